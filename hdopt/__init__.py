@@ -1,0 +1,1 @@
+"""hdopt: design optimization and tolerancing for harmonic drives (strain wave gears)."""
