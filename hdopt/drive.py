@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING
 
+from hdopt.errors import HdoptError
+
 if TYPE_CHECKING:
     from hdopt.profiles import WaveGeneratorProfile
 
@@ -21,7 +23,7 @@ TOOTH_DIFFERENCE = 2
 """CS teeth minus FS teeth: the model is of wave generators with two lobes, one tooth of difference a lobe."""
 
 
-class DriveError(ValueError):
+class DriveError(HdoptError):
     """A value that no drive can have. The message says what came, what is allowed and what to do."""
 
 
@@ -171,7 +173,7 @@ class Clearances:
             if width is not None and self.disc_radius is not None:
                 require(
                     width < 2 * self.disc_radius,
-                    f"{name} is {width:g} mm; a slot must be narrower than the disc, {2 * self.disc_radius:g} mm across",
+                    f"{name} is {width:g} mm; a slot must be narrower than the disc ({2 * self.disc_radius:g} mm)",
                 )
 
 

@@ -7,6 +7,7 @@ about both axes. Every profile gives r, r' and r'' as exact functions; curvature
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -344,7 +345,7 @@ class MeasuredProfile:
 
     def perimeter(self) -> float:
         knots = np.unique(np.clip(self._spline[0], self._spline[0][5], self._spline[0][5] + 2 * math.pi))
-        return sum(_arc_length(self, a, b) for a, b in zip(knots[:-1], knots[1:], strict=True))
+        return sum(_arc_length(self, a, b) for a, b in itertools.pairwise(knots))
 
 
 PROFILES: dict[str, type] = {"ellipse": Ellipse, "resal": Resal, "two_disk": TwoDisk, "measured": MeasuredProfile}

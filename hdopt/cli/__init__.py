@@ -1,0 +1,73 @@
+"""The command line. Each command lives in a module of its own that is imported only when the command is used."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+import click
+
+from hdopt.errors import HdoptError
+
+COMMANDS: dict[str, str] = {
+    "ke": "Kinematic error of one drive: peak-to-peak, orders, contact, lag.",
+    "profile": "The wave generator's profile: contact angle, curvature change, bending stress.",
+    "run": "Everything a study file asks for, with report.html.",
+    "studies": "The shipped studies, a line each.",
+}
+"""Command -> its line in `hdopt --help`; the command is `command` in `hdopt.cli.<name>`."""
+
+
+class LazyGroup(click.Group):
+    """A group that knows its commands' names and help lines without importing them."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        if name not in COMMANDS:
+            return None
+        return import_module(f"hdopt.cli.{name}").command
+
+    def resolve_command(self, ctx: click.Context, args: list[str]):
+        if args and not args[0].startswith("-") and args[0] not in COMMANDS:
+            from hdopt.errors import unknown_name
+
+            raise click.UsageError(unknown_name("command", args[0], COMMANDS))
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="hdopt")
+def cli() -> None:
+    """Design optimization and tolerancing for harmonic drives (strain wave gears).
+
+    Exit status: 0 done, 1 the answer is "no", 2 unusable input.
+    """
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit: unusable input ends with one message and status 2, never a traceback."""
+    try:
+        status = cli.main(args=arguments, prog_name="hdopt", standalone_mode=False)
+        sys.exit(status if isinstance(status, int) else 0)
+    except click.exceptions.NoArgsIsHelpError as help_text:
+        help_text.show()
+        sys.exit(2)
+    except click.ClickException as error:
+        print(f"hdopt: {error.format_message()}", file=sys.stderr)
+        sys.exit(2)
+    except (HdoptError, ValueError) as error:
+        # Physics refuses impossible values with ValueError; at the command line that is unusable input.
+        print(f"hdopt: {error}", file=sys.stderr)
+        sys.exit(2)
+    except BrokenPipeError:
+        sys.exit(0)
+    except (KeyboardInterrupt, click.Abort):
+        print("hdopt: interrupted", file=sys.stderr)
+        sys.exit(130)

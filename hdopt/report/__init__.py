@@ -1,0 +1,83 @@
+"""What a report is made of. Sections are built by `hdopt.report.sections`, pages are written by `hdopt.report.html`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import plotly.graph_objects as go
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A Plotly figure. `key` names it in the page and in file names; `caption` says what to see in it."""
+
+    key: str
+    title: str
+    figure: go.Figure
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table, also written as `key`.csv beside the report. `formats` maps a column to a format spec such as '.3f'."""
+
+    key: str
+    title: str
+    frame: pd.DataFrame
+    caption: str = ""
+    formats: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A drawing given as the text of an SVG, or the bytes of a PNG."""
+
+    key: str
+    title: str
+    content: str | bytes
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Text:
+    """A paragraph in plain words."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class KeyFigures:
+    """The few numbers to see first: label -> value with its unit, already written out."""
+
+    values: Mapping[str, str]
+
+
+Item = Figure | Table | Picture | Text | KeyFigures
+
+
+@dataclass(frozen=True)
+class Section:
+    """One topic of a report: a heading, what it says in a sentence or two, and what it shows."""
+
+    key: str
+    title: str
+    items: tuple[Item, ...]
+    summary: str = ""
+
+
+@dataclass(frozen=True)
+class Report:
+    """Everything on one page, with the JSON-ready results behind it."""
+
+    title: str
+    subtitle: str
+    sections: tuple[Section, ...]
+    results: Mapping[str, object] = field(default_factory=dict)
+
+
+SectionBuilder = Callable[..., Section]
+"""A function of `hdopt.report.sections`: takes a frozen result, returns the section that shows it."""
