@@ -59,7 +59,9 @@ def write_text(path: Path, text: str) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise HdoptError(f"cannot write {path}: {error.strerror}; give a file in a folder that can be written") from error
+        raise HdoptError(
+            f"cannot write {path}: {error.strerror}; give a file in a folder that can be written"
+        ) from error
 
 
 def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterable[T]:
