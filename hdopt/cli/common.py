@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -11,7 +9,7 @@ from typing import Any, TypeVar
 
 import click
 
-from hdopt.errors import HdoptError
+from hdopt.files import to_json, write_text
 
 T = TypeVar("T")
 
@@ -35,33 +33,6 @@ def emit(result: Mapping[str, Any], json_file: str | None, lines: Iterable[str])
         click.echo(line)
     if json_file:
         write_text(Path(json_file), to_json(result) + "\n")
-
-
-def to_json(result: Mapping[str, Any]) -> str:
-    """JSON text of `result`; numpy numbers and arrays become plain ones, numbers that are not finite become null."""
-    return json.dumps(_plain(result), indent=2, allow_nan=False)
-
-
-def _plain(value: Any) -> Any:
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return value
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file, or say in one sentence why that cannot be done."""
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise HdoptError(
-            f"cannot write {path}: {error.strerror}; give a file in a folder that can be written"
-        ) from error
 
 
 def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterable[T]:
