@@ -1,0 +1,123 @@
+"""How a table's columns are written for reading: headings, units, and numbers that align on the decimal point."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+UNITS = {
+    "arcmin": "arcmin",
+    "arcsec": "arcsec",
+    "deg": "deg",
+    "rad": "rad",
+    "mm": "mm",
+    "um": "µm",
+    "per_mm": "1/mm",
+    "mpa": "MPa",
+    "nm": "N m",
+    "rpm": "r/min",
+    "mm3": "mm³",
+    "percent": "%",
+    "ppm": "ppm",
+    "s": "s",
+    "k": "K",
+    "hz": "Hz",
+}
+"""The ending that marks a column's unit -> how the unit is written."""
+
+NOT_A_NUMBER = "–"
+SIGNIFICANT_DIGITS = 4
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table as it is read: heading, unit, 'number' or 'word', and its cells."""
+
+    name: str
+    unit: str
+    align: str
+    cells: tuple[str, ...]
+
+
+def columns(frame: pd.DataFrame, formats: dict[str, str] | None = None) -> list[Column]:
+    """The columns of `frame` as they are read, its index first where that has a meaning."""
+    if index_has_meaning(frame):
+        frame = frame.reset_index()
+    formats = formats or {}
+    return [_column(str(name), frame.iloc[:, i].tolist(), formats.get(name)) for i, name in enumerate(frame.columns)]
+
+
+def index_has_meaning(frame: pd.DataFrame) -> bool:
+    """Whether a table's index belongs to its content: it has a name, or entries other than 0, 1, 2..."""
+    import pandas as pd
+
+    return frame.index.name is not None or not isinstance(frame.index, pd.RangeIndex)
+
+
+def heading(name: str) -> tuple[str, str]:
+    """Heading and unit of a column: 'peak_to_peak_arcmin' reads 'peak to peak' with the unit 'arcmin'.
+
+    A name that holds a space or a bracket is taken as it is, 'Peak-to-peak [arcmin]' giving its unit in brackets.
+    """
+    bracketed = re.fullmatch(r"(.+?)\s*\[([^\]]+)\]", name)
+    if bracketed:
+        return bracketed.group(1), bracketed.group(2)
+    if " " in name:
+        return name, ""
+    for ending in sorted(UNITS, key=len, reverse=True):
+        if name.endswith("_" + ending):
+            return name.removesuffix("_" + ending).replace("_", " "), UNITS[ending]
+    return name.replace("_", " "), ""
+
+
+def _column(name: str, values: Sequence[Any], spec: str | None) -> Column:
+    title, unit = heading(name)
+    numeric = all(_is_number(v) or _is_missing(v) for v in values) and any(_is_number(v) for v in values)
+    write = _formatter(spec) if spec else (_aligned(values) if numeric else str)
+    cells = tuple(_cell(value, write) for value in values)
+    return Column(title, unit, "number" if numeric else "word", cells)
+
+
+def _cell(value: Any, write: Callable[[Any], str]) -> str:
+    if _is_missing(value):
+        return NOT_A_NUMBER
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if _is_number(value):
+        return minus(write(value))
+    return str(value)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_missing(value: Any) -> bool:
+    return value is None or (isinstance(value, float) and math.isnan(value)) or str(value) in ("<NA>", "NaT")
+
+
+def minus(text: str) -> str:
+    """A leading hyphen as the minus sign that is as wide as a digit."""
+    return "−" + text[1:] if text.startswith("-") else text
+
+
+def _formatter(spec: str) -> Callable[[Any], str]:
+    return lambda value: format(value, spec)
+
+
+def _aligned(values: Sequence[Any]) -> Callable[[Any], str]:
+    """One number of decimals for the column, so that its largest value shows four digits; whole numbers stay whole."""
+    sizes = [abs(v) for v in values if _is_number(v)]
+    if all(float(size).is_integer() for size in sizes):
+        return lambda value: f"{value:,.0f}".replace(",", "\u202f") if abs(value) >= 10_000 else f"{value:.0f}"
+    largest = max(sizes)
+    if largest >= 1e7 or largest < 1e-3:
+        return lambda value: f"{value:.{SIGNIFICANT_DIGITS - 1}e}"
+    decimals = max(0, SIGNIFICANT_DIGITS - 1 - math.floor(math.log10(largest)))
+    return lambda value: f"{value:.{decimals}f}"

@@ -1,0 +1,233 @@
+"""Write a report as one page that opens from disk, anywhere, with its numbers beside it.
+
+The page holds everything it needs (Plotly's library once, styles, data, pictures) and forbids itself any other source,
+so it looks the same offline, in an archive and in ten years. Nothing is computed here.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import re
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from functools import singledispatchmethod
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup, escape
+
+from hdopt.errors import HdoptError
+from hdopt.files import make_folder, to_json, write_text
+from hdopt.report import Figure, Item, KeyFigures, Picture, Report, Table, Text
+from hdopt.report.cells import columns, index_has_meaning, minus
+from hdopt.report.numbers import figure_frame
+from hdopt.report.theme import HEIGHT, template
+
+REPORT_FILE = "report.html"
+RESULTS_FILE = "results.json"
+ROWS_SHOWN = 60
+"""Rows of a table in the page; a longer one goes on in its CSV file."""
+
+CONTENT_SECURITY_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
+    "img-src data: blob:; worker-src blob:"
+)
+"""Only what is in the page itself: no network, no other file."""
+
+_KEY = re.compile(r"[a-z0-9][a-z0-9_-]*")
+_REFERENCE = re.compile(r"\[\[([^\[\]]+)\]\]")
+_CODE = re.compile(r"`([^`]+)`")
+
+
+def write_report(report: Report, folder: Path) -> Path:
+    """Write report.html, a CSV for every table and figure, and results.json into `folder`; return the page's path.
+
+    In summaries, captions and paragraphs `[[key]]` becomes a link to the figure, table or picture of that key
+    ('Figure 3'), and text between backticks is set as code.
+    """
+    folder = Path(folder)
+    _check_keys(report)
+    make_folder(folder)
+    tables = dict(_csv_tables(report))
+    for name, frame in tables.items():
+        write_text(folder / name, frame.to_csv(index=index_has_meaning(frame), lineterminator="\n"))
+    if report.results:
+        write_text(folder / RESULTS_FILE, to_json(report.results) + "\n")
+    page = folder / REPORT_FILE
+    write_text(page, render(report, set(tables)))
+    return page
+
+
+def render(report: Report, csv_files: set[str] = frozenset()) -> str:
+    """The page's HTML; `csv_files` are the names of the files beside it that it may link to."""
+    import jinja2
+
+    templates = files("hdopt.report") / "templates"
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    page = environment.from_string((templates / "report.html.j2").read_text(encoding="utf-8"))
+    prepare = _Preparation(report, csv_files)
+    figures = [item for section in report.sections for item in section.items if isinstance(item, Figure)]
+    return page.render(
+        report=report,
+        sections=[
+            {
+                "anchor": section.key,
+                "title": section.title,
+                "summary": prepare.prose(section.summary),
+                "items": [prepare.item(item) for item in section.items],
+            }
+            for section in report.sections
+        ],
+        figures=[(figure.key, _figure_json(figure)) for figure in figures],
+        template_json=_script_safe(json.dumps(template().to_plotly_json())),
+        plotly_js=_plotly_js() if figures else "",
+        css=(templates / "report.css").read_text(encoding="utf-8"),
+        js=(templates / "report.js").read_text(encoding="utf-8"),
+        content_security_policy=CONTENT_SECURITY_POLICY,
+        results_file=RESULTS_FILE if report.results else "",
+        version=version("hdopt"),
+        date=_today(),
+    )
+
+
+class _Preparation:
+    """Numbers a report's figures and tables, and turns its items into what the page template shows."""
+
+    def __init__(self, report: Report, csv_files: set[str]) -> None:
+        self.csv_files = csv_files
+        self.numbers: dict[str, str] = {}
+        counts = {"Figure": 0, "Table": 0}
+        for section in report.sections:
+            for item in section.items:
+                kind = {Figure: "Figure", Picture: "Figure", Table: "Table"}.get(type(item))
+                if kind:
+                    counts[kind] += 1
+                    self.numbers[item.key] = f"{kind} {counts[kind]}"
+
+    def prose(self, text: str) -> Markup:
+        """Plain text as HTML, with references to figures and tables linked."""
+        linked = _REFERENCE.sub(self._reference, str(escape(text)))
+        return Markup(_CODE.sub(r"<code>\1</code>", linked))
+
+    def _reference(self, match: re.Match[str]) -> str:
+        key = match.group(1)
+        if key not in self.numbers:
+            from hdopt.errors import unknown_name
+
+            raise HdoptError("report: " + unknown_name("figure or table", key, self.numbers))
+        return f'<a href="#{key}">{self.numbers[key].replace(" ", "&nbsp;")}</a>'
+
+    @singledispatchmethod
+    def item(self, item: Item) -> dict[str, Any]:
+        raise TypeError(f"a report cannot show a {type(item).__name__}")
+
+    @item.register
+    def _(self, item: Text) -> dict[str, Any]:
+        return {"kind": "text", "text": self.prose(item.text)}
+
+    @item.register
+    def _(self, item: KeyFigures) -> dict[str, Any]:
+        return {"kind": "key-figures", "entries": [(label, *_split_unit(v)) for label, v in item.values.items()]}
+
+    @item.register
+    def _(self, item: Figure) -> dict[str, Any]:
+        height = item.figure.layout.height or HEIGHT
+        return self._numbered(item) | {"kind": "figure", "height": f"{height:g}"}
+
+    @item.register
+    def _(self, item: Picture) -> dict[str, Any]:
+        return self._numbered(item) | {"kind": "picture", "source": _data_url(item.content)}
+
+    @item.register
+    def _(self, item: Table) -> dict[str, Any]:
+        shown = columns(item.frame, dict(item.formats))
+        rows = list(zip(*(column.cells for column in shown), strict=True))
+        return self._numbered(item) | {
+            "kind": "table",
+            "columns": shown,
+            "rows": rows[:ROWS_SHOWN],
+            "rows_left_out": max(0, len(rows) - ROWS_SHOWN),
+        }
+
+    def _numbered(self, item: Figure | Picture | Table) -> dict[str, Any]:
+        csv = f"{item.key}.csv"
+        return {
+            "key": item.key,
+            "anchor": item.key,
+            "number": self.numbers[item.key],
+            "title": _full_stop(item.title),
+            "caption": self.prose(item.caption),
+            "label": f"{item.title}. {_REFERENCE.sub('', item.caption)}".strip(),
+            "csv": csv if csv in self.csv_files else "",
+        }
+
+
+def _check_keys(report: Report) -> None:
+    """Keys name files and anchors: refuse one that cannot, and one used twice."""
+    seen: set[str] = {"report", "template"}
+    for section in report.sections:
+        for part in (section, *section.items):
+            key = getattr(part, "key", None)
+            if key is None:
+                continue
+            if not _KEY.fullmatch(key):
+                raise HdoptError(f"report: the key {key!r} cannot name a file; use a-z, 0-9, '-' and '_' only")
+            if key in seen:
+                raise HdoptError(f"report: the key {key!r} is used twice; give every section, figure and table its own")
+            seen.add(key)
+
+
+def _csv_tables(report: Report) -> Iterator[tuple[str, Any]]:
+    for section in report.sections:
+        for item in section.items:
+            if isinstance(item, Table):
+                yield f"{item.key}.csv", item.frame
+            elif isinstance(item, Figure) and not (frame := figure_frame(item.figure)).empty:
+                yield f"{item.key}.csv", frame
+
+
+def _figure_json(figure: Figure) -> str:
+    """Data and layout of a figure; the template is left out, because the page gives the same one to all."""
+    content = json.loads(figure.figure.to_json())
+    content["layout"].pop("template", None)
+    return _script_safe(json.dumps({"data": content["data"], "layout": content["layout"]}, separators=(",", ":")))
+
+
+def _script_safe(text: str) -> str:
+    """JSON that cannot end the script element that holds it."""
+    return text.replace("<", "\\u003c")
+
+
+def _plotly_js() -> str:
+    from plotly.offline import get_plotlyjs
+
+    return get_plotlyjs()
+
+
+def _data_url(content: str | bytes) -> str:
+    """An image as a data URL; an SVG so included cannot run scripts nor clash with the names of another."""
+    kind, raw = ("svg+xml", content.encode()) if isinstance(content, str) else ("png", content)
+    return f"data:image/{kind};base64,{base64.b64encode(raw).decode()}"
+
+
+def _split_unit(value: str) -> tuple[str, str]:
+    """'1.369 arcmin' as ('1.369', 'arcmin'); what is not one number with a unit stays whole."""
+    number, _, unit = value.partition(" ")
+    if re.fullmatch(r"[-+−±<>≈≤≥]?\d[\d.,\u202f]*%?", number):
+        return minus(number), unit
+    return value, ""
+
+
+def _full_stop(title: str) -> str:
+    return title if title.endswith((".", "?", "!")) else title + "."
+
+
+def _today() -> str:
+    """The date, or that of SOURCE_DATE_EPOCH where a reproducible page is wanted."""
+    epoch = os.environ.get("SOURCE_DATE_EPOCH")
+    moment = datetime.fromtimestamp(int(epoch), UTC) if epoch else datetime.now().astimezone()
+    return f"{moment.day} {moment:%B %Y}"

@@ -1,0 +1,72 @@
+"use strict";
+(() => {
+  const PRINT_WIDTH = 660; // px: fits A4 and Letter within the margins of the print style
+  const NARROW = 520; // px: below it a figure takes smaller type and leaves dragging to the page
+  const json = (id) => JSON.parse(document.getElementById(id).textContent);
+  const plots = [...document.querySelectorAll(".plot")];
+  const template = plots.length ? json("template") : null;
+  const config = {
+    displaylogo: false,
+    responsive: false,
+    // Named one by one: Plotly's own choice has a button that sends the figure's data to a server.
+    modeBarButtons: [["toImage", "resetViews"]],
+    displayModeBar: !matchMedia("(pointer: coarse)").matches,
+  };
+
+  // What depends on the width a figure is given; the rest of its layout is its builder's.
+  const sizes = (plot, width) => {
+    const own = plot.ownLayout;
+    const narrow = width < NARROW;
+    const size = (own.font && own.font.size) || 13;
+    return {
+      width,
+      height: plot.ownHeight,
+      "font.size": narrow ? Math.min(size, 11) : size,
+      dragmode: narrow ? false : own.dragmode || "zoom",
+    };
+  };
+
+  const draw = (plot) => {
+    const { data, layout } = json("figure-data-" + plot.dataset.figure);
+    plot.ownLayout = { font: layout.font, dragmode: layout.dragmode };
+    plot.ownHeight = layout.height || plot.clientHeight;
+    const size = sizes(plot, plot.clientWidth);
+    const font = { ...layout.font, size: size["font.size"] };
+    const { width, height, dragmode } = size;
+    return Plotly.newPlot(plot, data, { ...layout, template, width, height, font, dragmode }, {
+      ...config, toImageButtonOptions: { format: "svg", filename: plot.dataset.figure },
+    });
+  };
+
+  const fit = (width) => plots.forEach((plot) => {
+    const wanted = width || plot.clientWidth;
+    if (plot._fullLayout && plot._fullLayout.width !== wanted) Plotly.relayout(plot, sizes(plot, wanted));
+  });
+
+  window.hdoptReport = { drawn: Promise.all(plots.map(draw)).then(() => plots.length) };
+  window.hdoptReport.drawn.catch((error) => console.error(error));
+
+  let waiting = 0;
+  let printing = false;
+  addEventListener("resize", () => {
+    clearTimeout(waiting);
+    if (!printing) waiting = setTimeout(() => printing || fit(), 100);
+  });
+  addEventListener("beforeprint", () => { printing = true; fit(PRINT_WIDTH); });
+  addEventListener("afterprint", () => { printing = false; fit(); });
+
+  const contents = document.querySelector(".contents details");
+  if (contents && matchMedia("(max-width: 62rem)").matches) contents.open = false;
+  const links = new Map([...document.querySelectorAll(".contents a")].map((a) => [a.hash.slice(1), a]));
+  const inView = new Set();
+  const watcher = new IntersectionObserver((entries) => {
+    for (const { target, isIntersecting } of entries) inView[isIntersecting ? "add" : "delete"](target.id);
+    let first = true;
+    for (const [id, link] of links) {
+      const current = first && inView.has(id);
+      if (current) first = false;
+      current ? link.setAttribute("aria-current", "location") : link.removeAttribute("aria-current");
+    }
+  }, { rootMargin: "-10% 0px -60% 0px" });
+  document.querySelectorAll("main > section").forEach((section) => watcher.observe(section));
+})();
