@@ -1,0 +1,310 @@
+"""The compiled kernel: converged peak-to-peak of one drive in well under a microsecond.
+
+To first order every branch of tau (zone s, rim k) is one sinusoid of the input angle. With t = tan(alpha) T_a and
+d = tan(alpha) E_a + the CS term, both c + R cos(theta - psi), the driving zone over all FS phases reaches
+
+    |t| + |d| + a_FS  at most,        |t| + max(0, |d| - a_FS)  at least.
+
+The extremes of these two lie at known angles: peaks and troughs of |t| +- |d|, zeros of t, and where |d| = a_FS.
+The second-order terms of the closed form and the discrete FS phases move them a little. So the few first-order
+candidates that can still win are refined on the closed form with exact slopes: a smooth extreme by a Newton step,
+a V-shaped minimum (rims or zones switching) as the lowest point of the highest of the branches' tangents.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from hdopt.kinematics import closed_form
+
+rigid_motion = njit(inline="always")(closed_form.rigid_motion)
+rim_depth = njit(inline="always")(closed_form.rim_depth)
+
+NARROW = 0.25
+"""How far, in rad, a refined extreme may move from its first-order place."""
+SETTLED = 0.2
+"""How far, in units of the second-order terms, a once-refined minimum may still sink."""
+FINAL_REACH = 0.02
+"""How far it may still move in the last step, where parabolas stand for the branches."""
+SCRATCH = (32, 8)
+"""Work space: first-order minima (bound, cos, sin), then refined ones (value, cos, sin, cos and sin of FS phase)."""
+
+
+class Rim(NamedTuple):
+    """One rim in one zone at one angle: tau without its FS term, with slope and curvature over theta; the depth."""
+
+    value: float
+    slope: float
+    bend: float
+    offset_fs: float
+    depth: float
+    depth_slope: float
+
+
+@njit(inline="always")
+def _sinusoid_derivative(cos_part, sin_part, cos, sin):
+    return sin_part * cos - cos_part * sin
+
+
+@njit(inline="always")
+def _rim(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin, s, k):
+    """tau without its FS term, its slope and curvature over theta, the FS offset o' and the depth, of zone s, rim k."""
+    e_a = motion.ea_cos * cos + motion.ea_sin * sin + motion.ea_0
+    e_l = motion.el_cos * cos + motion.el_sin * sin + motion.el_0
+    t_a = motion.ta_cos * cos + motion.ta_sin * sin + motion.ta_0
+    t_l = motion.tl_cos * cos + motion.tl_sin * sin + motion.tl_0
+    e_a1 = _sinusoid_derivative(motion.ea_cos, motion.ea_sin, cos, sin)
+    e_l1 = _sinusoid_derivative(motion.el_cos, motion.el_sin, cos, sin)
+    t_a1 = _sinusoid_derivative(motion.ta_cos, motion.ta_sin, cos, sin)
+    t_l1 = _sinusoid_derivative(motion.tl_cos, motion.tl_sin, cos, sin)
+    depth, o, o_fs = rim_depth(tip, e_a, e_l, t_a, t_l, s, k)
+    w2 = tip.half_width * tip.half_width
+    flatness = tip.semi_major - tip.tip_radius
+    q1 = e_l1 + s * k * t_l1 - s * (tip.semi_major + tip.tip_radius) / 2 / w2 * (t_a1 * t_l + t_a * t_l1)
+    depth1 = s * e_a1 + k * t_a1 - tip.semi_major / w2 * t_a * t_a1 + o * q1
+    cs = cs_cos * cos + cs_sin * sin
+    cs1 = cs_sin * cos - cs_cos * sin
+    value = tan_alpha * depth + s * (cs * (1 - 0.5 * o * o) + s * o * cs1)
+    slope = tan_alpha * depth1 + s * (cs1 - s * o * cs) * (1 + s * q1 / flatness)
+    bend = -tan_alpha * (s * (e_a - motion.ea_0) + k * (t_a - motion.ta_0)) - s * cs
+    return Rim(value, slope, bend, o_fs, depth, depth1)
+
+
+@njit(inline="always")
+def _lowest_between(low, high, v1, g1, b1, v2, g2, b2):
+    """Lowest point (x, value) of the higher of two parabolas v + g x + b x^2/2 on the interval [low, high]."""
+    x_best, best = low, max(v1 + low * (g1 + low * b1 / 2), v2 + low * (g2 + low * b2 / 2))
+    gap, rate, turn = v1 - v2, g1 - g2, b1 - b2
+    crossing = -gap / rate if rate != 0.0 else high
+    local_rate = rate + turn * crossing
+    if local_rate != 0.0:
+        crossing -= (gap + crossing * (rate + turn * crossing / 2)) / local_rate
+    vertex_1 = -g1 / b1 if b1 > 0.0 else high
+    vertex_2 = -g2 / b2 if b2 > 0.0 else high
+    for x in (high, crossing, vertex_1, vertex_2):
+        if low <= x <= high:
+            value = max(v1 + x * (g1 + x * b1 / 2), v2 + x * (g2 + x * b2 / 2))
+            if value < best:
+                x_best, best = x, value
+    return x_best, best
+
+
+@njit(inline="always")
+def _rotate(cos, sin, x):
+    """(cos, sin) turned by a small angle x (series to x^5; |x| <= 0.25 keeps 3e-7)."""
+    x2 = x * x
+    c = 1 - x2 / 2 * (1 - x2 / 12)
+    s = x * (1 - x2 / 6 * (1 - x2 / 20))
+    return cos * c - sin * s, sin * c + cos * s
+
+
+@njit(inline="always")
+def _switch(upper, lower):
+    """Where, seen from here, the deepest rim changes; infinite where it does not."""
+    rate = upper.depth_slope - lower.depth_slope
+    return (lower.depth - upper.depth) / rate if rate != 0.0 else math.inf
+
+
+@njit(inline="always")
+def _with_fs(rim, s, a_fs, advance, fs_cos, fs_sin):
+    """Value, slope and curvature of one branch of tau, its FS term included."""
+    cos, sin = _rotate(fs_cos, fs_sin, s * rim.offset_fs)
+    return rim.value + s * a_fs * sin, rim.slope + s * a_fs * advance * cos, rim.bend - s * a_fs * sin
+
+
+@njit(inline="always")
+def _deeper(upper, lower, x):
+    """Whether the upper rim is the deeper one at a distance x from here."""
+    return upper.depth + x * upper.depth_slope >= lower.depth + x * lower.depth_slope
+
+
+@njit(inline="always")
+def _four_rims(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin):
+    """Both rims of zone 1, then of zone 2, and the two distances from here, sorted, at which a deepest rim changes."""
+    a = _rim(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin, 1.0, 1.0)
+    b = _rim(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin, 1.0, -1.0)
+    c = _rim(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin, -1.0, 1.0)
+    d = _rim(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin, -1.0, -1.0)
+    first, second = _switch(a, b), _switch(c, d)
+    return (a, b, c, d), min(first, second), max(first, second)
+
+
+@njit(inline="always")
+def _lowest_nearby(rims, first, second, reach, a_fs, advance, fs_cos, fs_sin):
+    """(x, value): least driving deviation within `reach` of the angle of `rims`, where the FS phase is as given.
+
+    Between the angles where either zone's deepest rim changes, tau_1 and tau_2 are smooth: each piece is searched with
+    its ends, since tau steps there and the infimum is a one-sided limit.
+    """
+    first, second = min(reach, max(-reach, first)), min(reach, max(-reach, second))
+    x_best, best = 0.0, math.inf
+    for piece in range(3):
+        low = -reach if piece == 0 else first if piece == 1 else second
+        high = first if piece == 0 else second if piece == 1 else reach
+        if high > low:
+            middle = (low + high) / 2
+            one = rims[0] if _deeper(rims[0], rims[1], middle) else rims[1]
+            two = rims[2] if _deeper(rims[2], rims[3], middle) else rims[3]
+            v1, g1, b1 = _with_fs(one, 1.0, a_fs, advance, fs_cos, fs_sin)
+            v2, g2, b2 = _with_fs(two, -1.0, a_fs, advance, fs_cos, fs_sin)
+            x, value = _lowest_between(low, high, v1, g1, b1, v2, g2, b2)
+            if value < best:
+                x_best, best = x, value
+    return x_best, best
+
+
+@njit
+def _least(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phases, t, d, margin, settled, scratch):
+    """Infimum over one full relative turn, mm of arc. `t`, `d`: (cos, sin, constant) of the first-order parts."""
+    t_cos, t_sin, t_0 = t
+    d_cos, d_sin, d_0 = d
+    count = 0
+    best = math.inf
+
+    t_size = math.sqrt(t_cos * t_cos + t_sin * t_sin)
+    d_size = math.sqrt(d_cos * d_cos + d_sin * d_sin)
+    for case in range(7):
+        # Angles where a first-order sinusoid of (c, s) meets a level: its trough, or a pair of crossings.
+        if case < 4:
+            sign_t, sign_d = (1.0 if case < 2 else -1.0), (1.0 if case % 2 == 0 else -1.0)
+            c, s = sign_t * t_cos + sign_d * d_cos, sign_t * t_sin + sign_d * d_sin
+            size = math.sqrt(c * c + s * s)
+            level = -size
+        elif case == 4:
+            c, s, size, level = t_cos, t_sin, t_size, -t_0
+            if abs(level) > size:
+                level = -size if t_0 > 0 else size
+        else:
+            c, s, size = d_cos, d_sin, d_size
+            level = (a_fs if case == 5 else -a_fs) - d_0
+        if size == 0.0:
+            if count > 0:
+                continue
+            c, s, size, level = 1.0, 0.0, 1.0, 1.0
+        ratio = level / size
+        if abs(ratio) > 1.0:
+            continue
+        c, s = c / size, s / size
+        side = math.sqrt(1.0 - ratio * ratio)
+        for twin in range(1 if side == 0.0 else 2):
+            along = side if twin == 0 else -side
+            cos, sin = ratio * c - along * s, ratio * s + along * c
+            bound = abs(t_cos * cos + t_sin * sin + t_0)
+            bound += max(0.0, abs(d_cos * cos + d_sin * sin + d_0) - a_fs)
+            best = min(best, bound)
+            if bound <= best + margin:
+                scratch[count, 0], scratch[count, 1], scratch[count, 2] = bound, cos, sin
+                count += 1
+
+    spacing = 2 * math.pi / phases
+    least = math.inf
+    found = 0
+    for i in range(count):
+        if scratch[i, 0] > best + margin:
+            continue
+        cos, sin = scratch[i, 1], scratch[i, 2]
+        rims, first, second = _four_rims(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin)
+        phase = advance * math.atan2(sin, cos) + fs_phase
+        # FS phase at which both zones drive equally, or the trough of the zone that drives alone.
+        wanted = -(d_cos * cos + d_sin * sin + d_0) / a_fs if a_fs > 0.0 else 0.0
+        wanted = min(1.0, max(-1.0, wanted))
+        other = math.sqrt(1.0 - wanted * wanted)
+        target = math.atan2(wanted, other)
+        for crossing in range(2 if other > 0.0 else 1):
+            if crossing == 1:
+                target, other = math.pi - target, -other
+            off = (phase - target) / spacing
+            off = (off - math.floor(off)) * spacing
+            for neighbour in range(2):
+                fs_cos, fs_sin = _rotate(other, wanted, off - neighbour * spacing)
+                x, value = _lowest_nearby(rims, first, second, NARROW, a_fs, advance, fs_cos, fs_sin)
+                least = min(least, value)
+                if value <= least + settled and found < SCRATCH[0]:
+                    turned = _rotate(cos, sin, x)
+                    turned_fs = _rotate(fs_cos, fs_sin, advance * x)
+                    scratch[found, 3], scratch[found, 4], scratch[found, 5] = value, turned[0], turned[1]
+                    scratch[found, 6], scratch[found, 7] = turned_fs[0], turned_fs[1]
+                    found += 1
+
+    polished = math.inf
+    for i in range(found):
+        if scratch[i, 3] <= least + settled:
+            rims, first, second = _four_rims(tip, motion, cs_cos, cs_sin, tan_alpha, scratch[i, 4], scratch[i, 5])
+            _, value = _lowest_nearby(rims, first, second, FINAL_REACH, a_fs, advance, scratch[i, 6], scratch[i, 7])
+            polished = min(polished, value)
+    return polished
+
+
+@njit
+def _greatest(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phases, t, d, margin):
+    """Supremum over one full relative turn, mm of arc."""
+    t_cos, t_sin, t_0 = t
+    d_cos, d_sin, d_0 = d
+    best = -math.inf
+    for case in range(4):
+        s, k = (1.0 if case < 2 else -1.0), (1.0 if case % 2 == 0 else -1.0)
+        c, n = s * d_cos + k * t_cos, s * d_sin + k * t_sin
+        best = max(best, s * d_0 + k * t_0 + math.sqrt(c * c + n * n))
+    spacing = 2 * math.pi / phases
+    greatest = -math.inf
+    for case in range(4):
+        s, k = (1.0 if case < 2 else -1.0), (1.0 if case % 2 == 0 else -1.0)
+        c, n = s * d_cos + k * t_cos, s * d_sin + k * t_sin
+        size = math.sqrt(c * c + n * n)
+        if s * d_0 + k * t_0 + size < best - margin:
+            continue
+        cos, sin = (c / size, n / size) if size > 0.0 else (1.0, 0.0)
+        rim = _rim(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin, s, k)
+        # The phase's distance x from the peak of s sin(X + s o') is within half a spacing: take the nearer two.
+        off = (advance * math.atan2(sin, cos) + fs_phase + s * rim.offset_fs - s * math.pi / 2) / spacing
+        off = (off - math.floor(off)) * spacing
+        for neighbour in range(2):
+            x = off - neighbour * spacing
+            pull = rim.slope - a_fs * advance * x
+            stiffness = a_fs * advance * advance - rim.bend
+            gain = pull * pull / (2 * stiffness) if stiffness > 0.0 else 0.0
+            greatest = max(greatest, rim.value + a_fs * (1 - x * x / 2) + gain)
+    return greatest
+
+
+@njit
+def _one(tip, tan_alpha, advance, phases, row, scratch):
+    """Peak-to-peak of one drive, mm of arc; `row` holds its errors in the order of ERROR_NAMES."""
+    beta1, alpha1, phi_cs, a_fs = row[1], row[5], row[9], row[10]
+    motion = rigid_motion(
+        tip,
+        row[0] * math.sin(beta1),
+        row[0] * math.cos(beta1),
+        math.tan(row[3]),
+        math.tan(row[2]),
+        row[4] * math.cos(alpha1),
+        row[4] * math.sin(alpha1),
+        math.tan(row[6]),
+        math.tan(row[7]),
+    )
+    cs_cos, cs_sin = row[8] * math.sin(phi_cs), row[8] * math.cos(phi_cs)
+    t = tan_alpha * motion.ta_cos, tan_alpha * motion.ta_sin, tan_alpha * motion.ta_0
+    d = tan_alpha * motion.ea_cos + cs_cos, tan_alpha * motion.ea_sin + cs_sin, tan_alpha * motion.ea_0
+    t_max = math.sqrt(motion.ta_cos**2 + motion.ta_sin**2) + abs(motion.ta_0)
+    l_max = math.sqrt(motion.el_cos**2 + motion.el_sin**2) + abs(motion.el_0)
+    l_max += math.sqrt(motion.tl_cos**2 + motion.tl_sin**2) + abs(motion.tl_0)
+    offset = l_max / (tip.semi_major - tip.tip_radius)
+    second_order = tan_alpha * (tip.semi_major / 2 * (t_max / tip.half_width) ** 2 + l_max * offset / 2)
+    second_order += (row[8] + a_fs) * offset
+    margin = 2 * second_order + a_fs * math.pi / phases
+    settled = SETTLED * second_order
+    low = _least(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, row[11], advance, phases, t, d, margin, settled, scratch)
+    high = _greatest(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, row[11], advance, phases, t, d, margin)
+    return high - low
+
+
+@njit(cache=True, nogil=True)
+def peak_to_peak_block(tip, tan_alpha, advance, phases, matrix, out):
+    """Fill `out` (n,) with the peak-to-peak of each row of `matrix` (n, 12), mm of arc."""
+    scratch = np.empty(SCRATCH)
+    for i in range(matrix.shape[0]):
+        out[i] = _one(tip, tan_alpha, advance, phases, matrix[i], scratch)
