@@ -1,0 +1,235 @@
+"""One blind case: what is asked for, the recordings that go out, and the key that stays behind."""
+
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+
+import numpy as np
+import pandas as pd
+
+from tests.blind.bench import hidden_wave, joint_rms, read_angles, read_error, set_up
+from tests.blind.evidence import Witness
+from tests.blind.geometry import ARCMIN, draw_errors
+from tests.blind.hidden_drive import BearingPass, Lobing, LocalDefect, LongWave, ToothMesh
+from tests.blind.hidden_load import Hysteresis, LostMotion, Resonance, ThermalDrift, Windup
+from tests.blind.hidden_outside import Outside
+from tests.blind.hidden_sensors import ChannelDelay, Coupling, Eccentricity, Interpolation
+from tests.blind.instrument import draw_instrument, record
+from tests.blind.motion import draw_plans, draw_ripple, run
+
+CATALOGUE = {
+    "cs_tooth_harmonics": partial(LongWave.draw, on="cs"),
+    "fs_tooth_harmonics": partial(LongWave.draw, on="fs"),
+    "tooth_mesh": ToothMesh.draw,
+    "torsional_windup": Windup.draw,
+    "hysteresis": Hysteresis.draw,
+    "lost_motion": LostMotion.draw,
+    "encoder_input_eccentricity": partial(Eccentricity.draw, on="input"),
+    "encoder_output_eccentricity": partial(Eccentricity.draw, on="output"),
+    "encoder_interpolation": Interpolation.draw,
+    "output_coupling": Coupling.draw,
+    "bearing_pass": BearingPass.draw,
+    "circular_spline_lobing": Lobing.draw,
+    "thermal_drift": ThermalDrift.draw,
+    "resonance": Resonance.draw,
+    "local_tooth_defect": LocalDefect.draw,
+    "channel_delay": ChannelDelay.draw,
+}
+
+TROUBLES = ("gaps", "coloured", "ripple", "short", "one way", "coarse", "clock")
+
+# Above this severity a case whose own records cannot show the physics is drawn anew: it would test nothing.
+MUST_SHOW = 0.25
+ATTEMPTS = 12
+
+
+@dataclass(frozen=True)
+class Spec:
+    """What a case is to be. `effects` are catalogue ids; `outside` a kind of physics beyond it."""
+
+    family: str  # "nothing", "single", "pair", "decoy", "unknown"
+    seed: int
+    effects: tuple[str, ...] = ()
+    severity: float = 0.0  # hidden rms of each effect, in units of the base's rms
+    outside: str = ""
+    trouble: str = ""
+
+
+@dataclass(frozen=True)
+class Key:
+    """The truth of one case. Waves and noise in arcmin rms, means of each recording removed."""
+
+    id: str
+    family: str
+    seed: int
+    effects: tuple[str, ...]
+    variants: tuple[str, ...]
+    outside: str
+    trouble: str
+    severity: float
+    base_rms_arcmin: float
+    hidden_rms_arcmin: float  # of all hidden physics together
+    part_rms_arcmin: dict
+    noise_rms_arcmin: float
+    unexplained_rms_arcmin: float  # of the hidden wave, after the base alone was refitted
+    detectable: bool
+    separable: bool
+    rivals: tuple[str, ...]
+    parameters: dict  # id -> name -> {value, unit, identifiable}
+    conditions: dict
+
+    def to_dict(self):
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Case:
+    """What goes out: the tables, and nothing that hints at what is in them."""
+
+    id: str
+    recordings: tuple[pd.DataFrame, ...]
+
+
+def generate(spec, name="case"):
+    """Case and key of `spec`; the same seed gives the same numbers."""
+    for effect in spec.effects:
+        if effect not in CATALOGUE:
+            raise ValueError(f"unknown effect {effect!r}; the bench knows {', '.join(CATALOGUE)}")
+    rng = np.random.default_rng([spec.seed, len(spec.effects), int(1000 * spec.severity)])
+    for _ in range(ATTEMPTS):
+        case, key = _attempt(spec, name, rng)
+        if case is not None and _fair(spec, key):
+            return case, key
+    raise RuntimeError(f"no fair case in {ATTEMPTS} draws for {spec}")
+
+
+def _fair(spec, key):
+    if spec.family == "unknown":
+        return key.detectable and not key.rivals
+    if spec.family in ("single", "pair") and spec.severity >= MUST_SHOW:
+        return key.detectable
+    return True
+
+
+def _attempt(spec, name, rng):
+    errors = draw_errors(rng)
+    hidden = [CATALOGUE[effect](rng) for effect in spec.effects]
+    if spec.outside:
+        hidden.append(Outside.draw(rng, spec.outside))
+    plans = _plans(spec, hidden, rng)
+    hidden = [physics.for_plans(plans) for physics in hidden]
+    trouble = frozenset([spec.trouble])
+    instrument = draw_instrument(rng, len(plans), trouble)
+    setups = [set_up(errors, run(plan, instrument.jitter, rng)) for plan in plans]
+    base_rms = joint_rms([read_error(s) for s in setups])
+    hidden, waves = _to_severity(hidden, setups, spec.severity * base_rms)
+    if hidden is None:
+        return None, None
+    gain = float(np.prod([physics.torque_gain for physics in hidden]))
+    tables, noises = zip(
+        *[
+            record(instrument, rank, plan, s.run, read_angles(s, hidden), gain * s.run.torque, rng)
+            for rank, (plan, s) in enumerate(zip(plans, setups, strict=True))
+        ],
+        strict=True,
+    )
+    noise_rms = joint_rms(noises)
+    together = [hidden_wave(s, hidden) for s in setups] if len(hidden) != 1 else waves[0]
+    finding = _weigh(hidden, setups, plans, waves, together, noise_rms, instrument, rng)
+    top_torque = gain * max(float(np.abs(s.run.torque).max()) for s in setups)
+    key = Key(
+        id=name,
+        family=spec.family,
+        seed=spec.seed,
+        effects=tuple(sorted(spec.effects)),
+        variants=tuple(physics.variant for physics in hidden),
+        outside=spec.outside,
+        trouble=spec.trouble,
+        severity=spec.severity,
+        base_rms_arcmin=base_rms / ARCMIN,
+        hidden_rms_arcmin=joint_rms(together) / ARCMIN,
+        part_rms_arcmin={h.id or h.variant: joint_rms(w) / ARCMIN for h, w in zip(hidden, waves, strict=True)},
+        noise_rms_arcmin=noise_rms / ARCMIN,
+        parameters={physics.id: _parameters(physics, top_torque) for physics in hidden if physics.id},
+        conditions=_conditions(plans, setups),
+        **finding,
+    )
+    return Case(name, tuple(tables)), key
+
+
+def _plans(spec, hidden, rng):
+    needs = frozenset().union(*[physics.needs for physics in hidden])
+    size = "small" if spec.family == "nothing" else "full"
+    if spec.trouble == "one way":
+        needs = needs - {"reversal", "speeds"} | {"one way"}
+    if spec.trouble == "short":
+        size = "short"
+    plans = draw_plans(rng, needs, size)
+    if spec.trouble == "ripple":
+        plans = tuple(replace(p, ripple=draw_ripple(rng, rng.uniform(0.05, 0.2))) for p in plans)
+    return plans
+
+
+def _to_severity(hidden, setups, target):
+    """Every hidden physics scaled to an rms of `target` (rad) alone, and its waves; None where it cannot be so large.
+
+    A decoy's conditions may take all effect from it (play without a reversal); it then stays as it was drawn.
+    """
+    found, waves = [], []
+    for physics in hidden:
+        scale, wave = physics.scale, None
+        for _ in range(25):
+            physics = physics.scaled(scale)
+            wave = [hidden_wave(s, [physics]) for s in setups]
+            rms = joint_rms(wave)
+            if rms < 1e-3 * target or target == 0 or abs(rms / target - 1) < 0.005:
+                break
+            # Secant in logarithms from the local proportionality; half steps where physics is not proportional.
+            step = target / rms if abs(np.log(target / rms)) > 0.1 else np.sqrt(target / rms)
+            low, high = physics.scale_range
+            scale = float(np.clip(scale * step, low, high))
+        found.append(physics)
+        waves.append(wave)
+        if target and rms >= 1e-3 * target and abs(rms / target - 1) > 0.05:
+            return None, None
+    return found, waves
+
+
+def _weigh(hidden, setups, plans, waves, together, noise_rms, instrument, rng):
+    if not hidden:
+        return {"unexplained_rms_arcmin": 0.0, "detectable": False, "separable": False, "rivals": ()}
+    witness = Witness(setups, plans, rng)
+
+    def sampled(parts):
+        return np.concatenate([part[pick] for part, pick in zip(parts, witness.pick, strict=True)])
+
+    share = instrument.effective(1.0)
+    parts = [sampled(wave) for wave in waves]
+    detectable, rivals = True, set()
+    for rank, physics in enumerate(hidden):
+        others = [part for other, part in enumerate(parts) if other != rank]
+        beside = np.column_stack(others) if others else None
+        evidence = witness.weigh(parts[rank], physics.id, noise_rms, share, beside)
+        detectable &= evidence.detectable
+        rivals |= set(evidence.rivals)
+    return {
+        "unexplained_rms_arcmin": witness.refit(sampled(together)) / ARCMIN,
+        "detectable": bool(detectable),
+        "separable": not rivals,
+        "rivals": tuple(sorted(rivals)),
+    }
+
+
+def _parameters(physics, top_torque):
+    found = physics.truth_under(top_torque) if physics.id == "torsional_windup" else physics.truth()
+    return {name: asdict(parameter) for name, parameter in found.items()}
+
+
+def _conditions(plans, setups):
+    return {
+        "recordings": len(plans),
+        "samples": int(sum(s.run.time.size for s in setups)),
+        "legs": [list(plan.legs) for plan in plans],
+        "samples_per_turn": plans[0].samples_per_turn,
+        "torque": plans[0].torque.shape if plans[0].torque else "",
+        "temperature": plans[0].log_temperature,
+    }
