@@ -1,6 +1,7 @@
 "use strict";
 (() => {
   const PRINT_WIDTH = 660; // px: fits A4 and Letter within the margins of the print style
+  const PRINT_TYPE = 0.8; // size of a table's type in print against that on the screen, a little above the style's
   const NARROW = 520; // px: below it a figure takes smaller type and leaves dragging to the page
   const json = (id) => JSON.parse(document.getElementById(id).textContent);
   const plots = [...document.querySelectorAll(".plot")];
@@ -46,13 +47,19 @@
   window.hdoptReport = { drawn: Promise.all(plots.map(draw)).then(() => plots.length) };
   window.hdoptReport.drawn.catch((error) => console.error(error));
 
+  // Paper does not scroll: a table wider than the page is set smaller.
+  const fitTables = () => document.querySelectorAll(".scroll table").forEach((table) => {
+    const zoom = Math.min(1, PRINT_WIDTH / (PRINT_TYPE * table.scrollWidth));
+    table.style.setProperty("--print-zoom", zoom.toFixed(3));
+  });
+
   let waiting = 0;
   let printing = false;
   addEventListener("resize", () => {
     clearTimeout(waiting);
     if (!printing) waiting = setTimeout(() => printing || fit(), 100);
   });
-  addEventListener("beforeprint", () => { printing = true; fit(PRINT_WIDTH); });
+  addEventListener("beforeprint", () => { printing = true; fit(PRINT_WIDTH); fitTables(); });
   addEventListener("afterprint", () => { printing = false; fit(); });
 
   const contents = document.querySelector(".contents details");
