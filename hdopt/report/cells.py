@@ -44,6 +44,11 @@ class Column:
     align: str
     cells: tuple[str, ...]
 
+    @property
+    def short(self) -> bool:
+        """Whether its words are better kept on one line."""
+        return max((len(cell) for cell in (self.name, *self.cells)), default=0) <= 22
+
 
 def columns(frame: pd.DataFrame, formats: dict[str, str] | None = None) -> list[Column]:
     """The columns of `frame` as they are read, its index first where that has a meaning."""

@@ -16,14 +16,18 @@ COORDINATES = ("x", "y", "z", "r", "theta")
 def figure_frame(figure: go.Figure) -> pd.DataFrame:
     """One row a point: the trace's name, its coordinates, and the titles of its axes where the figure has several.
 
-    A grid (heat map, contour) gives one row a cell. Traces without data of these kinds give no rows.
+    A grid (heat map, contour) gives one row a cell. Left out are traces without data of these kinds, and traces that
+    have neither a legend entry nor a hover label, which only decorate.
     """
     import pandas as pd
 
-    frames = [frame for trace in figure.data if (frame := _trace_frame(trace)) is not None]
-    if not frames:
+    traces = [trace for trace in figure.data if not _is_decoration(trace)]
+    frames_and_titles = [
+        (frame, _axis_titles(figure, trace)) for trace in traces if (frame := _trace_frame(trace)) is not None
+    ]
+    if not frames_and_titles:
         return pd.DataFrame()
-    titles = [_axis_titles(figure, trace) for trace in figure.data if _trace_frame(trace) is not None]
+    frames, titles = zip(*frames_and_titles, strict=True)
     several = len(set(titles)) > 1
     for frame, (x_title, y_title) in zip(frames, titles, strict=True):
         if several:
@@ -35,6 +39,10 @@ def figure_frame(figure: go.Figure) -> pd.DataFrame:
         if len(set(renamed.values()) | {"trace", "z"}) == 4:
             joined = joined.rename(columns=renamed)
     return joined
+
+
+def _is_decoration(trace: Any) -> bool:
+    return getattr(trace, "hoverinfo", None) == "skip" and getattr(trace, "showlegend", None) is False
 
 
 def _trace_frame(trace: Any) -> pd.DataFrame | None:
@@ -57,7 +65,8 @@ def _trace_frame(trace: Any) -> pd.DataFrame | None:
     flat = {key: values for key, values in given.items() if values.ndim == 1}
     if not flat or len({len(values) for values in flat.values()}) != 1:
         return None
-    return pd.DataFrame({"trace": name, **flat})
+    frame = pd.DataFrame({"trace": name, **flat})
+    return frame.dropna(subset=list(flat), how="any")
 
 
 def _axis_titles(figure: go.Figure, trace: Any) -> tuple[str, str]:

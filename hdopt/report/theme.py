@@ -75,7 +75,13 @@ def template() -> go.layout.Template:
         "minor": {"showgrid": False},
     }
     polar_axis = {"gridcolor": GRID, "linecolor": AXIS, "tickcolor": AXIS}
-    colour_bar = {"outlinewidth": 0, "thickness": 12, "ticklen": 4, "tickcolor": AXIS, "title": {"side": "right"}}
+    colour_bar = {
+        "outlinewidth": 0,
+        "thickness": 12,
+        "ticklen": 4,
+        "tickcolor": AXIS,
+        "title": {"side": "right", "font": {"size": 13, "color": MUTED}},
+    }
     sequential = [list(stop) for stop in SEQUENTIAL]
     return go.layout.Template(
         layout={
@@ -112,7 +118,7 @@ def template() -> go.layout.Template:
             "separators": ".\u202f",
         },
         data={
-            "scatter": [{"line": {"width": 2}, "marker": {"size": 7}}],
+            "scatter": [{"line": {"width": 2}, "marker": {"size": 7, "colorbar": colour_bar}}],
             "bar": [{"marker": {"line": {"width": 0}}}],
             "heatmap": [{"colorscale": sequential, "colorbar": colour_bar}],
             "contour": [{"colorscale": sequential, "colorbar": colour_bar}],

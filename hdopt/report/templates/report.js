@@ -1,6 +1,7 @@
 "use strict";
 (() => {
   const PRINT_WIDTH = 660; // px: fits A4 and Letter within the margins of the print style
+  const PRINT_HEIGHT = 0.86; // height of a figure in print against that on the screen
   const PRINT_TYPE = 0.8; // size of a table's type in print against that on the screen, a little above the style's
   const NARROW = 520; // px: below it a figure takes smaller type and leaves dragging to the page
   const json = (id) => JSON.parse(document.getElementById(id).textContent);
@@ -14,6 +15,8 @@
     displayModeBar: !matchMedia("(pointer: coarse)").matches,
   };
 
+  let printing = false;
+
   // What depends on the width a figure is given; the rest of its layout is its builder's.
   const sizes = (plot, width) => {
     const own = plot.ownLayout;
@@ -21,7 +24,7 @@
     const size = (own.font && own.font.size) || 13;
     return {
       width,
-      height: plot.ownHeight,
+      height: printing ? Math.max(240, Math.round(PRINT_HEIGHT * plot.ownHeight)) : plot.ownHeight,
       "font.size": narrow ? Math.min(size, 11) : size,
       dragmode: narrow ? false : own.dragmode || "zoom",
     };
@@ -41,7 +44,11 @@
 
   const fit = (width) => plots.forEach((plot) => {
     const wanted = width || plot.clientWidth;
-    if (plot._fullLayout && plot._fullLayout.width !== wanted) Plotly.relayout(plot, sizes(plot, wanted));
+    if (!plot._fullLayout) return;
+    const size = sizes(plot, wanted);
+    if (plot._fullLayout.width === size.width && plot._fullLayout.height === size.height) return;
+    plot.style.height = size.height + "px";
+    Plotly.relayout(plot, size);
   });
 
   window.hdoptReport = { drawn: Promise.all(plots.map(draw)).then(() => plots.length) };
@@ -54,7 +61,6 @@
   });
 
   let waiting = 0;
-  let printing = false;
   addEventListener("resize", () => {
     clearTimeout(waiting);
     if (!printing) waiting = setTimeout(() => printing || fit(), 100);

@@ -1,0 +1,130 @@
+"""The order spectrum: how much of the kinematic error each order carries, and where it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.report import Figure, Section, Table, Text
+from hdopt.report.sections.words import listed
+from hdopt.report.theme import PALETTE, figure
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import plotly.graph_objects as go
+
+
+def spectrum_section(
+    orders: NDArray[np.float64],
+    amplitude_arcmin: NDArray[np.float64],
+    expressions: Sequence[str],
+    origins: Sequence[str],
+    ratio: float,
+    *,
+    interference: pd.DataFrame | None = None,
+    key: str = "orders",
+) -> Section:
+    """Amplitudes at exact orders.
+
+    `orders` cycles per input turn, `amplitude_arcmin` half of each order's swing, both of shape (n,); `expressions`
+    how each order is written ('2(1 + 1/N)'), `origins` the physics it comes from, equal origins sharing a colour.
+    `interference` is a table of orders that the record is too short to tell apart, where there are any.
+    """
+    import pandas as pd
+
+    orders, amplitude_arcmin = np.asarray(orders, float), np.asarray(amplitude_arcmin, float)
+    rank = np.argsort(amplitude_arcmin)[::-1]
+    frame = pd.DataFrame(
+        {"order": orders, "written": list(expressions), "amplitude_arcmin": amplitude_arcmin, "origin": list(origins)}
+    )
+    items = [
+        Figure(
+            f"{key}-stems",
+            "Order spectrum",
+            _stems(orders, amplitude_arcmin, expressions, origins, ratio),
+            f"Above all orders, below the neighbourhood of order 2, where neighbours lie 1/N = {1 / ratio:g} apart "
+            "and only a record of a full relative turn separates them.",
+        ),
+        Table(
+            f"{key}-table",
+            "Orders by amplitude",
+            frame.iloc[rank].reset_index(drop=True),
+            formats={"order": ".4f", "amplitude_arcmin": ".4f"},
+        ),
+    ]
+    if interference is not None and len(interference):
+        items += [
+            Text("This record is too short to separate the following orders; their amplitudes share what is there."),
+            Table(f"{key}-interference", "Orders that the record cannot separate", interference),
+        ]
+    largest = [f"{expressions[i]} ({amplitude_arcmin[i]:.3f} arcmin, {origins[i]})" for i in rank[:3]]
+    return Section(key, "Orders", tuple(items), f"Most of the error lies at the orders {listed(largest)}.")
+
+
+def _stems(
+    orders: NDArray[np.float64],
+    amplitude_arcmin: NDArray[np.float64],
+    expressions: Sequence[str],
+    origins: Sequence[str],
+    ratio: float,
+) -> go.Figure:
+    around_two = np.abs(orders - 2) < 3.5 / ratio
+    span = float(orders.max()) * 1.04 + 0.2
+    near = np.abs(orders[:, None] - orders) < 0.06 * span
+    outshone = (near & (amplitude_arcmin[None, :] > amplitude_arcmin[:, None])).any(axis=1)
+    top = float(amplitude_arcmin.max()) * 1.18
+    made = figure("", "", height=560)
+    made.update_layout(
+        xaxis={"domain": [0, 1], "anchor": "y", "range": [-0.03 * span, span], "dtick": 1},
+        yaxis={"domain": [0.60, 1], "anchor": "x", "range": [0, top], "title": {"text": "Amplitude [arcmin]"}},
+        xaxis2={
+            "domain": [0, 1],
+            "anchor": "y2",
+            "range": [2 - 3.5 / ratio, 2 + 3.5 / ratio],
+            "tickvals": [2 + k / ratio for k in range(-3, 4)],
+            "ticktext": [f"{2 + k / ratio:.6g}" for k in range(-3, 4)],
+            "title": {"text": "Order [cycles per input turn]"},
+        },
+        yaxis2={"domain": [0, 0.42], "anchor": "x2", "range": [0, top], "title": {"text": "Amplitude [arcmin]"}},
+    )
+    for colour, origin in zip(PALETTE * 3, dict.fromkeys(origins), strict=False):
+        mine = np.array([name == origin for name in origins])
+        panels = [("x", "y", mine, True, ~outshone), ("x2", "y2", mine & around_two, False, around_two)]
+        for xaxis, yaxis, chosen, legend, named in panels:
+            if not chosen.any():
+                continue
+            x, y = orders[chosen], amplitude_arcmin[chosen]
+            gap = np.full_like(x, np.nan)
+            made.add_scatter(
+                x=np.stack([x, x, gap], axis=1).ravel(),
+                y=np.stack([0 * y, y, gap], axis=1).ravel(),
+                mode="lines",
+                line={"color": colour, "width": 2.5},
+                xaxis=xaxis,
+                yaxis=yaxis,
+                name=origin,
+                legendgroup=origin,
+                showlegend=False,
+                hoverinfo="skip",
+            )
+            made.add_scatter(
+                x=x,
+                y=y,
+                mode="markers+text",
+                marker={"color": colour, "size": 9},
+                xaxis=xaxis,
+                yaxis=yaxis,
+                text=[expressions[i] if named[i] else "" for i in np.flatnonzero(chosen)],
+                textposition="top center",
+                textfont={"color": colour, "size": 12},
+                name=origin,
+                legendgroup=origin,
+                showlegend=legend,
+                customdata=[expressions[i] for i in np.flatnonzero(chosen)],
+                cliponaxis=False,
+                hovertemplate="order %{customdata} = %{x:.4f}<br>%{y:.4f} arcmin",
+            )
+    return made

@@ -1,0 +1,182 @@
+"""The kinematic error over a full relative turn: the beat, one turn in detail, and every turn at once."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.report import Figure, KeyFigures, Section
+from hdopt.report.theme import BLUE, DIVERGING, GREY, INK, VERMILLION, faded, figure
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+POINTS_PER_TURN = 180
+BEAT_POINTS_PER_TURN = 120
+HOVER = "%{x:.1f} deg: %{y:.3f} arcmin"
+
+
+def waveform_section(
+    theta: NDArray[np.float64],
+    ke_arcmin: NDArray[np.float64],
+    ratio: float,
+    *,
+    peak_to_peak_arcmin: float | None = None,
+    requirement_arcmin: float | None = None,
+    key: str = "waveform",
+) -> Section:
+    """Kinematic error of one drive over its full relative turn.
+
+    `theta` input angle, rad, rising from 0 over one relative turn (`ratio` input turns) or more, shape (n,);
+    `ke_arcmin` the error there, shape (n,), at least 30 points a turn. `peak_to_peak_arcmin` is the converged value
+    where the grid's own is not to be shown; `requirement_arcmin` is what it is held against.
+    """
+    turns = _by_turn(theta, ke_arcmin)
+    peak_to_peak = float(np.ptp(ke_arcmin)) if peak_to_peak_arcmin is None else peak_to_peak_arcmin
+    low, high = _extremes_by_turn(theta, ke_arcmin)
+    by_turn = high - low
+    values = {"Peak-to-peak, converged": f"{peak_to_peak:.3f} arcmin"}
+    if requirement_arcmin is not None:
+        values["Required"] = f"{requirement_arcmin:.3f} arcmin"
+    values |= {
+        "Largest in one turn": f"{by_turn.max():.3f} arcmin",
+        "Smallest in one turn": f"{by_turn.min():.3f} arcmin",
+    }
+    return Section(
+        key,
+        "Kinematic error over a full turn",
+        (
+            KeyFigures(values),
+            Figure(
+                f"{key}-beat",
+                f"The error over {len(turns)} input turns",
+                _beat(theta, ke_arcmin, peak_to_peak),
+                "Every turn of the wave generator, and the envelope of its peaks. The flexspline falls behind by 1/N "
+                f"of a turn each time, so its teeth meet those of the circular spline anew only after {ratio:g} turns.",
+            ),
+            Figure(
+                f"{key}-turn",
+                "One turn of the wave generator",
+                _one_turn(turns, by_turn),
+                "All turns in grey, with the two whose peak-to-peak is largest and smallest. Kinks are where the "
+                "driving meshing zone or the touching rim changes.",
+            ),
+            Figure(
+                f"{key}-carpet",
+                "Every turn at once",
+                _carpet(turns),
+                "Each row is one turn. Upright stripes stay with the input angle; slanted ones travel with the "
+                "flexspline's teeth.",
+            ),
+        ),
+        f"A single recording of one turn would show between {by_turn.min():.2f} and {by_turn.max():.2f} arcmin, "
+        f"depending on which turn it catches; over the full relative turn it is {peak_to_peak:.3f} arcmin.",
+    )
+
+
+def _whole_turns(theta: NDArray[np.float64]) -> int:
+    return max(1, math.floor((theta[-1] - theta[0]) / (2 * math.pi) + 0.01))
+
+
+def _extremes_by_turn(
+    theta: NDArray[np.float64], ke_arcmin: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Smallest and largest error in each whole turn, of the points given: each of shape (turns,)."""
+    starts = np.searchsorted(theta, theta[0] + 2 * math.pi * np.arange(_whole_turns(theta)) - 1e-9)
+    return np.minimum.reduceat(ke_arcmin, starts), np.maximum.reduceat(ke_arcmin, starts)
+
+
+def _by_turn(theta: NDArray[np.float64], ke_arcmin: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The error on an even grid, one row a whole turn: shape (turns, POINTS_PER_TURN + 1)."""
+    turns = _whole_turns(theta)
+    grid = np.linspace(0, 2 * math.pi, POINTS_PER_TURN + 1)
+    return np.interp(theta[0] + 2 * math.pi * np.arange(turns)[:, None] + grid, theta, ke_arcmin)
+
+
+def _beat(theta: NDArray[np.float64], ke_arcmin: NDArray[np.float64], peak_to_peak: float) -> go.Figure:
+    low, high = _extremes_by_turn(theta, ke_arcmin)
+    middle = np.arange(len(low)) + 0.5
+    step = max(1, len(theta) // (len(low) * BEAT_POINTS_PER_TURN))
+    made = figure("Input turns", "Kinematic error [arcmin]", height=380)
+    made.add_scatter(
+        x=(theta[::step] / (2 * math.pi)).astype(np.float32),
+        y=ke_arcmin[::step].astype(np.float32),
+        mode="lines",
+        name="Kinematic error",
+        line={"width": 0.8, "color": faded(BLUE, 0.55)},
+        hoverinfo="skip",
+    )
+    for name, edge in (("Envelope of the peaks", high), ("", low)):
+        made.add_scatter(
+            x=middle,
+            y=edge,
+            mode="lines",
+            name=name or "Envelope, lower",
+            showlegend=bool(name),
+            line={"width": 2, "color": INK, "shape": "spline", "smoothing": 0.6},
+            hovertemplate="turn %{x:.0f}: %{y:.3f} arcmin<extra></extra>",
+        )
+    extremes = (int(ke_arcmin.argmax()), "top center"), (int(ke_arcmin.argmin()), "bottom center")
+    for index, position in extremes:
+        made.add_scatter(
+            x=[theta[index] / (2 * math.pi)],
+            y=[ke_arcmin[index]],
+            mode="markers+text",
+            showlegend=False,
+            text=[f"{ke_arcmin[index]:.3f}".replace("-", "−")],
+            textposition=position,
+            marker={"size": 8, "color": VERMILLION},
+            textfont={"color": VERMILLION},
+            name="Highest" if position.startswith("top") else "Lowest",
+            hovertemplate="turn %{x:.2f}: %{y:.3f} arcmin",
+        )
+    margin = 0.12 * peak_to_peak
+    made.update_yaxes(range=[ke_arcmin.min() - margin, ke_arcmin.max() + margin])
+    made.update_xaxes(range=[0, len(low)])
+    return made
+
+
+def _one_turn(turns: NDArray[np.float64], by_turn: NDArray[np.float64]) -> go.Figure:
+    angle = np.linspace(0, 360, turns.shape[1])
+    made = figure("Input angle [deg]", "Kinematic error [arcmin]", height=400)
+    made.add_scatter(
+        x=np.tile(np.append(angle, np.nan), len(turns)),
+        y=np.hstack([turns, np.full((len(turns), 1), np.nan)]).ravel().astype(np.float32),
+        mode="lines",
+        name=f"All {len(turns)} turns",
+        line={"width": 1, "color": faded(GREY, 0.22)},
+        hoverinfo="skip",
+    )
+    for index, colour, name in ((by_turn.argmax(), VERMILLION, "Largest"), (by_turn.argmin(), BLUE, "Smallest")):
+        made.add_scatter(
+            x=angle,
+            y=turns[index],
+            mode="lines",
+            name=f"{name}: turn {index + 1}, {by_turn[index]:.3f} arcmin",
+            line={"width": 2.2, "color": colour},
+            hovertemplate=HOVER,
+        )
+    made.update_xaxes(range=[0, 360], dtick=45)
+    return made
+
+
+def _carpet(turns: NDArray[np.float64]) -> go.Figure:
+    made = figure("Input angle [deg]", "Input turn", height=440)
+    made.add_heatmap(
+        x=np.linspace(0, 360, turns.shape[1]),
+        y=np.arange(1, len(turns) + 1),
+        z=turns.astype(np.float32),
+        zmin=float(turns.min()),
+        zmax=float(turns.max()),
+        zsmooth="best",
+        colorscale=[list(stop) for stop in DIVERGING],
+        name="Kinematic error",
+        colorbar={"title": {"text": "arcmin"}},
+        hovertemplate="turn %{y}, %{x:.0f} deg: %{z:.3f} arcmin<extra></extra>",
+    )
+    made.update_xaxes(range=[0, 360], dtick=45, showgrid=False)
+    made.update_yaxes(range=[0.5, len(turns) + 0.5], showgrid=False)
+    return made

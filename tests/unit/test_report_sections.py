@@ -1,0 +1,152 @@
+"""The sections' numbers: what a figure shows is what the builder was given."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hdopt.report import Figure, KeyFigures, Section, Table
+from hdopt.report.numbers import figure_frame
+from hdopt.report.sections.design_map import Design, pressure_angle_width_section
+from hdopt.report.sections.lag import lag_section
+from hdopt.report.sections.orders import spectrum_section
+from hdopt.report.sections.profiles import profiles_section
+from hdopt.report.sections.published import published_section
+from hdopt.report.sections.structures import structures_section
+from hdopt.report.sections.tornado import sensitivities_section
+from hdopt.report.sections.waveform import waveform_section
+from hdopt.report.sections.words import in_sentence, label, listed
+
+
+def item(section: Section, key: str) -> Figure | Table:
+    return next(i for i in section.items if getattr(i, "key", None) == key)
+
+
+def key_figures(section: Section) -> dict[str, str]:
+    return dict(next(i for i in section.items if isinstance(i, KeyFigures)).values)
+
+
+def test_the_beat_is_measured_turn_by_turn():
+    theta = np.linspace(0, 2 * np.pi * 80, 80 * 360 + 1)
+    size = 1 + 0.5 * np.cos(theta / 80)  # 1.5 at the start and end, 0.5 half way
+    section = waveform_section(theta, size * np.sin(2 * theta), 80)
+    values = key_figures(section)
+    assert values["Largest in one turn"] == "3.000 arcmin"
+    # A turn holds two cycles and the larger counts: 315 deg past the waist the size is 0.5 (2 - cos 0.0687) = 0.5012.
+    assert values["Smallest in one turn"] == "1.002 arcmin"
+    assert values["Peak-to-peak, converged"] == "3.000 arcmin"
+    carpet = item(section, "waveform-carpet").figure.data[0]
+    assert np.shape(carpet.z) == (80, 181)
+    assert np.allclose(np.asarray(carpet.z)[40], size[40 * 360] * np.sin(2 * np.radians(carpet.x)), atol=0.01)
+
+
+def test_the_converged_value_given_is_the_one_shown():
+    theta = np.linspace(0, 4 * np.pi, 721)
+    section = waveform_section(theta, np.sin(theta), 2, peak_to_peak_arcmin=2.125, requirement_arcmin=1.0)
+    assert key_figures(section)["Peak-to-peak, converged"] == "2.125 arcmin"
+    assert key_figures(section)["Required"] == "1.000 arcmin"
+    assert "2.125" in section.summary
+
+
+def test_orders_are_ranked_and_one_record_too_short_says_so():
+    orders, amplitudes = np.array([1.0, 2.0, 2.0125]), np.array([0.1, 0.3, 0.2])
+    interference = pd.DataFrame({"order": [2.0], "neighbour": [2.0125]})
+    section = spectrum_section(
+        orders, amplitudes, ["1", "2", "2 + 1/N"], ["a", "b", "a"], 80, interference=interference
+    )
+    assert item(section, "orders-table").frame["order"].tolist() == [2.0, 2.0125, 1.0]
+    assert item(section, "orders-interference").frame.equals(interference)
+    tops = figure_frame(item(section, "orders-stems").figure)
+    assert sorted(tops.loc[tops["x"] == 2.0125, "y"].unique()) == [0.2]
+    quiet = spectrum_section(orders, amplitudes, ["1", "2", "2 + 1/N"], ["a", "b", "a"], 80)
+    assert len(quiet.items) == 2
+
+
+def test_structures_name_the_best_and_the_worst():
+    frame = pd.DataFrame({"structure": ["integral", "one_way_major"], "peak_to_peak_arcmin": [1.369, 1.06]})
+    section = structures_section(frame)
+    assert section.summary.startswith("One-way, major axis gives the smallest kinematic error, 1.060 arcmin")
+    (bars,) = item(section, "structures-bars").figure.data
+    assert list(bars.y) == [1.369, 1.06]
+
+
+def test_the_map_marks_the_design_and_the_requirement_only_where_it_lies_on_it():
+    angle, width = np.array([8.0, 12.0, 16.0]), np.array([5.0, 9.0])
+    values = angle[:, None] * width / 100
+    for requirement, lines in ((1.0, 1), (9.0, 0)):
+        section = pressure_angle_width_section(
+            angle, width, values, Design("mine", 9.0, 12.0), requirement_arcmin=requirement
+        )
+        figure = item(section, "design-map-figure").figure
+        assert sum((trace.name or "").startswith("required") for trace in figure.data) == lines
+        assert figure.data[-1].x == (9.0,)
+        assert figure.data[-1].y == (12.0,)
+        assert np.array_equal(figure.data[0].z, values)
+
+
+def test_the_tornado_puts_the_strongest_on_top_and_bars_end_at_the_values():
+    frame = pd.DataFrame(
+        {
+            "variable": ["weak", "strong"],
+            "low": ["1 mm", "2 mm"],
+            "high": ["3 mm", "4 mm"],
+            "low_arcmin": [0.95, 0.5],
+            "high_arcmin": [1.02, 1.3],
+        }
+    )
+    section = sensitivities_section(frame, 1.0)
+    assert item(section, "sensitivities-table").frame["variable"].tolist() == ["strong", "weak"]
+    bars = [trace for trace in item(section, "sensitivities-tornado").figure.data if trace.type == "bar"]
+    assert [list(bar.y) for bar in bars] == [["weak", "strong"]] * 2  # Plotly draws the first at the bottom
+    assert np.allclose([np.add(bar.base, bar.x) for bar in bars], [[0.95, 0.5], [1.02, 1.3]])
+
+
+def test_lag_below_zero_is_interference_and_said():
+    theta = np.linspace(0, 2 * np.pi, 361)
+    free = lag_section(theta, 1 + 0.1 * np.sin(theta), {"backlash": 1 + 0.1 * np.sin(theta)})
+    assert "no play" not in free.summary
+    tight = lag_section(theta, np.sin(theta) - 1e-9, {"backlash": np.sin(theta)})
+    assert "over 50 % of the turn the teeth have no play at all" in tight.summary
+    assert key_figures(tight)["Smallest"] == "-1.000 arcmin"
+
+
+def test_published_values_are_counted_against_the_tolerance():
+    frame = pd.DataFrame(
+        {
+            "case": ["a", "b", "c"],
+            "published_arcmin": [1.0, 1.0, 1.0],
+            "sampled_arcmin": [1.005, 0.97, 1.019],
+            "converged_arcmin": [1.05, 1.0, np.nan],
+        }
+    )
+    section = published_section(frame, source="A source", tolerance_arcmin=0.02)
+    assert section.summary.startswith("2 of 3 values of A source")
+    assert "−0.0300 arcmin, is at b" in section.summary
+    assert np.allclose(item(section, "published-table").frame["difference_arcmin"], [0.005, -0.03, 0.019])
+
+
+def test_profiles_are_compared_with_the_first():
+    phi = np.linspace(0, 2 * np.pi, 361)
+    deflection = {"ellipse": 0.4 * np.cos(2 * phi), "resal": 0.5 * np.cos(2 * phi)}
+    change = {"ellipse": 0.001 * np.cos(2 * phi), "resal": 0.002 * np.cos(2 * phi)}
+    section = profiles_section(phi, deflection, change, 30.0, pd.DataFrame({"profile": ["ellipse", "resal"]}))
+    assert "smallest with Ellipse (1.00 × 10⁻³/mm)" in section.summary
+    (difference,) = item(section, "profiles-difference").figure.data
+    assert max(difference.y) == pytest.approx(100.0)
+    alone = profiles_section(
+        phi, {"resal": deflection["resal"]}, {"resal": change["resal"]}, 30.0, pd.DataFrame({"profile": ["resal"]})
+    )
+    assert not any(getattr(i, "key", "") == "profiles-difference" for i in alone.items)
+
+
+def test_words():
+    assert label("one_way_minor") == "One-way, minor axis"
+    assert label("resal") == "Resal"
+    assert listed(["a"]) == "a"
+    assert listed(["a", "b", "c"]) == "a, b and c"
+    assert [in_sentence(name) for name in ("Pressure angle", "WG tilt", "CS teeth")] == [
+        "pressure angle",
+        "WG tilt",
+        "CS teeth",
+    ]
