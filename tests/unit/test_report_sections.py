@@ -150,3 +150,11 @@ def test_words():
         "WG tilt",
         "CS teeth",
     ]
+
+
+def test_a_full_turn_whose_end_is_left_out_counts_whole():
+    theta = np.arange(80 * 90) * (2 * np.pi / 90)
+    section = waveform_section(theta, np.sin(theta), 80)
+    carpet = np.asarray(item(section, "waveform-carpet").figure.data[0].z)
+    assert carpet.shape == (80, 181)
+    assert np.allclose(carpet[-1], carpet[0], atol=1e-3)  # linear interpolation between points 4 deg apart

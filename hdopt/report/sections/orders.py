@@ -24,14 +24,16 @@ def spectrum_section(
     origins: Sequence[str],
     ratio: float,
     *,
+    kinds: Sequence[str] | None = None,
     interference: pd.DataFrame | None = None,
     key: str = "orders",
 ) -> Section:
     """Amplitudes at exact orders.
 
     `orders` cycles per input turn, `amplitude_arcmin` half of each order's swing, both of shape (n,); `expressions`
-    how each order is written ('2(1 + 1/N)'), `origins` the physics it comes from, equal origins sharing a colour.
-    `interference` is a table of orders that the record is too short to tell apart, where there are any.
+    how each order is written ('2(1 + 1/N)'), `origins` the physics it comes from. Equal `kinds` share a colour and a
+    place in the legend (at most seven; the origins, where none are given). `interference` is a table of orders that
+    the record is too short to tell apart, where there are any.
     """
     import pandas as pd
 
@@ -44,7 +46,7 @@ def spectrum_section(
         Figure(
             f"{key}-stems",
             "Order spectrum",
-            _stems(orders, amplitude_arcmin, expressions, origins, ratio),
+            _stems(orders, amplitude_arcmin, expressions, origins, kinds or origins, ratio),
             f"Above all orders, below the neighbourhood of order 2, where neighbours lie 1/N = {1 / ratio:g} apart "
             "and only a record of a full relative turn separates them.",
         ),
@@ -60,7 +62,7 @@ def spectrum_section(
             Text("This record is too short to separate the following orders; their amplitudes share what is there."),
             Table(f"{key}-interference", "Orders that the record cannot separate", interference),
         ]
-    largest = [f"{expressions[i]} ({amplitude_arcmin[i]:.3f} arcmin, {origins[i]})" for i in rank[:3]]
+    largest = [f"{expressions[i]} ({amplitude_arcmin[i]:.3f} arcmin)" for i in rank[:3]]
     return Section(key, "Orders", tuple(items), f"Most of the error lies at the orders {listed(largest)}.")
 
 
@@ -69,6 +71,7 @@ def _stems(
     amplitude_arcmin: NDArray[np.float64],
     expressions: Sequence[str],
     origins: Sequence[str],
+    kinds: Sequence[str],
     ratio: float,
 ) -> go.Figure:
     around_two = np.abs(orders - 2) < 3.5 / ratio
@@ -90,8 +93,8 @@ def _stems(
         },
         yaxis2={"domain": [0, 0.42], "anchor": "x2", "range": [0, top], "title": {"text": "Amplitude [arcmin]"}},
     )
-    for colour, origin in zip(PALETTE * 3, dict.fromkeys(origins), strict=False):
-        mine = np.array([name == origin for name in origins])
+    for colour, kind in zip(PALETTE * 3, dict.fromkeys(kinds), strict=False):
+        mine = np.array([name == kind for name in kinds])
         panels = [("x", "y", mine, True, ~outshone), ("x2", "y2", mine & around_two, False, around_two)]
         for xaxis, yaxis, chosen, legend, named in panels:
             if not chosen.any():
@@ -105,8 +108,8 @@ def _stems(
                 line={"color": colour, "width": 2.5},
                 xaxis=xaxis,
                 yaxis=yaxis,
-                name=origin,
-                legendgroup=origin,
+                name=kind,
+                legendgroup=kind,
                 showlegend=False,
                 hoverinfo="skip",
             )
@@ -120,11 +123,11 @@ def _stems(
                 text=[expressions[i] if named[i] else "" for i in np.flatnonzero(chosen)],
                 textposition="top center",
                 textfont={"color": colour, "size": 12},
-                name=origin,
-                legendgroup=origin,
+                name=kind,
+                legendgroup=kind,
                 showlegend=legend,
-                customdata=[expressions[i] for i in np.flatnonzero(chosen)],
+                customdata=[(expressions[i], origins[i]) for i in np.flatnonzero(chosen)],
                 cliponaxis=False,
-                hovertemplate="order %{customdata} = %{x:.4f}<br>%{y:.4f} arcmin",
+                hovertemplate="order %{customdata[0]} = %{x:.4f}<br>%{y:.4f} arcmin<br>%{customdata[1]}<extra></extra>",
             )
     return made

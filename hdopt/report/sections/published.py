@@ -100,7 +100,7 @@ def _dumbbells(frame: pd.DataFrame) -> go.Figure:
             name=name,
             hovertemplate="%{y}: %{x:.4f} arcmin",
         )
-    made.update_yaxes(range=[-0.7, len(frame) - 0.3])
+    made.update_yaxes(range=[-0.7, len(frame) - 0.3], dtick=1)
     return made
 
 

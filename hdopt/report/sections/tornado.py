@@ -44,8 +44,8 @@ def sensitivities_section(
 
 
 def _tornado(frame: pd.DataFrame, base_arcmin: float) -> go.Figure:
-    frame = frame.iloc[::-1].assign(variable=lambda f: ["<br>".join(wrap(name, 18)) for name in f["variable"]])
-    made = figure("Peak-to-peak [arcmin]", "", height=90 + 34 * len(frame), barmode="overlay", bargap=0.3)
+    frame = frame.iloc[::-1].assign(variable=lambda f: ["<br>".join(wrap(name, 22)) for name in f["variable"]])
+    made = figure("Peak-to-peak [arcmin]", "", height=90 + 38 * len(frame), barmode="overlay", bargap=0.3)
     for end, colour, name in (("low", BLUE, "At the low value"), ("high", ORANGE, "At the high value")):
         value = frame[f"{end}_arcmin"].to_numpy(float)
         change = value - base_arcmin

@@ -30,9 +30,9 @@ def waveform_section(
 ) -> Section:
     """Kinematic error of one drive over its full relative turn.
 
-    `theta` input angle, rad, rising from 0 over one relative turn (`ratio` input turns) or more, shape (n,);
-    `ke_arcmin` the error there, shape (n,), at least 30 points a turn. `peak_to_peak_arcmin` is the converged value
-    where the grid's own is not to be shown; `requirement_arcmin` is what it is held against.
+    `theta` input angle, rad, rising evenly over one relative turn (`ratio` input turns), shape (n,), its end given or
+    left out; `ke_arcmin` the error there, shape (n,), at least 90 points a turn. `peak_to_peak_arcmin` is the converged
+    value where the grid's own is not to be shown; `requirement_arcmin` is what it is held against.
     """
     turns = _by_turn(theta, ke_arcmin)
     peak_to_peak = float(np.ptp(ke_arcmin)) if peak_to_peak_arcmin is None else peak_to_peak_arcmin
@@ -78,21 +78,28 @@ def waveform_section(
 
 
 def _whole_turns(theta: NDArray[np.float64]) -> int:
-    return max(1, math.floor((theta[-1] - theta[0]) / (2 * math.pi) + 0.01))
+    """Whole turns in a record, whose last angle may be the end of a turn or the last sample before it."""
+    step = (theta[-1] - theta[0]) / (len(theta) - 1)
+    return max(1, math.floor((theta[-1] - theta[0] + 1.001 * step) / (2 * math.pi)))
 
 
 def _extremes_by_turn(
     theta: NDArray[np.float64], ke_arcmin: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Smallest and largest error in each whole turn, of the points given: each of shape (turns,)."""
-    starts = np.searchsorted(theta, theta[0] + 2 * math.pi * np.arange(_whole_turns(theta)) - 1e-9)
-    return np.minimum.reduceat(ke_arcmin, starts), np.maximum.reduceat(ke_arcmin, starts)
+    turns = _whole_turns(theta)
+    starts = np.searchsorted(theta, theta[0] + 2 * math.pi * np.arange(turns) - 1e-9)
+    within = ke_arcmin[: np.searchsorted(theta, theta[0] + 2 * math.pi * turns + 1e-9)]
+    return np.minimum.reduceat(within, starts), np.maximum.reduceat(within, starts)
 
 
 def _by_turn(theta: NDArray[np.float64], ke_arcmin: NDArray[np.float64]) -> NDArray[np.float64]:
     """The error on an even grid, one row a whole turn: shape (turns, POINTS_PER_TURN + 1)."""
     turns = _whole_turns(theta)
     grid = np.linspace(0, 2 * math.pi, POINTS_PER_TURN + 1)
+    end = theta[0] + 2 * math.pi * turns
+    if theta[-1] < end:  # the error repeats after a full relative turn
+        theta, ke_arcmin = np.append(theta, end), np.append(ke_arcmin, ke_arcmin[0])
     return np.interp(theta[0] + 2 * math.pi * np.arange(turns)[:, None] + grid, theta, ke_arcmin)
 
 

@@ -1,7 +1,7 @@
 "use strict";
 (() => {
   const PRINT_WIDTH = 660; // px: fits A4 and Letter within the margins of the print style
-  const PRINT_HEIGHT = 0.86; // height of a figure in print against that on the screen
+  const printHeight = (height) => Math.round(height * (height > 460 ? 0.9 : 0.76)); // tall ones need their rows
   const PRINT_TYPE = 0.8; // size of a table's type in print against that on the screen, a little above the style's
   const NARROW = 520; // px: below it a figure takes smaller type and leaves dragging to the page
   const json = (id) => JSON.parse(document.getElementById(id).textContent);
@@ -24,7 +24,7 @@
     const size = (own.font && own.font.size) || 13;
     return {
       width,
-      height: printing ? Math.max(240, Math.round(PRINT_HEIGHT * plot.ownHeight)) : plot.ownHeight,
+      height: printing ? printHeight(plot.ownHeight) : plot.ownHeight,
       "font.size": narrow ? Math.min(size, 11) : size,
       dragmode: narrow ? false : own.dragmode || "zoom",
     };
