@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from hdopt.deviations import DriveErrors
 from hdopt.drive import ARCMIN, Drive
 from hdopt.errors import MissingValue
-from hdopt.kinematics.waveform import zone_deviation
 
 Array = NDArray[np.float64]
 
@@ -84,17 +83,18 @@ def cross_slide_lag_arcmin(drive: Drive, errors: DriveErrors, theta: ArrayLike) 
     return lag / ARCMIN
 
 
-def backlash_lag_arcmin(drive: Drive, errors: DriveErrors, theta: ArrayLike) -> Array:
+def backlash_lag_arcmin(drive: Drive, kinematic_error: ArrayLike) -> Array:
     """Output lag from the backlash e_t less the driving zone's deviation tau, arcmin (Jia 2021, Eqs. (34), (35)).
 
-    2 pi (e_t - tau(theta))/l_FS. Negative where tau exceeds e_t: interference, not clipped.
+    2 pi (e_t - tau)/l_FS, where 2 pi tau/l_FS is the `kinematic_error` of a single tooth pair (arcmin, k_e = 1).
+    Negative where tau exceeds e_t: interference, not clipped.
     """
     if drive.clearances.backlash is None:
         raise MissingValue("the lag", "clearances.backlash_mm")
-    driving = np.max(zone_deviation(drive, errors, theta), axis=0)
-    return drive.geometry.arcmin_per_mm * (drive.clearances.backlash - driving)
+    return drive.geometry.arcmin_per_mm * drive.clearances.backlash - np.asarray(kinematic_error)
 
 
-def lag(drive: Drive, errors: DriveErrors, theta: ArrayLike) -> Lag:
-    """Lag of one drive at reversal over input angles `theta`, rad, shape (n,)."""
-    return Lag(cross_slide_lag_arcmin(drive, errors, theta), backlash_lag_arcmin(drive, errors, theta))
+def lag(drive: Drive, errors: DriveErrors, theta: ArrayLike, kinematic_error: ArrayLike) -> Lag:
+    """Lag of one drive at reversal over input angles `theta`, rad, shape (n,), where its `kinematic_error` (arcmin,
+    k_e = 1, same shape) is known: the sum of the cross-slide's part and the tooth backlash's."""
+    return Lag(cross_slide_lag_arcmin(drive, errors, theta), backlash_lag_arcmin(drive, kinematic_error))

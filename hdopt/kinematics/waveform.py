@@ -52,7 +52,11 @@ def zone_deviation(drive: Drive, errors: DriveErrors, theta: ArrayLike, geometry
     Misalignment makes an arc delta tan(alpha) (Jia 2021, Eqs. (24)-(26)); tooth deviations add to it ((31a), (31b)).
     `theta` in rad; for the exact geometry `errors` must be scalars and `theta` of shape (n,).
     """
-    points = geometry_for(drive, geometry)(drive, errors, theta)
+    return deviation_at(drive, errors, theta, geometry_for(drive, geometry)(drive, errors, theta))
+
+
+def deviation_at(drive: Drive, errors: DriveErrors, theta: ArrayLike, points: DeepestPoints) -> Array:
+    """tau_1 and tau_2 for deepest points that are known already, mm of arc, shape (2, ...)."""
     return (
         points.depth * np.tan(drive.geometry.pressure_angle)
         + circular_spline_term(errors, points, theta)
@@ -80,3 +84,19 @@ def full_turn(drive: Drive, samples_per_turn: int) -> Array:
     """Input angles of one full relative turn of FS and CS (N input turns for even Z_FS), rad, end left out."""
     turns = drive.geometry.beat_phases
     return np.arange(turns * samples_per_turn) * (2 * np.pi / samples_per_turn)
+
+
+def relative_turn(
+    drive: Drive, errors: DriveErrors, samples_per_turn: int, geometry: str | None = None
+) -> tuple[Array, Array]:
+    """Input angles (rad) and kinematic error (arcmin, k_e = 1) of one drive over one full relative turn; shapes (n,).
+
+    The deepest points repeat every input turn and are found once; only the FS teeth met differ from turn to turn.
+    """
+    theta = full_turn(drive, samples_per_turn)
+    one_turn = geometry_for(drive, geometry)(drive, errors, theta[:samples_per_turn])
+    turns = drive.geometry.beat_phases
+    points = DeepestPoints(
+        *(np.tile(values, turns) for values in (one_turn.depth, one_turn.offset_cs, one_turn.offset_fs, one_turn.rim))
+    )
+    return theta, drive.geometry.arcmin_per_mm * np.max(deviation_at(drive, errors, theta, points), axis=0)

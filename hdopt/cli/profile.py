@@ -1,0 +1,52 @@
+"""`hdopt profile`: what a wave generator's profile asks of the flexspline."""
+
+from __future__ import annotations
+
+import click
+
+from hdopt.cli.common import drive_option, emit, json_option, seed_option, set_option, study_argument
+
+
+@click.command()
+@study_argument
+@drive_option
+@set_option
+@click.option("--profile", metavar="P", help="ellipse, resal, two_disk or measured.")
+@json_option
+@seed_option
+def command(study, drive, overrides, profile, json_file, seed) -> None:
+    """The wave generator's profile: contact angle, curvature change, bending stress.
+
+    STUDY is a study file or a shipped study; without one, the shipped drive csf-25-80 is taken.
+    """
+    from hdopt.analysis import profile as analyse
+    from hdopt.study import load_study
+
+    chosen = (f"wave_generator.profile={profile}",) if profile else ()
+    result = analyse(load_study(study, (*overrides, *chosen), drive))
+    emit(result.to_dict(), json_file, _lines(result))
+
+
+ROWS = (
+    ("contact_angle_deg", "contact angle (overlap of tips)", "{:.3f} deg"),
+    ("meshing_teeth", "teeth in mesh, one zone", "{:.2f}"),
+    ("homogenization_coefficient", "homogenization coefficient k_e", "{:.4f}"),
+    ("max_curvature_change_per_mm", "largest change of curvature", "{:.6f} 1/mm"),
+    ("max_bending_stress_mpa", "largest bending stress, ring", "{:.1f} MPa"),
+    ("max_bending_stress_plate_mpa", "largest bending stress, plate", "{:.1f} MPa"),
+    ("mean_flank_pressure_mpa", "mean flank pressure under the load", "{:.2f} MPa"),
+    ("perimeter_error_mm", "perimeter less the flexspline's", "{:+.4f} mm"),
+    ("semi_major_mm", "semi-major axis", "{:.4f} mm"),
+    ("semi_minor_mm", "semi-minor axis", "{:.4f} mm"),
+    ("tip_radius_of_curvature_mm", "radius of curvature at the tip", "{:.4f} mm"),
+)
+
+
+def _lines(result):
+    values = result.to_dict()
+    yield f"{result.study}: {result.profile} profile"
+    for key, label, form in ROWS:
+        if values[key] is not None:
+            yield f"  {label:36s} {form.format(values[key])}"
+    for note in result.notes:
+        yield f"  note: {note}"
