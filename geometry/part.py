@@ -1,0 +1,169 @@
+"""A part: what it is made of, its volume and size in closed form, and the solid that CadQuery makes of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from hdopt.geometry.areas import strip_of_disc
+from hdopt.geometry.contour import Contour
+from hdopt.geometry.features import BoltCircle, Bore, BrokenEdge, Slot, bar, countersink_tool, countersink_volume, cylinder
+from hdopt.geometry.solids import Station, loft
+
+if TYPE_CHECKING:
+    import cadquery as cq
+
+Colour = tuple[float, float, float, float]
+"""Red, green, blue, opacity, each 0 to 1."""
+
+SHARP = BrokenEdge()
+
+
+@dataclass(frozen=True)
+class Prism:
+    """Material between z = `bottom` and `top` within `outline`, outside `inner`; either outer edge may be broken."""
+
+    outline: Contour
+    bottom: float
+    top: float
+    bottom_edge: BrokenEdge = SHARP
+    top_edge: BrokenEdge = SHARP
+    inner: Contour | None = None
+
+    @property
+    def height(self) -> float:
+        return self.top - self.bottom
+
+    @property
+    def volume(self) -> float:
+        broken = sum(edge.removed_volume(self.outline.perimeter) for edge in (self.bottom_edge, self.top_edge))
+        return (self.outline.area - (self.inner.area if self.inner else 0.0)) * self.height - broken
+
+    def bore_area(self, bore: Bore) -> float:
+        return bore.area_with_disc(0.0)
+
+    def stations(self) -> list[Station]:
+        stations = [
+            (self.bottom, self.bottom_edge.radial),
+            (self.bottom + self.bottom_edge.axial, 0.0),
+            (self.top - self.top_edge.axial, 0.0),
+            (self.top, self.top_edge.radial),
+        ]
+        return [
+            station for index, station in enumerate(stations) if index == 0 or station[0] > stations[index - 1][0]
+        ]
+
+    def build(self) -> cq.Shape:
+        solid = loft(self.outline, self.stations())
+        if self.inner is None:
+            return solid
+        return solid.cut(loft(self.inner, [(self.bottom - 1, 0.0), (self.top + 1, 0.0)]))
+
+
+@dataclass(frozen=True)
+class Tongue:
+    """The block of a cross-slide: the strip of `width` along `direction` of a disc of `radius`."""
+
+    radius: float
+    width: float
+    direction: float
+    bottom: float
+    top: float
+
+    @property
+    def height(self) -> float:
+        return self.top - self.bottom
+
+    @property
+    def volume(self) -> float:
+        return strip_of_disc(self.width, self.radius) * self.height
+
+    def bore_area(self, bore: Bore) -> float:
+        return bore.area_in_strip(self.width)
+
+    def build(self) -> cq.Shape:
+        strip = bar(-2 * self.radius, 2 * self.radius, self.width, self.bottom, self.top, self.direction)
+        return cylinder(self.radius, self.bottom, self.top).intersect(strip)
+
+
+@dataclass(frozen=True)
+class Part:
+    """One solid: prisms and tongues stacked along z, less a bore through all of them, a slot and bolt holes.
+
+    The slot is cut into the back (the lowest plane). The bore is countersunk at the planes in `countersunk`, given as
+    (z, +1 where the outside is above it, -1 where below). `context` parts show the surroundings and are not made.
+    """
+
+    name: str
+    colour: Colour
+    body: tuple[Prism | Tongue, ...]
+    bore: Bore | None = None
+    countersink: float = 0.0
+    countersunk: tuple[tuple[float, int], ...] = ()
+    slot: Slot | None = None
+    bolts: BoltCircle | None = None
+    contour: Contour | None = None
+    context: bool = False
+
+    @property
+    def bottom(self) -> float:
+        return self.body[0].bottom
+
+    @property
+    def top(self) -> float:
+        return self.body[-1].top
+
+    @property
+    def volume(self) -> float:
+        """mm^3, in closed form from outlines, features and heights."""
+        volume = sum(piece.volume for piece in self.body)
+        if self.bore:
+            volume -= sum(piece.bore_area(self.bore) * piece.height for piece in self.body)
+            volume -= len(self.countersunk) * countersink_volume(self.bore, self.countersink)
+        if self.slot:
+            already = self.bore.area_in_strip(self.slot.width) if self.bore else 0.0
+            volume -= (self.slot.area - already) * self.slot.depth
+        if self.bolts:
+            volume -= self.bolts.area * sum(piece.height for piece in self.body if self._holds_bolts(piece))
+        return volume
+
+    def _holds_bolts(self, piece: Prism | Tongue) -> bool:
+        """Whether the bolt holes lie in this piece (they pass beside a hub's seat)."""
+        return isinstance(piece, Prism) and piece.outline.least_radius >= self.bolts.radius + self.bolts.hole / 2
+
+    @property
+    def box(self) -> tuple[float, float, float, float, float, float]:
+        """x_min, y_min, z_min, x_max, y_max, z_max in mm, exact."""
+        boxes = [piece.outline.box for piece in self.body if isinstance(piece, Prism)]
+        low = [min(box[axis] for box in boxes) for axis in (0, 1)]
+        high = [max(box[axis] for box in boxes) for axis in (2, 3)]
+        return (*low, self.bottom, *high, self.top)
+
+    @property
+    def size(self) -> tuple[float, float, float]:
+        """Extent along x, y and z, mm."""
+        box = self.box
+        return box[3] - box[0], box[4] - box[1], box[5] - box[2]
+
+    def build(self) -> cq.Solid:
+        """The solid, made in CadQuery."""
+        first, *more = (piece.build() for piece in self.body)
+        shape = first.fuse(*more) if more else first
+        if tools := self._tools():
+            shape = shape.cut(*tools)
+        (solid,) = shape.Solids()
+        return solid
+
+    def _tools(self) -> list[cq.Shape]:
+        tools: list[cq.Shape] = []
+        below, above = self.bottom - 1.0, self.top + 1.0
+        if self.bore:
+            tools += self.bore.tool(below, above)
+            if self.countersink:
+                tools += [countersink_tool(self.bore, self.countersink, face, side) for face, side in self.countersunk]
+        if self.slot:
+            tools += self.slot.tool(self.bottom)
+        if self.bolts:
+            tools += self.bolts.tool(below, above)
+        return tools
+
