@@ -14,7 +14,7 @@ def strip_of_disc(width: float, radius: float) -> float:
 
 
 def segment_of_disc(radius: float, distance: float) -> float:
-    """Area of the part of a disc of `radius` beyond a chord at `distance` from its centre; 0 where it misses the disc."""
+    """Area of the part of a disc of `radius` beyond a chord at `distance` from its centre."""
     if distance >= radius:
         return 0.0
     return radius**2 * math.acos(distance / radius) - distance * math.sqrt(radius**2 - distance**2)

@@ -345,8 +345,8 @@ def _sliding(carrier: _Cam | _TwoDiscs, structure: Structure) -> tuple[Part, ...
     """
     if carrier.options.bolt_count:
         raise HdoptError(
-            f"export.bolt_count is {carrier.options.bolt_count}, but the cam of the {structure.value} structure slides; "
-            "remove it, or choose the integral structure"
+            f"export.bolt_count is {carrier.options.bolt_count}, but the cam of the {structure.value} structure "
+            "slides; remove it, or choose the integral structure"
         )
     slide = _CrossSlide(carrier, structure)
     bore = carrier.clearance_bore()
@@ -391,14 +391,14 @@ class _CrossSlide:
         for number, width in self.widths.items():
             if width - self.clearance < wall:
                 raise HdoptError(
-                    f"clearances.cross_slide_clearance_mm is {self.clearance:g} mm in slot {number} of {width:g} mm: the "
-                    f"clearance closes the slot, a block of {width - self.clearance:.4g} mm is left; at least {wall:g} "
+                    f"clearances.cross_slide_clearance_mm is {self.clearance:g} mm in slot {number} of {width:g} mm: "
+                    f"the clearance closes the slot, a block of {width - self.clearance:.4g} mm is left; at least {wall:g} "
                     f"mm are needed (export.minimum_wall_mm): give less clearance or a wider slot_{number}_width_mm"
                 )
         if self.gap >= self.depth:
             raise HdoptError(
-                f"export.axial_gap_mm is {self.gap:g} mm, the slots are {self.depth:g} mm deep: the blocks do not reach "
-                "into them; give a smaller gap"
+                f"export.axial_gap_mm is {self.gap:g} mm, the slots are {self.depth:g} mm deep: the blocks do not "
+                "reach into them; give a smaller gap"
             )
         if self.depth + wall > self.thickness:
             raise HdoptError(
@@ -417,8 +417,8 @@ class _CrossSlide:
         slot = Slot(width, self.depth, straight, self._direction(number), self.radius, closed=True)
         if slot.reach + wall > room:
             raise HdoptError(
-                f"slot {number} for a disc of {2 * self.radius:g} mm reaches {slot.reach:.4g} mm from the axis; the cam "
-                f"allows {room - wall:.4g} mm; give a smaller clearances.disc_radius_mm"
+                f"slot {number} for a disc of {2 * self.radius:g} mm reaches {slot.reach:.4g} mm from the axis; the "
+                f"cam allows {room - wall:.4g} mm; give a smaller clearances.disc_radius_mm"
             )
         if self.depth + wall > thickness:
             raise HdoptError(

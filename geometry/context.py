@@ -1,4 +1,4 @@
-"""What surrounds a wave generator, for pictures and for a check of room: bearing races, flexspline ring, circular spline.
+"""What surrounds a wave generator, for pictures and a check of room: races, flexspline ring, circular spline.
 
 These parts show the deformed shapes as the model has them; they are not meant to be made.
 """
@@ -45,10 +45,11 @@ def context_parts(drive: Drive, bearing: float, race_share: float, clear: float)
         body = Prism(outline, -half, half, inner=ParallelCurve(profile, inside - clear))
         return Part(name, colour, (body,), contour=outline, context=True)
 
-    circular = Prism(Circle(tips * (1 + RIM_SHARE)), -half, half, inner=Circle(tips))
+    rim = Circle(tips * (1 + RIM_SHARE))
+    circular = Prism(rim, -half, half, inner=Circle(tips))
     return (
         ring("bearing_inner_race", RACE, bearing, bearing - race),
         ring("bearing_outer_race", RACE, race, 0.0),
         ring("flexspline_ring", FLEXSPLINE, 0.0, -wall),
-        Part("circular_spline", CIRCULAR_SPLINE, (circular,), context=True),
+        Part("circular_spline", CIRCULAR_SPLINE, (circular,), contour=rim, context=True),
     )

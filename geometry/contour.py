@@ -124,7 +124,7 @@ class ParallelCurve:
         return ParallelCurve(self.profile, self.distance + distance)
 
     def deviation(self, points: ArrayLike) -> Array:
-        """Measured against the profile itself, not against `points()`: its nearest point is found by Newton's method."""
+        """Measured from the profile itself, not from `points()`: its nearest point is found by Newton's method."""
         points = np.asarray(points, float)
         phi = np.arctan2(points[:, 0], points[:, 1])
         for _ in range(8):

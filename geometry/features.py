@@ -206,9 +206,7 @@ class Slot:
 
     @property
     def area(self) -> float:
-        return (
-            obround(2 * self.half_length, self.width) if self.closed else strip_of_disc(self.width, self.disc_radius)
-        )
+        return obround(2 * self.half_length, self.width) if self.closed else strip_of_disc(self.width, self.disc_radius)
 
     def tool(self, face: float) -> list[cq.Shape]:
         """The milling cutter's path, from below `face` up into the part."""

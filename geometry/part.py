@@ -5,9 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hdopt.geometry.areas import strip_of_disc
-from hdopt.geometry.contour import Contour
-from hdopt.geometry.features import BoltCircle, Bore, BrokenEdge, Slot, bar, countersink_tool, countersink_volume, cylinder
+from hdopt.geometry.contour import Array, Contour
+from hdopt.geometry.features import (
+    BoltCircle,
+    Bore,
+    BrokenEdge,
+    Slot,
+    bar,
+    countersink_tool,
+    countersink_volume,
+    cylinder,
+)
 from hdopt.geometry.solids import Station, loft
 
 if TYPE_CHECKING:
@@ -42,6 +54,12 @@ class Prism:
     def bore_area(self, bore: Bore) -> float:
         return bore.area_with_disc(0.0)
 
+    def contains(self, points: Array, margin: float) -> NDArray[np.bool_]:
+        """Which points (n, 3) lie in a prism with unbroken edges, deeper than `margin` mm."""
+        inside = (points[:, 2] > self.bottom + margin) & (points[:, 2] < self.top - margin)
+        inside &= self.outline.deviation(points[:, :2]) < -margin
+        return inside & (self.inner.deviation(points[:, :2]) > margin) if self.inner else inside
+
     def stations(self) -> list[Station]:
         stations = [
             (self.bottom, self.bottom_edge.radial),
@@ -49,9 +67,7 @@ class Prism:
             (self.top - self.top_edge.axial, 0.0),
             (self.top, self.top_edge.radial),
         ]
-        return [
-            station for index, station in enumerate(stations) if index == 0 or station[0] > stations[index - 1][0]
-        ]
+        return [station for index, station in enumerate(stations) if index == 0 or station[0] > stations[index - 1][0]]
 
     def build(self) -> cq.Shape:
         solid = loft(self.outline, self.stations())
@@ -104,6 +120,12 @@ class Part:
     bolts: BoltCircle | None = None
     contour: Contour | None = None
     context: bool = False
+
+    @property
+    def walls(self) -> tuple[Contour, ...]:
+        """The contours that the file's upright walls are checked against, the outermost first."""
+        inner = self.body[0].inner if len(self.body) == 1 and isinstance(self.body[0], Prism) else None
+        return tuple(contour for contour in (self.contour, inner) if contour is not None)
 
     @property
     def bottom(self) -> float:
@@ -166,4 +188,3 @@ class Part:
         if self.bolts:
             tools += self.bolts.tool(below, above)
         return tools
-
