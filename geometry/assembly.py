@@ -392,8 +392,8 @@ class _CrossSlide:
             if width - self.clearance < wall:
                 raise HdoptError(
                     f"clearances.cross_slide_clearance_mm is {self.clearance:g} mm in slot {number} of {width:g} mm: "
-                    f"the clearance closes the slot, a block of {width - self.clearance:.4g} mm is left; at least {wall:g} "
-                    f"mm are needed (export.minimum_wall_mm): give less clearance or a wider slot_{number}_width_mm"
+                    f"the clearance closes the slot: a block of {width - self.clearance:.4g} mm is left, {wall:g} "
+                    f"mm are needed (export.minimum_wall_mm); give less clearance or a wider slot_{number}_width_mm"
                 )
         if self.gap >= self.depth:
             raise HdoptError(

@@ -81,14 +81,21 @@ class StepCheck:
         """Largest deviation of any profile surface, mm."""
         return max(part.profile_deviation for part in self.parts if part.profile_deviation is not None)
 
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "parts": [part.to_dict() for part in self.parts],
+            "max_profile_deviation_um": self.profile_deviation * 1e3,
+        }
 
-def check_step(file: StepFile, model: WaveGeneratorModel, identity: Identity, schema: str) -> StepCheck:
+
+def check_step(file: StepFile, model: WaveGeneratorModel, identity: Identity, schema: str, name: str = "") -> StepCheck:
     """Compare a file that was read back with the model it is to show; `CheckFailed` with all that is wrong."""
+    name = name or file.path.name
     failures = list(_check_header(file, identity, schema))
     names, expected = [part.name for part in file.parts], [part.name for part in model.parts]
     if sorted(names) != sorted(expected):
         failures.append(f"it holds the parts {', '.join(names) or 'none'}, not {', '.join(expected)}")
-        raise CheckFailed(file.path.name, failures)
+        raise CheckFailed(name, failures)
     checks = []
     for part in model.parts:
         found = next(item for item in file.parts if item.name == part.name)
@@ -99,7 +106,7 @@ def check_step(file: StepFile, model: WaveGeneratorModel, identity: Identity, sc
     if not failures:
         failures += interferences(file.parts, [part for part in model.parts if part.context])
     if failures:
-        raise CheckFailed(file.path.name, failures)
+        raise CheckFailed(name, failures)
     return StepCheck(tuple(checks))
 
 

@@ -1,0 +1,146 @@
+"""Export of a wave generator: build, write under a passing name, read back, check, and only then name the file.
+
+A file that has not passed its check never bears its name; a file of an earlier export stays as it was.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, is_dataclass
+from enum import Enum
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hdopt.drive import Drive
+from hdopt.errors import HdoptError
+from hdopt.geometry.assembly import WaveGeneratorModel, wave_generator_model
+from hdopt.geometry.formats import FORMATS
+from hdopt.geometry.step import Identity
+from hdopt.study.export import ExportSection
+
+if TYPE_CHECKING:
+    import cadquery as cq
+
+    from hdopt.geometry.part import Part
+
+
+@dataclass(frozen=True)
+class Job:
+    """What every format needs to write its file: the model, its solids (built once), and what the files say."""
+
+    drive: Drive
+    model: WaveGeneratorModel
+    options: ExportSection
+    identity: Identity
+
+    @cached_property
+    def solids(self) -> tuple[tuple[Part, cq.Solid], ...]:
+        return tuple((part, part.build()) for part in self.model.parts)
+
+
+@dataclass(frozen=True)
+class ExportResult:
+    """What was written, as it was found in the files."""
+
+    files: Mapping[str, Path]
+    checks: Mapping[str, Mapping[str, Any]]
+    model: WaveGeneratorModel
+    identity: Identity
+
+    def to_dict(self) -> dict[str, Any]:
+        step = self.checks.get("step", {})
+        parts = step.get("parts") or [
+            {"name": part.name, "volume_mm3": part.volume, "bounding_box_mm": list(part.size), "context": part.context}
+            for part in self.model.parts
+        ]
+        first = next(iter(self.files.values()), None)
+        return {
+            "file": str(self.files.get("step", first)) if self.files else None,
+            "files": {kind: str(path) for kind, path in self.files.items()},
+            "structure": self.model.structure.value,
+            "parts": parts,
+            "max_profile_deviation_um": step.get("max_profile_deviation_um"),
+            "checks": dict(self.checks),
+            "assumptions": {assumption.key: assumption.value for assumption in self.model.assumptions},
+            "notes": list(self.model.notes),
+            "fingerprint": self.identity.fingerprint,
+        }
+
+
+def export(
+    drive: Drive, files: Mapping[str, str | Path], options: ExportSection | None = None, name: str = "wave generator"
+) -> ExportResult:
+    """Write the wave generator of `drive` to `files` (a key of `FORMATS` -> path) and check each file from disk.
+
+    `name` is the study's. Raises `HdoptError` for input that cannot be made, and `hdopt.geometry.check.CheckFailed`
+    where a file fails its check: then no file of this export is left.
+    """
+    options = options or ExportSection()
+    for kind in files:
+        if kind not in FORMATS:
+            from hdopt.errors import unknown_name
+
+            raise HdoptError(unknown_name("file format", kind, FORMATS))
+    targets = {kind: Path(path) for kind, path in files.items()}
+    if len({path.resolve() for path in targets.values()}) < len(targets):
+        raise HdoptError("two files of the export have the same name; give each its own")
+    model = wave_generator_model(drive, options)
+    identity = Identity(f"wave generator {name}", name, fingerprint(drive, options), version("hdopt"))
+    job = Job(drive, model, options, identity)
+    checks = {}
+    with staged(targets) as passing:
+        for kind, path in passing.items():
+            FORMATS[kind].write(path, job)
+        for kind, path in passing.items():
+            checks[kind] = FORMATS[kind].check(path, job, targets[kind].name)
+    return ExportResult(targets, checks, model, identity)
+
+
+def fingerprint(drive: Drive, options: ExportSection) -> str:
+    """Twelve digits that change with any number the solids are made from."""
+    plain = json.dumps([_plain(drive.wave_generator), _plain(drive.clearances), options.model_dump()], sort_keys=True)
+    return hashlib.sha256(plain.encode()).hexdigest()[:12]
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value):
+        numbers = {field.name: getattr(value, field.name) for field in fields(value) if not field.name.startswith("_")}
+        value = {"kind": type(value).__name__, **numbers}
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, Enum):
+        return value.value
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+@contextmanager
+def staged(targets: Mapping[str, Path]) -> Iterator[dict[str, Path]]:
+    """Passing names beside the targets; they become the targets' at the end, all of them, unless anything fails."""
+    passing = {kind: path.with_name(f".{path.name}.unchecked-{os.getpid()}") for kind, path in targets.items()}
+    try:
+        for kind, path in passing.items():
+            _require_writable(path, targets[kind])
+        yield passing
+        for kind, path in passing.items():
+            os.replace(path, targets[kind])
+    finally:
+        for path in passing.values():
+            path.unlink(missing_ok=True)
+
+
+def _require_writable(passing: Path, target: Path) -> None:
+    """Create the passing file, or say in one sentence why that cannot be done."""
+    if target.is_dir():
+        raise HdoptError(f"cannot write {target}: it is a folder; give the name of a file")
+    try:
+        passing.touch()
+    except OSError as error:
+        raise HdoptError(
+            f"cannot write {target}: {error.strerror}; give a file in a folder that exists and can be written"
+        ) from error

@@ -1,0 +1,40 @@
+"""The file formats of an export, each with how it is written and how the file is checked once it lies on disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from hdopt.geometry.export import Job
+
+
+class Format(Protocol):
+    """A kind of file."""
+
+    @property
+    def description(self) -> str: ...
+
+    def write(self, path: Path, job: Job) -> None: ...
+
+    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+        """Read the file back and compare it with the model; `CheckFailed` about the file `name` where it differs."""
+
+
+class Step:
+    description = "STEP assembly of all parts (AP214 or AP242)"
+
+    def write(self, path: Path, job: Job) -> None:
+        from hdopt.geometry.step import write_step
+
+        write_step(path, job.solids, job.identity, job.options.step_schema)
+
+    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+        from hdopt.geometry.check import check_step
+        from hdopt.geometry.step import read_step
+
+        return check_step(read_step(path), job.model, job.identity, job.options.step_schema, name).to_dict()
+
+
+FORMATS: dict[str, Format] = {"step": Step()}
+"""Format -> what writes and checks it; the names are the options of `hdopt export`."""
