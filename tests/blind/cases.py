@@ -37,9 +37,18 @@ CATALOGUE = {
 
 TROUBLES = ("gaps", "coloured", "ripple", "short", "one way", "coarse", "clock")
 
-# Above this severity a case whose own records cannot show the physics is drawn anew: it would test nothing.
+# One of each pair is a special case of the other, as far as any recording goes.
+ONE_IN_THE_OTHER = (
+    {"circular_spline_lobing", "cs_tooth_harmonics"},
+    {"encoder_output_eccentricity", "output_coupling"},
+)
+
+# From this severity on, a case whose own records cannot show the physics is drawn anew: it would test nothing.
 MUST_SHOW = 0.25
-ATTEMPTS = 12
+# From this severity on, conditions under which the physics could also be another are drawn anew, as a test engineer
+# would choose them; after some draws the confusion is taken as the physics' own.
+SHOULD_SEPARATE, SEPARATION_DRAWS = 0.5, 5
+ATTEMPTS = 14
 
 
 @dataclass(frozen=True)
@@ -95,18 +104,20 @@ def generate(spec, name="case"):
         if effect not in CATALOGUE:
             raise ValueError(f"unknown effect {effect!r}; the bench knows {', '.join(CATALOGUE)}")
     rng = np.random.default_rng([spec.seed, len(spec.effects), int(1000 * spec.severity)])
-    for _ in range(ATTEMPTS):
+    for attempt in range(ATTEMPTS):
         case, key = _attempt(spec, name, rng)
-        if case is not None and _fair(spec, key):
+        if case is not None and _fair(spec, key, attempt):
             return case, key
     raise RuntimeError(f"no fair case in {ATTEMPTS} draws for {spec}")
 
 
-def _fair(spec, key):
+def _fair(spec, key, attempt):
     if spec.family == "unknown":
         return key.detectable and not key.rivals
     if spec.family in ("single", "pair") and spec.severity >= MUST_SHOW:
-        return key.detectable
+        own = {name for pair in ONE_IN_THE_OTHER if pair & set(key.effects) for name in pair}
+        confused = spec.severity >= SHOULD_SEPARATE and not set(key.rivals) <= own
+        return key.detectable and not (confused and attempt < SEPARATION_DRAWS)
     return True
 
 
@@ -121,9 +132,17 @@ def _attempt(spec, name, rng):
     instrument = draw_instrument(rng, len(plans), trouble)
     setups = [set_up(errors, run(plan, instrument.jitter, rng)) for plan in plans]
     base_rms = joint_rms([read_error(s) for s in setups])
-    hidden, waves = _to_severity(hidden, setups, spec.severity * base_rms)
-    if hidden is None:
+    deaf = {"reversal", "speeds"} if spec.trouble == "one way" else set()
+    target = spec.severity * base_rms
+    sized = [
+        (_as_if_reversed if physics.needs & deaf and hasattr(physics, "scale_for") else _scaled_to)(
+            physics, setups, target
+        )
+        for physics in (hidden if target else [])
+    ]
+    if None in sized:
         return None, None
+    hidden, waves = [physics for physics, _ in sized], [waves for _, waves in sized]
     gain = float(np.prod([physics.torque_gain for physics in hidden]))
     tables, noises = zip(
         *[
@@ -169,29 +188,26 @@ def _plans(spec, hidden, rng):
     return plans
 
 
-def _to_severity(hidden, setups, target):
-    """Every hidden physics scaled to an rms of `target` (rad) alone, and its waves; None where it cannot be so large.
+def _scaled_to(physics, setups, target):
+    """`physics` scaled to an rms of `target` (rad), and its waves; None where it cannot be so large."""
+    scale = physics.scale
+    for _ in range(25):
+        physics = physics.scaled(scale)
+        waves = [hidden_wave(s, [physics]) for s in setups]
+        rms = joint_rms(waves)
+        if abs(rms / target - 1) < 0.005:
+            break
+        # In proportion at first; by half steps close by, where the zone switch spoils the proportion.
+        step = np.clip(target / rms, 0.01, 100) if rms else 10.0
+        step = step if abs(np.log(step)) > 0.1 else np.sqrt(step)
+        scale = float(np.clip(scale * step, *physics.scale_range))
+    return (physics, waves) if abs(rms / target - 1) < 0.02 else None
 
-    A decoy's conditions may take all effect from it (play without a reversal); it then stays as it was drawn.
-    """
-    found, waves = [], []
-    for physics in hidden:
-        scale, wave = physics.scale, None
-        for _ in range(25):
-            physics = physics.scaled(scale)
-            wave = [hidden_wave(s, [physics]) for s in setups]
-            rms = joint_rms(wave)
-            if rms < 1e-3 * target or target == 0 or abs(rms / target - 1) < 0.005:
-                break
-            # Secant in logarithms from the local proportionality; half steps where physics is not proportional.
-            step = target / rms if abs(np.log(target / rms)) > 0.1 else np.sqrt(target / rms)
-            low, high = physics.scale_range
-            scale = float(np.clip(scale * step, low, high))
-        found.append(physics)
-        waves.append(wave)
-        if target and rms >= 1e-3 * target and abs(rms / target - 1) > 0.05:
-            return None, None
-    return found, waves
+
+def _as_if_reversed(physics, setups, target):
+    """Physics in a test without the reversal that it needs: as large as would give `target` with one."""
+    physics = physics.scaled(physics.scale_for(target, max(np.abs(s.run.speed).max() for s in setups)))
+    return physics, [hidden_wave(s, [physics]) for s in setups]
 
 
 def _weigh(hidden, setups, plans, waves, together, noise_rms, instrument, rng):

@@ -8,6 +8,7 @@ left over, against the noise, says whether a perfect observer could decide.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from tests.blind import loops
 from tests.blind.geometry import (
@@ -84,15 +85,14 @@ class Witness:
 
     def refit(self, wave, turns=4):
         """What the base, refitted to base + `wave` within its plausible errors, leaves of it (rad rms)."""
-        from scipy.optimize import least_squares
-
-        truth = kinematic_error(self.errors, self.theta)
+        theta, rank, wave = self.theta[::3], self.rank[::3], wave[::3]  # smooth, but for pulses: a third will do
+        truth = kinematic_error(self.errors, theta)
         target = truth + wave
         unit = ERROR_BOUNDS
 
         def left(x):
-            residual = target - kinematic_error(BaseErrors(*(x * unit)), self.theta)
-            return (residual - (np.bincount(self.rank, residual) / np.bincount(self.rank))[self.rank]) / truth.std()
+            residual = target - kinematic_error(BaseErrors(*(x * unit)), theta)
+            return (residual - (np.bincount(rank, residual) / np.bincount(rank))[rank]) / truth.std()
 
         start = self.errors.vector() / unit
         found = least_squares(left, start, bounds=(-1.5, 1.5), diff_step=1e-3, max_nfev=turns)

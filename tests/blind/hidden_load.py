@@ -99,6 +99,10 @@ class Hysteresis(Hidden):
     def lag(self, run, ke):
         return self.scale * ARCMIN * self.force(run.theta / RATIO)
 
+    def scale_for(self, rms, speed):
+        """Scale that gives `rms` (rad) in a test back and forth."""
+        return rms / ARCMIN
+
     def reversal_path(self, share):
         """Output angle (rad) from a reversal at full slip to `share` of the way to the other branch."""
         reach = 40 * max(self.slip)
@@ -140,6 +144,10 @@ class LostMotion(Hidden):
             rng.uniform(0.05, 0.4),
             rng.uniform(0, TURN),
         )
+
+    def scale_for(self, rms, speed):
+        """Scale that gives `rms` (rad) in a test back and forth."""
+        return 2 * rms / ARCMIN
 
     def slots(self, theta):
         """Sum of 1/r over both slots (1/mm)."""

@@ -152,6 +152,10 @@ class ChannelDelay(Hidden):
     def draw(cls, rng):
         return cls(str(rng.choice(["output late", "input late"])))
 
+    def scale_for(self, rms, speed):
+        """Scale that gives `rms` (rad) in a test back and forth at `speed` (rad/s)."""
+        return rms * RATIO / speed
+
     def clock(self, time, input_angle, output_angle):
         late = time - self.scale
         if self.variant == "output late":

@@ -4,16 +4,11 @@ from itertools import combinations
 
 import numpy as np
 
-from tests.blind.cases import CATALOGUE, TROUBLES, Spec
+from tests.blind.cases import CATALOGUE, ONE_IN_THE_OTHER, TROUBLES, Spec
 from tests.blind.hidden_outside import KINDS
 
 SEVERITIES = (0.1, 0.25, 0.5, 1.0)
 FAMILIES = ("nothing", "single", "knee", "pair", "decoy", "unknown")
-# One of each pair is a special case of the other, as far as any recording goes.
-ONE_IN_THE_OTHER = (
-    {"circular_spline_lobing", "cs_tooth_harmonics"},
-    {"encoder_output_eccentricity", "output_coupling"},
-)
 
 
 def plan(seed, families=FAMILIES, nothing=300, repeats=2, pairs=40, share=1.0):

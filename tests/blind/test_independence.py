@@ -23,7 +23,7 @@ def imported(path):
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.name)
 def test_only_libraries_and_its_own_files_are_imported(path):
-    allowed = SCORER_MAY_USE if path.name in ("score.py", "thresholds.py") else BENCH_MAY_USE
+    allowed = SCORER_MAY_USE if path.name in ("marking.py", "score.py", "scores.py", "thresholds.py") else BENCH_MAY_USE
     for name in imported(path):
         top = name.split(".")[0]
         own = name == "tests.blind" or name.startswith("tests.blind.")
