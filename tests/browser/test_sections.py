@@ -65,7 +65,7 @@ def all_sections() -> tuple:
     )
     interference = pd.DataFrame({"order": [2.0], "neighbour": [2.0125], "correlation": [0.98]})
     return (
-        waveform_section(theta, beating(theta), RATIO, requirement_arcmin=1.0),
+        waveform_section(theta, beating(theta), requirement_arcmin=1.0),
         spectrum_section(
             np.array([1 / RATIO, 1, 2, 2.0125, 2.025, 3]),
             np.array([0.13, 0.31, 0.28, 0.13, 0.02, 0.07]),

@@ -30,7 +30,7 @@ def key_figures(section: Section) -> dict[str, str]:
 def test_the_beat_is_measured_turn_by_turn():
     theta = np.linspace(0, 2 * np.pi * 80, 80 * 360 + 1)
     size = 1 + 0.5 * np.cos(theta / 80)  # 1.5 at the start and end, 0.5 half way
-    section = waveform_section(theta, size * np.sin(2 * theta), 80)
+    section = waveform_section(theta, size * np.sin(2 * theta))
     values = key_figures(section)
     assert values["Largest in one turn"] == "3.000 arcmin"
     # A turn holds two cycles and the larger counts: 315 deg past the waist the size is 0.5 (2 - cos 0.0687) = 0.5012.
@@ -43,7 +43,7 @@ def test_the_beat_is_measured_turn_by_turn():
 
 def test_the_converged_value_given_is_the_one_shown():
     theta = np.linspace(0, 4 * np.pi, 721)
-    section = waveform_section(theta, np.sin(theta), 2, peak_to_peak_arcmin=2.125, requirement_arcmin=1.0)
+    section = waveform_section(theta, np.sin(theta), peak_to_peak_arcmin=2.125, requirement_arcmin=1.0)
     assert key_figures(section)["Peak-to-peak, converged"] == "2.125 arcmin"
     assert key_figures(section)["Required"] == "1.000 arcmin"
     assert "2.125" in section.summary
@@ -154,7 +154,7 @@ def test_words():
 
 def test_a_full_turn_whose_end_is_left_out_counts_whole():
     theta = np.arange(80 * 90) * (2 * np.pi / 90)
-    section = waveform_section(theta, np.sin(theta), 80)
+    section = waveform_section(theta, np.sin(theta))
     carpet = np.asarray(item(section, "waveform-carpet").figure.data[0].z)
     assert carpet.shape == (80, 181)
     assert np.allclose(carpet[-1], carpet[0], atol=1e-3)  # linear interpolation between points 4 deg apart

@@ -22,7 +22,6 @@ HOVER = "%{x:.1f} deg: %{y:.3f} arcmin"
 def waveform_section(
     theta: NDArray[np.float64],
     ke_arcmin: NDArray[np.float64],
-    ratio: float,
     *,
     peak_to_peak_arcmin: float | None = None,
     requirement_arcmin: float | None = None,
@@ -30,8 +29,8 @@ def waveform_section(
 ) -> Section:
     """Kinematic error of one drive over its full relative turn.
 
-    `theta` input angle, rad, rising evenly over one relative turn (`ratio` input turns), shape (n,), its end given or
-    left out; `ke_arcmin` the error there, shape (n,), at least 90 points a turn. `peak_to_peak_arcmin` is the converged
+    `theta` input angle, rad, rising evenly over one relative turn of both splines, shape (n,), its end given or left
+    out; `ke_arcmin` the error there, shape (n,), at least 90 points a turn. `peak_to_peak_arcmin` is the converged
     value where the grid's own is not to be shown; `requirement_arcmin` is what it is held against.
     """
     turns = _by_turn(theta, ke_arcmin)
@@ -55,7 +54,8 @@ def waveform_section(
                 f"The error over {len(turns)} input turns",
                 _beat(theta, ke_arcmin, peak_to_peak),
                 "Every turn of the wave generator, and the envelope of its peaks. The flexspline falls behind by 1/N "
-                f"of a turn each time, so its teeth meet those of the circular spline anew only after {ratio:g} turns.",
+                "of a turn each time, so its teeth meet those of the circular spline anew only after "
+                f"{len(turns)} turns.",
             ),
             Figure(
                 f"{key}-turn",

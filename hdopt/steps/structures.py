@@ -1,0 +1,51 @@
+"""Step: the drive with each of the four wave-generator structures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pandas as pd
+
+from hdopt.drive import Drive, Structure
+from hdopt.errors import MissingValue
+from hdopt.kinematics import peak_to_peak_arcmin
+from hdopt.kinematics.lag import lag
+from hdopt.kinematics.waveform import relative_turn
+from hdopt.report.sections.structures import structures_section
+from hdopt.steps import StepResult, requirement_arcmin
+from hdopt.study import Study
+
+SAMPLES_PER_TURN = 360
+
+
+def with_structure(drive: Drive, structure: Structure) -> Drive:
+    return replace(drive, wave_generator=replace(drive.wave_generator, structure=structure))
+
+
+def structures(study: Study, seed: int) -> StepResult:
+    """Peak-to-peak and lag of all four structures; lag is left out where a clearance it needs is not given."""
+    rows, waveforms = [], {}
+    for structure in Structure:
+        drive = with_structure(study.drive, structure)
+        theta, error = relative_turn(drive, study.errors, SAMPLES_PER_TURN)
+        row = {
+            "structure": structure.value,
+            "peak_to_peak_arcmin": float(peak_to_peak_arcmin(drive, study.errors)),
+        }
+        try:
+            lost = lag(drive, study.errors, theta, error).total_arcmin
+        except MissingValue:
+            lost = None
+        if lost is not None:
+            row |= {"lag_mean_arcmin": lost.mean(), "lag_min_arcmin": lost.min(), "lag_max_arcmin": lost.max()}
+        rows.append(row)
+        one_turn = theta <= 2 * math.pi
+        waveforms[structure.value] = error[one_turn]
+    frame = pd.DataFrame(rows)
+    if frame.isna().any(axis=None):
+        frame = frame[["structure", "peak_to_peak_arcmin"]]
+    section = structures_section(
+        frame, waveforms=(theta[one_turn], waveforms), requirement_arcmin=requirement_arcmin(study)
+    )
+    return StepResult((section,), {row.pop("structure"): row for row in frame.to_dict("records")})

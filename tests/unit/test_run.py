@@ -1,0 +1,122 @@
+"""`hdopt run` and its steps: every step builds its section from a study, and says what it cannot do."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from cases import drive
+
+from hdopt.drive import Structure
+from hdopt.errors import HdoptError
+from hdopt.kinematics import peak_to_peak_arcmin
+from hdopt.run import run, steps_of
+from hdopt.steps import STEPS, find_step
+from hdopt.steps.design import map_arcmin, sensitivities, with_width
+from hdopt.steps.profiles import alternatives, profiles
+from hdopt.steps.structures import structures
+from hdopt.study import load_study
+
+MINIMAL = """
+[drive]
+flexspline_teeth = 100
+circular_spline_teeth = 102
+module_mm = 0.5
+pressure_angle_deg = 20
+flexspline_inner_radius_mm = 24.0
+[wave_generator]
+width_mm = 8.0
+[errors]
+axis_eccentricity_mm = 0.01
+axis_eccentricity_direction_deg = 30
+"""
+
+
+@pytest.fixture(scope="module")
+def study():
+    return load_study("csf-25-80")
+
+
+@pytest.fixture
+def minimal(tmp_path):
+    (tmp_path / "minimal.toml").write_text(MINIMAL)
+    return load_study(tmp_path / "minimal.toml")
+
+
+def test_a_run_leaves_a_page_its_numbers_and_the_results_of_each_step(study, tmp_path):
+    result = run(study, tmp_path)
+    assert result.report == tmp_path / "report.html"
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert list(results["steps"]) == list(STEPS)
+    assert results["steps"]["waveform"]["peak_to_peak_arcmin"] == pytest.approx(
+        float(peak_to_peak_arcmin(study.drive, study.errors))
+    )
+    assert (tmp_path / "orders-table.csv").is_file()
+    assert study.title in result.report.read_text()
+
+
+def test_a_study_lists_its_steps(tmp_path, study):
+    (tmp_path / "mine.toml").write_text('drive = "csf-25-80"\n[study]\nsteps = ["orders", "waveform"]\n')
+    assert steps_of(load_study(tmp_path / "mine.toml")) == ("orders", "waveform")
+    assert steps_of(study) == tuple(STEPS)
+
+
+@pytest.mark.parametrize(
+    ("steps", "message"),
+    [
+        ('["wavefrom"]', r"mine.toml, line 3, study.steps: unknown step 'wavefrom'; did you mean 'waveform'"),
+        ("[]", r"mine.toml, line 3, study.steps: is empty; name at least one of waveform, orders"),
+    ],
+)
+def test_steps_that_cannot_be_done_are_refused_before_anything_runs(steps, message, tmp_path):
+    (tmp_path / "mine.toml").write_text(f'drive = "csf-25-80"\n[study]\nsteps = {steps}\n')
+    with pytest.raises(HdoptError, match=message):
+        run(load_study(tmp_path / "mine.toml"), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_steps_do_without_what_a_study_does_not_give(minimal):
+    frame = next(item.frame for item in find_step("structures")(minimal, 1).sections[0].items if hasattr(item, "frame"))
+    assert list(frame.columns) == ["structure", "peak_to_peak_arcmin"]
+    with pytest.raises(HdoptError, match=r"the lag needs clearances.backlash_mm"):
+        find_step("lag")(minimal, 1)
+    with pytest.raises(HdoptError, match=r"bending of the ring needs drive.flexspline_wall_mm"):
+        find_step("profiles")(minimal, 1)
+
+
+def test_an_error_that_is_nil_and_its_direction_have_no_sensitivity(minimal):
+    found = sensitivities(minimal, 1).results
+    assert set(found) == {
+        "base_arcmin",
+        "Axis eccentricity",
+        "Axis eccentricity, direction",
+        "Pressure angle",
+        "WG width",
+    }
+    assert found["Axis eccentricity"]["low_arcmin"] < found["base_arcmin"] < found["Axis eccentricity"]["high_arcmin"]
+
+
+def test_the_map_goes_through_the_design(study):
+    angles, widths = np.array([10.0, 12.0]), np.array([9.0, 11.0])
+    values = map_arcmin(study.drive, study.errors, angles, widths)
+    assert values[1, 0] == pytest.approx(float(peak_to_peak_arcmin(study.drive, study.errors)), rel=1e-12)
+    wider = float(peak_to_peak_arcmin(with_width(study.drive, 11.0), study.errors))
+    assert values[1, 1] == pytest.approx(wider, rel=1e-12)
+
+
+def test_profiles_start_with_the_studys_own_and_all_deflect_alike(study):
+    offered = alternatives(study)
+    assert next(iter(offered)) == "ellipse"
+    assert set(offered) == {"ellipse", "resal", "two_disk"}
+    assert offered["ellipse"] is study.drive.wave_generator.profile
+    assert [profile.semi_major for profile in offered.values()] == pytest.approx([31.046] * 3)
+    results = profiles(study, 1).results
+    assert results["resal"]["contact_angle_deg"] == pytest.approx(54.99, abs=0.03)  # Jia 2021, Table 4
+
+
+def test_structures_are_those_of_the_drive_with_nothing_else_changed(study):
+    results = structures(study, 1).results
+    for structure in Structure:
+        expected = float(peak_to_peak_arcmin(drive(structure=structure), study.errors))
+        assert results[structure.value]["peak_to_peak_arcmin"] == pytest.approx(expected, rel=1e-12)
