@@ -118,7 +118,7 @@ def template() -> go.layout.Template:
             "separators": ".\u202f",
         },
         data={
-            "scatter": [{"line": {"width": 2}, "marker": {"size": 7, "colorbar": colour_bar}}],
+            "scatter": [{"line": {"width": 2, "simplify": False}, "marker": {"size": 7, "colorbar": colour_bar}}],
             "bar": [{"marker": {"line": {"width": 0}}}],
             "heatmap": [{"colorscale": sequential, "colorbar": colour_bar}],
             "contour": [{"colorscale": sequential, "colorbar": colour_bar}],

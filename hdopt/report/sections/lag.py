@@ -46,7 +46,7 @@ def lag_section(
                 f"{key}-turn",
                 "Lag over a turn of the wave generator",
                 _lag(theta, lag_arcmin, parts),
-                "The thick line is the whole; where it falls below zero the teeth interfere.",
+                ("The thick line is the whole. " if len(parts) > 1 else "") + "Below zero the teeth interfere.",
             ),
         ),
         says,
@@ -58,7 +58,7 @@ def _lag(
 ) -> go.Figure:
     angle = np.degrees(theta)
     made = figure("Input angle [deg]", "Lag [arcmin]", height=360)
-    for colour, (name, values) in zip(PALETTE, parts.items(), strict=False):
+    for colour, (name, values) in zip(PALETTE, parts.items() if len(parts) > 1 else (), strict=False):
         made.add_scatter(
             x=angle,
             y=np.broadcast_to(values, angle.shape),

@@ -40,7 +40,6 @@ def profiles_section(
     times = EXAGGERATED * undeformed_radius_mm / max(float(np.abs(w).max()) for w in deflection_mm.values())
     change = {name: 1000 * values for name, values in curvature_change_per_mm.items()}
     peaks = {name: float(np.abs(values).max()) for name, values in change.items()}
-    gentle, harsh = min(peaks, key=peaks.get), max(peaks, key=peaks.get)
     shown = summary.assign(profile=[label(name) for name in summary["profile"]])
     reference = next(iter(deflection_mm))
     items: list[Figure | Table] = [
@@ -69,7 +68,8 @@ def profiles_section(
                 f"{key}-difference",
                 f"Deflection against that of the {label(reference).lower()}",
                 _along(phi, others, "Difference [µm]", "%{y:.2f} µm", first_colour=1),
-                "These few hundredths of a millimetre decide where the flexspline bends and how many teeth meet.",
+                f"Up to {max(float(np.abs(w).max()) for w in others.values()):.0f} µm, which decide where the ring "
+                "bends and how many teeth meet.",
             )
         )
     items.append(Table(f"{key}-table", "Profiles", shown))
@@ -77,8 +77,18 @@ def profiles_section(
         key,
         "Profiles of the wave generator",
         tuple(items),
-        f"The largest change of curvature is smallest with {label(gentle)} ({peaks[gentle]:.2f} × 10⁻³/mm) and largest "
-        f"with {label(harsh)} ({peaks[harsh]:.2f} × 10⁻³/mm); bending stress grows in proportion.",
+        _comparison(peaks),
+    )
+
+
+def _comparison(peaks: Mapping[str, float]) -> str:
+    gentle, harsh = min(peaks, key=peaks.get), max(peaks, key=peaks.get)
+    says = f"{label(gentle)}: the curvature changes by {peaks[gentle]:.2f} × 10⁻³/mm at most"
+    if len(peaks) == 1:
+        return f"{says}; bending stress grows in proportion."
+    return (
+        f"{says}, least of all. {label(harsh)}: {peaks[harsh]:.2f} × 10⁻³/mm, most of all. "
+        "Bending stress grows in proportion."
     )
 
 

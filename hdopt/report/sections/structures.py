@@ -93,10 +93,11 @@ def _bars(frame: pd.DataFrame, requirement_arcmin: float | None) -> go.Figure:
         made.add_hline(
             requirement_arcmin,
             line={"dash": "dash", "width": 1.5, "color": INK},
-            annotation={"text": f"required {requirement_arcmin:g} arcmin", "xanchor": "right"},
+            name=f"Required, {requirement_arcmin:g} arcmin",
+            showlegend=True,
         )
     made.update_xaxes(showgrid=False, ticks="")
-    made.update_yaxes(rangemode="tozero")
+    made.update_yaxes(rangemode="tozero", zeroline=True, zerolinecolor=INK, zerolinewidth=1)
     return made
 
 
