@@ -13,6 +13,9 @@ _EXPORTS: dict[str, str] = {
     "load_study": "hdopt.study",
     "kinematic_error": "hdopt.analysis",
     "profile": "hdopt.analysis",
+    "stack": "hdopt.tolerancing",
+    "sobol": "hdopt.tolerancing",
+    "allocate": "hdopt.tolerancing",
     "HdoptError": "hdopt.errors",
 }
 """Public name -> the module that has it."""

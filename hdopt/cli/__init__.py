@@ -13,6 +13,9 @@ from hdopt.errors import HdoptError
 COMMANDS: dict[str, str] = {
     "ke": "Kinematic error of one drive: peak-to-peak, orders, contact, lag.",
     "profile": "The wave generator's profile: contact angle, curvature change, bending stress.",
+    "stack": "Monte Carlo stack of the tolerances: distribution, yield, Ppk; tails and worst case on request.",
+    "sobol": "Which tolerances matter: Sobol' indices with intervals, Shapley effects where inputs are correlated.",
+    "allocate": "Least-cost tolerances that keep the requirement, verified.",
     "run": "Everything a study file asks for, with report.html.",
     "studies": "The shipped studies, a line each.",
 }

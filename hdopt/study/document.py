@@ -78,11 +78,20 @@ def _split(dotted: str) -> Keys:
     return tuple(part.strip().strip("\"'") for part in dotted.split("."))
 
 
+KIND_KEYS = ("distribution", "model", "callout")
+"""Keys that say what a table is; the keys beside them depend on it."""
+
+
 def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """`base` with the keys of `changes` in place of its own, table by table; neither is changed."""
+    """`base` with the keys of `changes` in place of its own, table by table; neither is changed.
+
+    A table that says what it is (a distribution, a cost model) takes the place of the other one whole: half of one
+    distribution's parameters and half of another's make neither.
+    """
     merged = deepcopy(dict(base))
     for key, value in changes.items():
-        if isinstance(value, Mapping) and isinstance(merged.get(key), Mapping):
+        says_kind = isinstance(value, Mapping) and any(kind in value for kind in KIND_KEYS)
+        if isinstance(value, Mapping) and isinstance(merged.get(key), Mapping) and not says_kind:
             merged[key] = merge(merged[key], value)
         else:
             merged[key] = deepcopy(value)

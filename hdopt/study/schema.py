@@ -21,9 +21,11 @@ SECTIONS: dict[str, str] = {
     "clearances": "hdopt.study.drive:ClearancesSection",
     "material": "hdopt.study.drive:MaterialSection",
     "load": "hdopt.study.drive:LoadSection",
-    "tolerances": "hdopt.study.base:OpenSection",
-    "requirement": "hdopt.study.base:OpenSection",
-    "contributors": "hdopt.study.base:OpenSection",
+    "tolerances": "hdopt.study.tolerances:TolerancesSection",
+    "requirement": "hdopt.study.tolerances:RequirementSection",
+    "contributors": "hdopt.study.tolerances:ContributorsSection",
+    "linear_stack": "hdopt.study.tolerances:LinearStackSection",
+    "allocate": "hdopt.study.costs:AllocateSection",
 }
 """Section -> where its model is; a model is imported only when a study has the section."""
 

@@ -1,0 +1,73 @@
+"""`hdopt allocate`: least-cost tolerances."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from hdopt.cli.common import drive_option, emit, json_option, seed_option, set_option, study_argument
+
+
+@click.command()
+@study_argument
+@drive_option
+@set_option
+@click.option("--rule", metavar="RULE", help="worst_case, rss or yield; the study's own if omitted.")
+@click.option("--compare/--no-compare", default=None, help="Also the other rules, in one table.")
+@click.option("--engine", metavar="ENGINE", help="process, threads or dask://HOST:PORT; threads if omitted.")
+@json_option
+@seed_option
+def command(study, drive, overrides, rule, compare, engine, json_file, seed) -> int:
+    """Least-cost tolerances that keep the requirement, verified once on a fresh seed.
+
+    STUDY is a study file or a shipped study with costs. Exit status 1: the requirement cannot be met.
+    """
+    from hdopt.study import load_study
+    from hdopt.tolerance.allocate import Infeasible
+    from hdopt.tolerancing import allocate
+
+    loaded = load_study(study, overrides, drive)
+    try:
+        result = allocate(loaded, rule, compare=compare, seed=seed, engine=engine)
+    except Infeasible as error:
+        answer = {
+            "study": loaded.name,
+            "status": "infeasible",
+            "reason": str(error),
+            "best_reachable": error.best_reachable,
+        }
+        emit(answer, json_file, ())
+        print(f"hdopt: {error}", file=sys.stderr)
+        return 1
+    emit(result.to_dict(), json_file, _lines(result))
+    return 0 if result.accepted else 1
+
+
+def _lines(result):
+    yield f"{result.study}: {result.rule} rule, limit {result.limit:g} {result.unit}: {result.status}"
+    yield f"  {'':32s} {'tolerance':>12s} {'present':>12s} {'cost':>9s} {'present':>9s}"
+    for name, row in result.errors.items():
+        grade = f"  {row.grade}" if row.grade else ""
+        flag = f" (extrapolated: {row.extrapolated})" if row.extrapolated else ""
+        yield (
+            f"  {name:32s} {row.tolerance:12.6g} {row.present:12.6g} {row.cost:9.4f} {row.present_cost:9.4f} "
+            f"{row.unit}{grade}{flag}"
+        )
+    yield f"  {'total cost':58s} {result.total_cost:9.4f} {result.present_cost:9.4f}"
+    gap = "not known" if result.optimality_gap is None else f"{result.optimality_gap:.2g}"
+    yield f"  optimality gap {gap}: {result.optimality_gap_reason}"
+    if result.marginal_cost is not None:
+        yield f"  marginal cost of the requirement {result.marginal_cost:.5g} ({result.marginal_cost_reason})"
+    check = result.verified_yield
+    yield f"  verified yield {check.value:.6f} ({check.low:.6f} to {check.high:.6f}), n = {result.verify_n}"
+    for outcome in result.comparison:
+        share = outcome.conforming
+        yield (
+            f"  {outcome.rule:14s} cost {outcome.total_cost:9.4f}  yield {share.value:.5f} "
+            f"({share.low:.5f} to {share.high:.5f}) {outcome.note}"
+        )
+    for limit, cost in result.cost_curve:
+        yield f"  limit {limit:9.5g} {result.unit}: cost {cost:.4f}"
+    for note in result.notes:
+        yield f"  note: {note}"

@@ -1,0 +1,122 @@
+"""Costs of tolerances in a study file, and [allocate]."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from hdopt.errors import HdoptError, MissingValue
+from hdopt.study.base import NotNegative, Positive, Section
+from hdopt.tolerance.cost import CostModel, Exponential, Grade, GradeTable, Piecewise, Power, Reciprocal
+from hdopt.tolerance.grades import GradeValue, iso_1328_pitch, it_grade, jis_1702_pitch
+
+
+class CostRow(Section):
+    """What every cost may carry: where its numbers come from, and how far the tolerance may go."""
+
+    source: str = "assumed"
+    tightest: NotNegative | None = None
+    widest: Positive | None = None
+
+
+class ReciprocalRow(CostRow):
+    model: Literal["reciprocal"]
+    a: float = 0.0
+    b: Positive
+
+    def build(self, gear: tuple[float, float] | None) -> CostModel:
+        return Reciprocal(self.a, self.b)
+
+
+class PowerRow(CostRow):
+    model: Literal["power"]
+    a: float = 0.0
+    b: Positive
+    k: Positive
+
+    def build(self, gear: tuple[float, float] | None) -> CostModel:
+        return Power(self.a, self.b, self.k)
+
+
+class ExponentialRow(CostRow):
+    model: Literal["exponential"]
+    a: Positive
+    b: Positive
+    fixed: float = 0.0
+
+    def build(self, gear: tuple[float, float] | None) -> CostModel:
+        return Exponential(self.a, self.b, self.fixed)
+
+
+class PiecewiseRow(CostRow):
+    model: Literal["piecewise"]
+    points: list[list[float]] = Field(min_length=2)
+    """[tolerance, cost] pairs, tolerances rising."""
+
+    def build(self, gear: tuple[float, float] | None) -> CostModel:
+        if any(len(point) != 2 for point in self.points):
+            raise HdoptError(f"the piecewise cost has points {self.points}; each must be a pair [tolerance, cost]")
+        return Piecewise(tuple((t, c) for t, c in self.points))
+
+
+class GradeRow(Section):
+    """One grade: its cost, and its tolerance unless a standard gives it."""
+
+    grade: str | int
+    cost: float
+    tolerance: Positive | None = None
+
+
+class TableRow(CostRow):
+    """A choice of grades; `system` names the standard that gives their tolerances."""
+
+    model: Literal["table"]
+    grades: list[GradeRow] = Field(min_length=1)
+    system: Literal["iso286", "iso1328", "jis1702"] | None = None
+    nominal_mm: Positive | None = None
+    """Nominal size, for ISO 286."""
+    factor: Positive = 1.0
+    """Tolerance of this input per mm of the grade's: 0.5 for an eccentricity by a coaxiality, or F_p as one sine."""
+
+    def build(self, gear: tuple[float, float] | None) -> CostModel:
+        built = []
+        for row in self.grades:
+            if self.system is None:
+                if row.tolerance is None:
+                    raise MissingValue(f"grade {row.grade}", "tolerance (or system, the standard that gives it)")
+                built.append(Grade(str(row.grade), row.tolerance, row.cost))
+            else:
+                value = self._standard(row.grade, gear)
+                built.append(Grade(value.name, self.factor * value.tolerance, row.cost, value.extrapolated))
+        return GradeTable(tuple(built))
+
+    def _standard(self, grade: str | int, gear: tuple[float, float] | None) -> GradeValue:
+        if self.system == "iso286":
+            if self.nominal_mm is None:
+                raise MissingValue("an ISO 286 grade", "nominal_mm")
+            return it_grade(str(grade), self.nominal_mm)
+        if gear is None:
+            raise HdoptError(f"a gear grade ({self.system}) needs the drive's module and teeth; add [drive]")
+        if not isinstance(grade, int):
+            raise HdoptError(f"the gear grade {grade!r} is not a whole number; {self.system} grades are numbers")
+        module, diameter = gear
+        return (iso_1328_pitch if self.system == "iso1328" else jis_1702_pitch)(grade, diameter, module)
+
+
+Cost = Annotated[
+    ReciprocalRow | PowerRow | ExponentialRow | PiecewiseRow | TableRow,
+    Field(discriminator="model"),
+]
+
+
+class AllocateSection(Section):
+    """[allocate]: which rule decides, what is compared, and how the result is verified."""
+
+    rule: Literal["worst_case", "rss", "yield"] = "yield"
+    compare: bool = True
+    """Also the other rules and equal scaling, in one table."""
+    verify_n: int = Field(default=2**20, ge=2**14)
+    """Samples of the one verification; fixed before it."""
+    curve: list[Positive] = Field(default_factory=list)
+    """Limits of the cost curve, as multiples of the requirement."""

@@ -1,0 +1,273 @@
+"""[tolerances], [requirement], [contributors] and [linear_stack] of a study file, and the records they become."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, create_model
+
+from hdopt.deviations import PHASE_OF, STUDY_KEYS, study_key
+from hdopt.errors import HdoptError, unknown_name
+from hdopt.study.base import Positive, Section
+from hdopt.study.costs import Cost
+from hdopt.tolerance.contributors import VECTORS, Contributor
+from hdopt.tolerance.copula import CorrelationGroup
+from hdopt.tolerance.distributions import (
+    Beta,
+    Distribution,
+    HalfNormal,
+    LogNormal,
+    MeasuredSample,
+    Normal,
+    Rayleigh,
+    Triangular,
+    Uniform,
+)
+from hdopt.tolerance.drive_inputs import contributor_distribution
+
+INFINITY = float("inf")
+
+
+class Row(Section):
+    """What every distribution may carry: its truncation, and the cost of its tolerance."""
+
+    lower: float = Field(default=-INFINITY, allow_inf_nan=True)
+    upper: float = Field(default=INFINITY, allow_inf_nan=True)
+    cost: Cost | None = None
+
+    @property
+    def bounds(self) -> dict[str, float]:
+        return {"lower": self.lower, "upper": self.upper}
+
+
+class NormalRow(Row):
+    distribution: Literal["normal"]
+    mean: float = 0.0
+    std: Positive
+
+    def build(self, folder: Path) -> Distribution:
+        return Normal(mean=self.mean, std=self.std, **self.bounds)
+
+
+class UniformRow(Row):
+    distribution: Literal["uniform"]
+    lower: float
+    upper: float
+
+    def build(self, folder: Path) -> Distribution:
+        return Uniform(**self.bounds)
+
+
+class TriangularRow(Row):
+    distribution: Literal["triangular"]
+    minimum: float
+    mode: float
+    maximum: float
+
+    def build(self, folder: Path) -> Distribution:
+        return Triangular(minimum=self.minimum, mode=self.mode, maximum=self.maximum, **self.bounds)
+
+
+class RayleighRow(Row):
+    distribution: Literal["rayleigh"]
+    scale: Positive
+
+    def build(self, folder: Path) -> Distribution:
+        return Rayleigh(scale=self.scale, **self.bounds)
+
+
+class HalfNormalRow(Row):
+    distribution: Literal["half_normal"]
+    scale: Positive
+
+    def build(self, folder: Path) -> Distribution:
+        return HalfNormal(scale=self.scale, **self.bounds)
+
+
+class LogNormalRow(Row):
+    distribution: Literal["lognormal"]
+    median: Positive
+    log_std: Positive
+
+    def build(self, folder: Path) -> Distribution:
+        return LogNormal(median=self.median, log_std=self.log_std, **self.bounds)
+
+
+class BetaRow(Row):
+    distribution: Literal["beta"]
+    a: Positive
+    b: Positive
+    minimum: float = 0.0
+    maximum: float
+
+    def build(self, folder: Path) -> Distribution:
+        return Beta(a=self.a, b=self.b, minimum=self.minimum, maximum=self.maximum, **self.bounds)
+
+
+class MeasuredRow(Row):
+    distribution: Literal["measured"]
+    file: str
+    """CSV of one number a line, in the error's unit, relative to the study file."""
+
+    def build(self, folder: Path) -> Distribution:
+        return MeasuredSample.from_csv(folder / self.file, **self.bounds)
+
+
+class PositionZoneRow(Section):
+    """A position tolerance zone: a plane normal deviation truncated at its edge, or one uniform over the zone."""
+
+    distribution: Literal["position_zone"]
+    diameter: Positive
+    std: Positive | None = None
+    """Standard deviation of each component; without it every place in the zone is alike."""
+    cost: Cost | None = None
+
+    def build(self, folder: Path) -> Distribution:
+        radius = self.diameter / 2
+        if self.std is None:
+            return Triangular(minimum=0.0, mode=radius, maximum=radius)  # the distance of a point uniform on a disc
+        return Rayleigh(scale=self.std, upper=radius)
+
+
+AnyRow = Annotated[
+    NormalRow
+    | UniformRow
+    | TriangularRow
+    | RayleighRow
+    | HalfNormalRow
+    | LogNormalRow
+    | BetaRow
+    | MeasuredRow
+    | PositionZoneRow,
+    Field(discriminator="distribution"),
+]
+
+
+class CorrelationRow(Section):
+    """Errors that vary together: the correlation matrix of their normal scores (Gaussian copula)."""
+
+    errors: list[str] = Field(min_length=2)
+    matrix: list[list[float]]
+
+    def build(self) -> CorrelationGroup:
+        return CorrelationGroup(tuple(self.errors), self.matrix)
+
+
+class TolerancesBase(Section):
+    """[tolerances]: any error by its study key, and `correlation`, a list of groups of errors."""
+
+    correlation: list[CorrelationRow] = Field(default_factory=list)
+
+    @property
+    def rows(self) -> dict[str, Any]:
+        """The errors that vary, in the order of `STUDY_KEYS`."""
+        return {key: row for key in STUDY_KEYS if (row := getattr(self, key)) is not None}
+
+    def distributions(self, folder: Path) -> dict[str, Distribution]:
+        """Distribution by study key. A position zone brings its direction with it."""
+        built: dict[str, Distribution] = {}
+        for key, row in self.rows.items():
+            try:
+                built[key] = row.build(folder)
+            except HdoptError as error:
+                raise HdoptError(f"[tolerances] {key}: {error}") from error
+        for size, direction in PHASE_OF.items():
+            row = getattr(self, study_key(size))
+            if isinstance(row, PositionZoneRow):
+                built.setdefault(study_key(direction), Uniform(lower=0.0, upper=360.0))
+        return built
+
+    def costs(self) -> dict[str, Cost]:
+        return {key: row.cost for key, row in self.rows.items() if row.cost is not None}
+
+
+TolerancesSection = create_model(
+    "TolerancesSection", __base__=TolerancesBase, **{key: (AnyRow | None, None) for key in STUDY_KEYS}
+)
+"""[tolerances] with a field for every error, so that a misspelt one is refused with the nearest."""
+
+RequirementSection = create_model(
+    "RequirementSection",
+    __base__=Section,
+    __doc__="[requirement]: the largest peak-to-peak, the share of drives that must keep it, and whose k_e counts.",
+    **{
+        "peak_to_peak_arcmin": (Positive, ...),
+        "yield": (Annotated[float, Field(gt=0, lt=1)], 0.9973),
+        "homogenization": (Literal["single_tooth", "contact"], "single_tooth"),
+    },
+)
+
+
+class ContributorRow(Section):
+    """One drawing callout."""
+
+    callout: str
+    value_mm: Positive
+    feeds: str
+    """A vector error (axis_eccentricity, axis_tilt, ...) or the study key of one of its parts."""
+    length_mm: Positive | None = None
+    """What a perpendicularity or parallelism is measured over."""
+    spread: Positive | None = None
+    """Standard deviation of the plane deviation as a share of the value; a third if omitted."""
+    cost: Cost | None = None
+
+    def build(self, name: str) -> tuple[Contributor, Distribution]:
+        contributor = Contributor(name, self.callout, self.value_mm, vector_of(self.feeds), self.length_mm)
+        return contributor, contributor_distribution(self.value_mm, self.spread)
+
+
+def vector_of(name: str) -> str:
+    """The vector error that a name or the study key of one of its parts means."""
+    if name in VECTORS:
+        return name
+    parts = {study_key(part): vector for vector, (_, *both) in VECTORS.items() for part in both}
+    if name in parts:
+        return parts[name]
+    raise HdoptError(unknown_name("error to feed", name, [*VECTORS, *parts]))
+
+
+class ContributorsSection(Section):
+    """[contributors]: named callouts."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    __pydantic_extra__: dict[str, ContributorRow]
+
+    @property
+    def rows(self) -> dict[str, ContributorRow]:
+        return dict(self.__pydantic_extra__)
+
+    def build(self) -> dict[Contributor, Distribution]:
+        built = {}
+        for name, row in self.rows.items():
+            try:
+                contributor, distribution = row.build(name)
+            except HdoptError as error:
+                raise HdoptError(f"[contributors] {name}: {error}") from error
+            built[contributor] = distribution
+        return built
+
+    def costs(self) -> Mapping[str, Cost]:
+        return {name: row.cost for name, row in self.rows.items() if row.cost is not None}
+
+
+class DimensionRow(Section):
+    """One dimension of a linear stack: its tolerance to either side, and how the gap changes with it."""
+
+    sensitivity: float = 1.0
+    tolerance: Positive
+    cost: Cost | None = None
+    """Without a cost the tolerance is fixed."""
+    sigmas: Positive = 3.0
+    """Standard deviations of the dimension (normal, truncated at its tolerance) within the tolerance."""
+
+
+class LinearStackSection(Section):
+    """[linear_stack]: any stack that is a sum of dimensions times sensitivities."""
+
+    unit: str = "mm"
+    gap_tolerance: Positive
+    """What the stack's deviation must keep, to either side."""
+    required_yield: float = Field(default=0.9973, gt=0, lt=1)
+    dimensions: dict[str, DimensionRow] = Field(min_length=1)

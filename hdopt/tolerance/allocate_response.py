@@ -1,0 +1,413 @@
+"""Least-cost tolerances of a nonlinear response: by the real yield, and by the rules it is compared with.
+
+No rule's convex model is believed: each is renewed at the tolerances it led to until both agree, and what comes out is
+judged by the real response. The yield rule keeps a margin, fixed beforehand, that covers the sampling of design and
+verification, so that one verification on a fresh seed passes; it is not repeated until it does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from hdopt.engine import Engine
+from hdopt.errors import HdoptError
+from hdopt.tolerance.allocate import Infeasible, Item, Requirement, Solution, solve, total_cost
+from hdopt.tolerance.intervals import Estimate
+from hdopt.tolerance.linearise import linearise
+from hdopt.tolerance.response import Response, evaluate
+from hdopt.tolerance.sampling import ScrambledSobol
+from hdopt.tolerance.space import InputSpace
+from hdopt.tolerance.stack import Stack, run_stack
+from hdopt.tolerance.worst_case import find_worst_case
+
+Array = NDArray[np.float64]
+
+MODEL_POINTS = 2**17
+"""Points of the sample, the same at every step, whose quantile the convex models follow."""
+NEIGHBOURS = 200
+"""Drives on either side of the quantile whose mean slope is the quantile's slope."""
+DESIGN_POINTS = 2**20
+COMPARE_POINTS = 2**17
+STEP = 0.01
+"""Relative step of slopes: small against the curvature, large against rounding."""
+REACH = 1.6
+"""Factor by which one convex model may move a tolerance."""
+SETTLED = 2e-4
+"""Relative change of cost and of the constraint below which successive models agree."""
+MAX_STEPS = 25
+CORRECTIONS = 8
+CLOSE = 1e-4
+"""How near below the limit, relative to it, the measured response of a continuous design is brought."""
+
+RULES = ("equal scaling", "worst case", "rss", "yield")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A response with its inputs, the tolerances that may change, and what is required of it."""
+
+    response: Response
+    space: InputSpace
+    items: tuple[Item, ...]
+    limit: float
+    required_yield: float
+    unit: str = "arcmin"
+    engine: Engine | str | None = None
+
+    @property
+    def current(self) -> Array:
+        """Tolerances as they are."""
+        return np.array([self.space.tolerances[item.name].value for item in self.items])
+
+    def space_at(self, tolerances: Array) -> InputSpace:
+        return self.space.with_tolerances(self.by_name(tolerances))
+
+    def by_name(self, tolerances: Array) -> dict[str, float]:
+        return {item.name: float(t) for item, t in zip(self.items, tolerances, strict=True)}
+
+
+@dataclass(frozen=True)
+class Allocation:
+    """Tolerances one rule allocates, what they cost, and what the real response makes of them.
+
+    `conforming` and `required_quantile` are of a stack of `judged_n` points; `modelled` is what the rule itself says
+    the response is, to hold against the limit.
+    """
+
+    rule: str
+    tolerances: dict[str, float]
+    costs: dict[str, float]
+    grades: dict[str, str]
+    total_cost: float
+    modelled: float
+    conforming: Estimate
+    required_quantile: Estimate
+    judged_n: int
+    marginal_cost: float | None = None
+    steps: int = 0
+    solution: Solution | None = field(default=None, repr=False)
+
+
+@dataclass(frozen=True)
+class _Constraint:
+    """A rule: its requirement around given tolerances, and its value there."""
+
+    name: str
+    model: Callable[[Array], Requirement]
+    value: Callable[[Array], float]
+
+
+def yield_margin(required_yield: float, design_n: int, verify_n: int, scramblings: int = 16) -> float:
+    """By how much the design's yield must exceed the required one for a verification to pass with its lower bound.
+
+    Three standard deviations of the difference of both estimates, and the verification's own half width; both taken as
+    of independent points, which scrambled ones do not exceed.
+    """
+    variance = required_yield * (1 - required_yield)
+    half_width = float(special.stdtrit(scramblings - 1, 0.975)) * math.sqrt(variance / verify_n)
+    margin = half_width + 3 * math.sqrt(variance / verify_n + variance / design_n)
+    if required_yield + margin >= 1:
+        raise HdoptError(
+            f"a yield of {required_yield:g} cannot be verified with {verify_n} samples; "
+            f"take at least {math.ceil(100 / (1 - required_yield))}"
+        )
+    return margin
+
+
+def allocate_by_yield(problem: Problem, seed: int = 1, verify_n: int = DESIGN_POINTS) -> Allocation:
+    """Least cost under P(response <= limit) >= yield, with the margin of `yield_margin`.
+
+    Successive linear models of the quantile on one fixed sample, whose slope is the mean slope of the drives next to
+    the quantile; then the limit is corrected by what a larger sample says of the quantile. Raises `Infeasible` where
+    even the tightest tolerances do not.
+    """
+    target = problem.required_yield + yield_margin(problem.required_yield, DESIGN_POINTS, verify_n)
+    constraint = _quantile_constraint(problem, target, seed)
+    tightest = np.array([item.bounds[0] for item in problem.items])
+    if np.all(tightest > 0):
+        _refuse_unreachable(problem, constraint.value(tightest))
+    judged: dict[bytes, Stack] = {}
+
+    def measured(tolerances: Array) -> float:
+        key = tolerances.tobytes()
+        judged[key] = judged.get(key) or _judge(problem, tolerances, DESIGN_POINTS, seed + 1, (target,))
+        return judged[key].quantiles[target].value
+
+    solution, steps = _successive(problem, constraint, measured)
+    tolerances = np.array(list(solution.tolerances.values()))
+    return _allocation("yield", problem, solution, measured(tolerances), judged[tolerances.tobytes()], steps)
+
+
+def allocate_by_worst_case(problem: Problem, seed: int = 1) -> Allocation:
+    """Least cost while the largest response over the tolerance box (as far as the search finds it) keeps the limit."""
+    space, items = problem.space, problem.items
+    columns = [space.index(item.name) for item in items]
+    centres = np.array([space.tolerances[item.name].centre for item in items])
+
+    def at_corner(corner: Array, found_at: Array, tolerances: Array) -> float:
+        place = corner.copy()
+        place[columns] = centres + (corner[columns] - centres) * tolerances / found_at
+        return float(evaluate(problem.response, place[None, :], space.names, "the worst corner")[0])
+
+    def model(tolerances: Array) -> Requirement:
+        worst = find_worst_case(problem.response, problem.space_at(tolerances), seed, corners=2**15, generations=100)
+        corner = np.array([worst.at[name] for name in space.names])
+        slopes = np.array(
+            [
+                (at_corner(corner, tolerances, tolerances + step) - at_corner(corner, tolerances, tolerances - step))
+                / (2 * step[i])
+                for i, step in enumerate(np.diag(STEP * tolerances))
+            ]
+        )
+        return _tangent(problem, "worst case", worst.value, np.maximum(slopes, 0), tolerances)
+
+    def value(tolerances: Array) -> float:
+        return find_worst_case(problem.response, problem.space_at(tolerances), seed).value
+
+    return _by_rule(problem, _Constraint("worst case", model, value), seed)
+
+
+def allocate_by_rss(problem: Problem, seed: int = 1) -> Allocation:
+    """Least cost under the root-sum-square stack, its line drawn at the tolerances it leads to."""
+    z = float(special.ndtri(problem.required_yield))
+    names = [item.name for item in problem.items]
+
+    def model(tolerances: Array) -> Requirement:
+        line = linearise(problem.response, problem.space_at(tolerances), seed)
+        slope = np.array([line.slopes[name] for name in names])
+        mean = np.array([line.point[name] for name in names])
+        spread = np.array([line.spreads[name] for name in names])
+        others = [line.slopes[n] * line.spreads[n] for n in line.slopes if n not in names]
+        centre = np.array([problem.space.tolerances[name].centre for name in names])
+        shift = np.where(centre == 0, slope * mean / tolerances, 0.0)
+        return Requirement(
+            problem.limit,
+            linear=shift,
+            quadratic=z * np.abs(slope) * spread / tolerances,
+            offset=line.value - float(shift @ tolerances),
+            rest=z * math.hypot(line.turning_std, float(np.linalg.norm(others))),
+            rule="rss",
+        )
+
+    def value(tolerances: Array) -> float:
+        return linearise(problem.response, problem.space_at(tolerances), seed).rss(z)
+
+    return _by_rule(problem, _Constraint("rss", model, value), seed)
+
+
+def allocate_by_equal_scaling(problem: Problem, seed: int = 1) -> Allocation:
+    """All tolerances times one factor, the largest that meets the yield: no cost is looked at."""
+    from scipy.optimize import brentq
+
+    constraint = _quantile_constraint(problem, problem.required_yield, seed)
+    low, high = 1e-2, 4.0
+    if constraint.value(low * problem.current) > problem.limit:
+        _refuse_unreachable(problem, constraint.value(low * problem.current))
+    factor = high
+    if constraint.value(high * problem.current) > problem.limit:
+        factor = brentq(lambda f: constraint.value(f * problem.current) - problem.limit, low, high, xtol=1e-5)
+    tolerances = factor * problem.current
+    grades = {}
+    for i, item in enumerate(problem.items):
+        low, high = item.bounds
+        if item.cost.discrete and hasattr(item.cost, "at_most"):
+            grade = item.cost.at_most(max(tolerances[i], low))
+            tolerances[i], grades[item.name] = grade.tolerance, grade.name
+        else:
+            tolerances[i] = min(max(tolerances[i], low), high)
+    judged = _judge(problem, tolerances, COMPARE_POINTS, seed + 1)
+    by_name = problem.by_name(tolerances)
+    return Allocation(
+        rule="equal scaling",
+        tolerances=by_name,
+        costs={item.name: float(item.cost.cost(by_name[item.name])) for item in problem.items},
+        grades=grades,
+        total_cost=total_cost(problem.items, by_name),
+        modelled=constraint.value(tolerances),
+        conforming=judged.conforming,
+        required_quantile=judged.required_quantile,
+        judged_n=judged.n,
+    )
+
+
+def verify(problem: Problem, tolerances: Mapping[str, float], seed: int, n: int) -> Stack:
+    """The one verification: a stack of the allocated tolerances with `n` fixed beforehand and a seed of its own."""
+    at = np.array([tolerances[item.name] for item in problem.items])
+    return _judge(problem, at, n, seed)
+
+
+def _judge(problem: Problem, tolerances: Array, n: int, seed: int, quantiles: Sequence[float] = ()) -> Stack:
+    return run_stack(
+        problem.response,
+        problem.space_at(tolerances),
+        limit=problem.limit,
+        required_yield=problem.required_yield,
+        n=n,
+        seed=seed,
+        engine=problem.engine,
+        quantiles=quantiles,
+        unit=problem.unit,
+    )
+
+
+def _refuse_unreachable(problem: Problem, best: float) -> None:
+    if best > problem.limit:
+        bounds = ", ".join(f"{item.name} >= {item.bounds[0]:g}" for item in problem.items)
+        held = [name for name in problem.space.names if name not in {item.name for item in problem.items}]
+        raise Infeasible(
+            f"the requirement {problem.limit:g} {problem.unit} at yield {problem.required_yield:g} cannot be met: with "
+            f"every tolerance at its lower bound ({bounds}) the best reachable is {best:.6g} {problem.unit}"
+            + (f"; {', '.join(held)} stay as they are" if held else "")
+            + "; allow finer tolerances or relax the requirement",
+            best,
+        )
+
+
+def _tangent(problem: Problem, rule: str, value: float, slopes: Array, at: Array) -> Requirement:
+    return Requirement(problem.limit, slopes, np.zeros_like(slopes), value - float(slopes @ at), rule=rule)
+
+
+def _quantile_constraint(problem: Problem, target: float, seed: int) -> _Constraint:
+    """The target quantile of the response on one fixed sample, as a function of the tolerances, with its tangents."""
+    names = problem.space.names
+    replicates = 4
+    sampling = ScrambledSobol(replicates)
+    u = np.concatenate(
+        [
+            block
+            for replicate in range(replicates)
+            for block in sampling.blocks(seed, replicate, MODEL_POINTS // replicates, len(names))
+        ]
+    )
+    rank = min(math.ceil(target * len(u)), len(u)) - 1
+    columns = [problem.space.index(item.name) for item in problem.items]
+    centres = np.array([problem.space.tolerances[item.name].centre for item in problem.items])
+
+    def values(inputs: Array) -> Array:
+        return evaluate(problem.response, inputs, names, "the yield model")
+
+    def value(tolerances: Array) -> float:
+        return float(np.partition(values(problem.space_at(tolerances).sample(u)), rank)[rank])
+
+    def model(tolerances: Array) -> Requirement:
+        inputs = problem.space_at(tolerances).sample(u)
+        y = values(inputs)
+        order = np.argsort(y)
+        reach = min(NEIGHBOURS, len(y) - 1 - rank)
+        near = inputs[order[rank - reach : rank + reach + 1]]
+        slopes = []
+        for column, centre, tolerance in zip(columns, centres, tolerances, strict=True):
+            wider, narrower = near.copy(), near.copy()
+            wider[:, column] += STEP * (near[:, column] - centre)
+            narrower[:, column] -= STEP * (near[:, column] - centre)
+            slopes.append(float(np.mean(values(wider) - values(narrower))) / (2 * STEP * tolerance))
+        return _tangent(problem, "yield", float(y[order[rank]]), np.maximum(slopes, 0), tolerances)
+
+    return _Constraint("yield", model, value)
+
+
+def _successive(problem: Problem, constraint: _Constraint, measured: Callable[[Array], float]) -> tuple[Solution, int]:
+    """Renew the convex model at its own solution until it stays there, then correct the last model's limit until the
+    response as `measured` keeps the limit. A shrinking reach keeps the steps within what a model can know."""
+    at, reach, cost, step = problem.current, REACH, math.inf, 0
+    for step in range(1, MAX_STEPS + 1):
+        requirement = constraint.model(at)
+        near = [_within(item, t, reach) for item, t in zip(problem.items, at, strict=True)]
+        try:
+            solution = solve(near, requirement)
+        except Infeasible:
+            # out of reach in one step: go as far down as it allows, and look again from there
+            tightest = np.array([item.bounds[0] for item in near])
+            if np.allclose(tightest, at, rtol=1e-9) or step == MAX_STEPS:
+                _refuse_unreachable(problem, requirement.value(tightest))
+                raise
+            at = tightest
+            continue
+        moved = np.array(list(solution.tolerances.values()))
+        change = float(np.max(np.abs(np.log(moved / at))))
+        settled = abs(solution.total_cost - cost) <= SETTLED * abs(solution.total_cost) and change < 0.02
+        at, cost = moved, solution.total_cost
+        if settled:
+            break
+        reach = 1 + (reach - 1) * 0.75
+    near = [_within(item, t, 1.2) for item, t in zip(problem.items, at, strict=True)]
+    return _corrected(problem, near, constraint.model(at), measured), step
+
+
+def _corrected(
+    problem: Problem, items: Sequence[Item], requirement: Requirement, measured: Callable[[Array], float]
+) -> Solution:
+    """Solutions of one convex model under a limit moved by what the response is measured to exceed it."""
+    limit, best, value = problem.limit, None, math.inf
+    for _ in range(CORRECTIONS):
+        solution = solve(items, requirement.with_limit(limit))
+        value = measured(np.array(list(solution.tolerances.values())))
+        excess = value - problem.limit
+        if excess <= 0 and (best is None or solution.total_cost < best.total_cost):
+            best = solution
+        if -CLOSE * problem.limit <= excess <= 0 or (best is not None and best.grades):
+            break
+        limit -= excess + CLOSE / 2 * problem.limit
+    if best is None:
+        raise Infeasible(
+            f"no tolerances were found that keep {problem.limit:g} {problem.unit}; the last ones reached {value:.6g}: "
+            "allow finer tolerances or relax the requirement",
+            value,
+        )
+    return best
+
+
+def _within(item: Item, tolerance: float, reach: float) -> Item:
+    """The item kept near a tolerance; grades are free, they come in steps."""
+    if item.cost.discrete:
+        return item
+    low, high = item.bounds
+    return replace(item, lower=min(max(tolerance / reach, low), high * 0.999), upper=min(tolerance * reach, high))
+
+
+def _by_rule(problem: Problem, constraint: _Constraint, seed: int) -> Allocation:
+    solution, steps = _successive(problem, constraint, constraint.value)
+    tolerances = np.array(list(solution.tolerances.values()))
+    judged = _judge(problem, tolerances, COMPARE_POINTS, seed + 1)
+    return _allocation(constraint.name, problem, solution, constraint.value(tolerances), judged, steps)
+
+
+def _allocation(
+    rule: str, problem: Problem, solution: Solution, modelled: float, judged: Stack, steps: int
+) -> Allocation:
+    return Allocation(
+        rule=rule,
+        tolerances=solution.tolerances,
+        costs=solution.costs,
+        grades=solution.grades,
+        total_cost=solution.total_cost,
+        modelled=modelled,
+        conforming=judged.conforming,
+        required_quantile=judged.required_quantile,
+        judged_n=judged.n,
+        marginal_cost=solution.marginal_cost,
+        steps=steps,
+        solution=solution,
+    )
+
+
+def yield_cost_curve(problem: Problem, limits: Sequence[float], seed: int = 1) -> list[tuple[float, float]]:
+    """Least cost by the yield rule at each limit, NaN where it cannot be met; as the rule's models see it, with its
+    margin but without the correction by a larger sample (within about 1 % of the limit)."""
+    target = problem.required_yield + yield_margin(problem.required_yield, DESIGN_POINTS, DESIGN_POINTS)
+    curve = []
+    for limit in limits:
+        other = replace(problem, limit=float(limit))
+        constraint = _quantile_constraint(other, target, seed)
+        try:
+            cost = _successive(other, constraint, constraint.value)[0].total_cost
+        except Infeasible:
+            cost = math.nan
+        curve.append((float(limit), cost))
+    return curve

@@ -1,0 +1,200 @@
+"""From rows of random inputs to drives: the one adapter that stacks, sensitivities, allocation and search use."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.deviations import ERROR_GROUPS, ERROR_NAMES, PHASE_OF, STUDY_KEYS, DriveErrors, study_key
+from hdopt.drive import Drive
+from hdopt.errors import HdoptError, unknown_name
+from hdopt.tolerance.contributors import TILT, VECTORS, Contributor
+from hdopt.tolerance.copula import CorrelationGroup
+from hdopt.tolerance.distributions import Distribution, Rayleigh, Uniform
+from hdopt.tolerance.space import InputSpace, Tolerance
+
+Array = NDArray[np.float64]
+
+FULL_TURN = Uniform(lower=0.0, upper=360.0)
+"""A free direction, deg."""
+
+TILTS = tuple(name for name in ERROR_NAMES if "tilt" in name)
+TURNING = tuple(PHASE_OF.values())
+"""Directions and phases: they have no tolerance that could be narrowed."""
+
+
+class Feed(Protocol):
+    """Fills some of a drive's errors from the columns of a sample."""
+
+    def fill(self, inputs: Array, errors: dict[str, Array]) -> None: ...
+
+    def widest(self, largest: Array, errors: dict[str, float]) -> None:
+        """The same for the largest absolute value each error can have; `largest` of shape (d,)."""
+
+
+@dataclass(frozen=True)
+class Direct:
+    """One column is one error, in the unit of the study file."""
+
+    column: int
+    error: str
+
+    def fill(self, inputs: Array, errors: dict[str, Array]) -> None:
+        values = inputs[:, self.column]
+        errors[self.error] = values if study_key(self.error).endswith("_mm") else values * (math.pi / 180)
+
+    def widest(self, largest: Array, errors: dict[str, float]) -> None:
+        self.fill(largest[None, :], errors)
+
+
+@dataclass(frozen=True)
+class VectorSum:
+    """Columns of callouts (mm) and of their directions (deg) that add as vectors to one error.
+
+    `terms` holds (column of the value, column of the direction, error per mm).
+    """
+
+    vector: str
+    terms: tuple[tuple[int, int, float], ...]
+
+    def fill(self, inputs: Array, errors: dict[str, Array]) -> None:
+        along = across = 0.0
+        for value, direction, factor in self.terms:
+            angle = inputs[:, direction] * (math.pi / 180)
+            along = along + factor * inputs[:, value] * np.cos(angle)
+            across = across + factor * inputs[:, value] * np.sin(angle)
+        kind, first, second = VECTORS[self.vector]
+        if kind == TILT:
+            errors[first], errors[second] = along, across
+        else:
+            errors[first], errors[second] = np.hypot(along, across), np.arctan2(across, along)
+
+    def widest(self, largest: Array, errors: dict[str, float]) -> None:
+        length = sum(factor * largest[value] for value, _, factor in self.terms)
+        kind, first, second = VECTORS[self.vector]
+        errors[first], errors[second] = length, length if kind == TILT else 0.0
+
+
+@dataclass(frozen=True)
+class DriveResponse:
+    """Converged peak-to-peak kinematic error (arcmin, times k_e) of the drive each row of inputs describes.
+
+    Errors that no column feeds keep the value they have in `held`.
+    """
+
+    drive: Drive
+    held: DriveErrors
+    feeds: tuple[Feed, ...]
+    homogenization: float = 1.0
+
+    def errors(self, inputs: Array) -> DriveErrors:
+        """The errors of all rows at once."""
+        varying: dict[str, Array] = {}
+        for feed in self.feeds:
+            feed.fill(inputs, varying)
+        return self.held.with_(**varying)
+
+    def upper_bound(self, lower: Array, upper: Array) -> float | None:
+        """A proven bound of the response over the box, None where there is no proof; see `drive_bound`."""
+        from hdopt.tolerance.drive_bound import peak_to_peak_bound_arcmin, widest_errors
+
+        if not self.drive.wave_generator.profile.tip_is_smooth:
+            return None
+        return self.homogenization * peak_to_peak_bound_arcmin(self.drive, widest_errors(self, lower, upper))
+
+    def __call__(self, inputs: Array) -> Array:
+        from hdopt.kinematics import peak_to_peak_arcmin
+
+        return self.homogenization * peak_to_peak_arcmin(self.drive, self.errors(inputs))
+
+
+@dataclass(frozen=True)
+class DriveProblem:
+    """A drive's response and its random inputs, ready for a stack."""
+
+    response: DriveResponse
+    space: InputSpace
+    replaced: tuple[str, ...] = field(default=())
+    """Tolerances that callouts took the place of."""
+
+
+def tolerance_of(error: str, distribution: Distribution) -> Tolerance:
+    """The tolerance of one drive error: a magnitude's upper bound, a tilt's half range, none of a direction."""
+    if error in TURNING:
+        return Tolerance(distribution, None)
+    return Tolerance.of_deviation(distribution) if error in TILTS else Tolerance.of_magnitude(distribution)
+
+
+def drive_problem(
+    drive: Drive,
+    tolerances: Mapping[str, Distribution],
+    *,
+    held: DriveErrors | None = None,
+    contributors: Mapping[Contributor, Distribution] | None = None,
+    correlations: Sequence[CorrelationGroup] = (),
+    homogenization: float = 1.0,
+) -> DriveProblem:
+    """The stack of a drive from the distributions of its errors by study key (mm, deg) and of its callouts (mm).
+
+    An error that callouts feed is theirs alone. Raises `HdoptError` for a key that is not an error, and for a magnitude
+    that could be negative.
+    """
+    contributors = contributors or {}
+    fed = {error for contributor in contributors for error in VECTORS[contributor.feeds][1:]}
+    inputs: dict[str, Tolerance] = {}
+    feeds: list[Feed] = []
+    groups: dict[str, list[str]] = {name: [] for name in ERROR_GROUPS}
+    replaced = []
+    for key, distribution in tolerances.items():
+        if key not in STUDY_KEYS:
+            raise HdoptError(f"[tolerances]: {unknown_name('error', key, STUDY_KEYS)}")
+        error = STUDY_KEYS[key]
+        if error in fed:
+            replaced.append(key)
+            continue
+        if error in PHASE_OF and distribution.support[0] < 0:
+            raise HdoptError(
+                f"[tolerances] {key} is a magnitude but may be as low as {distribution.support[0]:g}; give lower = 0, "
+                "or a distribution of magnitudes such as rayleigh or half_normal"
+            )
+        feeds.append(Direct(len(inputs), error))
+        inputs[key] = tolerance_of(error, distribution)
+        groups[_group_of(error)].append(key)
+    terms: dict[str, list[tuple[int, int, float]]] = {}
+    free = set()
+    for contributor, distribution in contributors.items():
+        direction = f"{contributor.name}_direction_deg"
+        for name in (contributor.name, direction):
+            if name in inputs:
+                raise HdoptError(f"two inputs are called {name!r}; rename the contributor")
+        terms.setdefault(contributor.feeds, []).append((len(inputs), len(inputs) + 1, contributor.error_per_mm))
+        inputs[contributor.name] = Tolerance(distribution, contributor.value)
+        inputs[direction] = Tolerance(FULL_TURN, None)
+        free.add(direction)
+        groups[_group_of(VECTORS[contributor.feeds][1])] += [contributor.name, direction]
+    feeds += [VectorSum(vector, tuple(parts)) for vector, parts in terms.items()]
+    space = InputSpace(
+        inputs,
+        tuple(correlations),
+        {group: tuple(names) for group, names in groups.items() if names},
+        folded=frozenset(study_key(name) for name in TILTS) & set(inputs),
+        turning=frozenset(name for name in inputs if STUDY_KEYS.get(name) in TURNING or name in free),
+    )
+    return DriveProblem(
+        DriveResponse(drive, held or DriveErrors(), tuple(feeds), homogenization), space, tuple(replaced)
+    )
+
+
+def _group_of(error: str) -> str:
+    return next(group for group, names in ERROR_GROUPS.items() if error in names)
+
+
+def contributor_distribution(value: float, shape: float | None = None) -> Distribution:
+    """How a callout of `value` mm is used up unless the study says otherwise: a plane normal deviation whose standard
+    deviation is `shape` of the value (a third by default, an assumption), truncated at the value."""
+    return Rayleigh(scale=value * (1 / 3 if shape is None else shape), upper=value)

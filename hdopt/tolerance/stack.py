@@ -1,0 +1,316 @@
+"""Monte Carlo stacks: how a response spreads when its inputs spread as the tolerances say.
+
+The sample comes in independent replicates (scramblings, or streams of plain Monte Carlo), each evaluated block by
+block, so memory does not grow with the sample. Every figure carries the interval that fits its sampling.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from hdopt.engine import Engine, engine_from
+from hdopt.errors import HdoptError
+from hdopt.tolerance import capability
+from hdopt.tolerance.empirical import Bins, CountInBins, Empirical, KeepAll, merge
+from hdopt.tolerance.intervals import (
+    Estimate,
+    clopper_pearson,
+    order_statistic_ranks,
+    over_scramblings,
+    smallest_n,
+    student_half_width,
+)
+from hdopt.tolerance.linearise import Linearisation, linearise
+from hdopt.tolerance.response import Response, evaluate
+from hdopt.tolerance.sampling import Sampling, ScrambledSobol, replicate_sizes
+from hdopt.tolerance.space import InputSpace
+
+Array = NDArray[np.float64]
+
+KEPT_VALUES = 2**24
+"""Up to here every value is kept (128 MiB); a larger sample is counted in bins."""
+PILOT = 2**12
+FEW = 4
+"""Fewer points than this beyond a quantile per scrambling, and its interval is made from ranks instead."""
+REPORTED_QUANTILES = (0.5, 0.9, 0.99)
+HISTOGRAM_BINS = 120
+
+
+@dataclass(frozen=True)
+class ReplicateTask:
+    """All that one replicate needs, to be evaluated anywhere."""
+
+    response: Response
+    space: InputSpace
+    sampling: Sampling
+    seed: int
+    replicate: int
+    n: int
+    limit: float
+    bins: Bins | None
+
+
+@dataclass(frozen=True)
+class Replicate:
+    """What one replicate leaves: moments, values above the limit, and its empirical distribution."""
+
+    n: int
+    mean: float
+    variance: float
+    above_limit: int
+    values: Empirical
+
+
+def run_replicate(task: ReplicateTask) -> Replicate:
+    """Sample one replicate block by block."""
+    collector = KeepAll() if task.bins is None else CountInBins(task.bins)
+    count, mean, squares, above = 0, 0.0, 0.0, 0
+    for u in task.sampling.blocks(task.seed, task.replicate, task.n, task.space.dimension):
+        values = evaluate(
+            task.response,
+            task.space.sample(u),
+            task.space.names,
+            f"replicate {task.replicate} of seed {task.seed}, counted from {count}",
+        )
+        collector.add(values)
+        above += int(np.count_nonzero(values > task.limit))
+        block_mean = float(values.mean())
+        shift = block_mean - mean
+        total = count + len(values)
+        squares += float(np.square(values - block_mean).sum()) + shift * shift * count * len(values) / total
+        mean += shift * len(values) / total
+        count = total
+    return Replicate(count, mean, squares / count, above, collector.finish())
+
+
+@dataclass(frozen=True)
+class Stack:
+    """The distribution of a response under its tolerances. `unit` names the response's unit ('arcmin', 'mm', ...).
+
+    `quantiles` by probability; `ppk` is None where the sample is too small for X99.865, and `notes` says so.
+    `linearisation` with `rss`, its value at the quantile of the required yield.
+    """
+
+    n: int
+    sampling: str
+    seed: int
+    unit: str
+    limit: float
+    required_yield: float
+    mean: Estimate
+    std: Estimate
+    quantiles: dict[float, Estimate]
+    conforming: Estimate
+    ppk: Estimate | None
+    linearisation: Linearisation
+    rss: float
+    histogram: tuple[Array, Array] = field(repr=False)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def ppm(self) -> Estimate:
+        """Parts per million beyond the limit."""
+        return self.conforming.map(lambda share: 1e6 * (1 - share))
+
+    @property
+    def required_quantile(self) -> Estimate:
+        """The quantile at the required yield: it must not exceed the limit."""
+        return self.quantiles[self.required_yield]
+
+    def to_dict(self) -> dict:
+        line, unit = self.linearisation, self.unit
+        return {
+            "n": self.n,
+            "sampling": self.sampling,
+            "seed": self.seed,
+            f"limit_{unit}": self.limit,
+            "required_yield": self.required_yield,
+            f"mean_{unit}": self.mean.value,
+            f"std_{unit}": self.std.value,
+            "quantiles": {f"{q:g}": estimate.to_dict() for q, estimate in self.quantiles.items()},
+            "yield": self.conforming.to_dict(),
+            "ppm": self.ppm.value,
+            "ppk": None if self.ppk is None else self.ppk.value,
+            f"rss_{unit}": self.rss,
+            "contributions": line.shares,
+            "intervals": {
+                f"mean_{unit}": self.mean.to_dict(),
+                f"std_{unit}": self.std.to_dict(),
+                "ppm": self.ppm.to_dict(),
+                "ppk": None if self.ppk is None else self.ppk.to_dict(),
+            },
+            "interval": {
+                "confidence": self.mean.confidence,
+                "mean": self.mean.interval,
+                "quantiles": self.required_quantile.interval,
+                "yield": self.conforming.interval,
+                "ppk": None if self.ppk is None else self.ppk.interval,
+            },
+            "linearisation": {
+                "operating_point": line.point,
+                "slopes": line.slopes,
+                f"mean_{unit}": line.value,
+                f"std_{unit}": line.std,
+                f"mean_error_{unit}": line.value - self.mean.value,
+                f"std_error_{unit}": line.std - self.std.value,
+                f"rss_error_{unit}": self.rss - self.required_quantile.value,
+            },
+            "notes": list(self.notes),
+        }
+
+    def to_frame(self):
+        """A pandas table: one row a figure, with its interval."""
+        import pandas as pd
+
+        rows = {f"mean, {self.unit}": self.mean, f"standard deviation, {self.unit}": self.std}
+        rows |= {f"quantile {q:g}, {self.unit}": estimate for q, estimate in self.quantiles.items()}
+        rows |= {"yield": self.conforming, "ppm beyond the limit": self.ppm}
+        if self.ppk is not None:
+            rows["Ppk"] = self.ppk
+        return pd.DataFrame(
+            [(name, e.value, e.low, e.high, e.interval) for name, e in rows.items()],
+            columns=["figure", "value", "low", "high", "interval"],
+        ).set_index("figure")
+
+
+def run_stack(
+    response: Response,
+    space: InputSpace,
+    *,
+    limit: float,
+    required_yield: float = 0.9973,
+    n: int = 2**18,
+    sampling: Sampling | None = None,
+    seed: int = 1,
+    engine: Engine | str | None = None,
+    quantiles: Sequence[float] = (),
+    unit: str = "arcmin",
+) -> Stack:
+    """Sample `response` over `space` with `n` points in all and report its distribution against the upper `limit`.
+
+    Raises `HdoptError` where `n` is too small for a quantile asked for, or a response is not finite.
+    """
+    sampling = sampling or ScrambledSobol()
+    if not 0 < required_yield < 1:
+        raise HdoptError(f"the required yield is {required_yield!r}; it must lie between 0 and 1, such as 0.9973")
+    asked = sorted({required_yield, *quantiles, *REPORTED_QUANTILES})
+    _check_size(n, sampling, [required_yield, *quantiles])
+    asked = [q for q in asked if n >= smallest_n(q)]
+    sizes = replicate_sizes(n, sampling.replicates)
+    bins = None if n <= KEPT_VALUES else Bins.around(_pilot(response, space, sampling, seed, sizes[0]))
+    tasks = [
+        ReplicateTask(response, space, sampling, seed, replicate, size, limit, bins)
+        for replicate, size in enumerate(sizes)
+    ]
+    parts = list(engine_from(engine).map(run_replicate, tasks))
+    pooled = merge(part.values for part in parts)
+    # a two-sided response is the size of a signed one, which is the straighter of both
+    signed = getattr(response, "signed", None)
+    line = linearise(signed or response, space, seed)
+    z = float(special.ndtri((1 + required_yield) / 2 if signed else required_yield))
+    performance, notes = _performance(parts, pooled, sampling, limit)
+    return Stack(
+        n=n,
+        sampling=f"{sampling.replicates} x {sampling.name}" if not sampling.independent_points else sampling.name,
+        seed=seed,
+        unit=unit,
+        limit=limit,
+        required_yield=required_yield,
+        mean=over_scramblings([part.mean for part in parts], _pooled_mean(parts)),
+        std=over_scramblings([part.variance**0.5 for part in parts], _pooled_std(parts)),
+        quantiles={q: quantile_estimate(parts, pooled, q, sampling) for q in asked},
+        conforming=yield_estimate(parts, sampling),
+        ppk=performance,
+        linearisation=line,
+        rss=line.rss(z),
+        histogram=pooled.histogram(HISTOGRAM_BINS),
+        notes=notes,
+    )
+
+
+def _check_size(n: int, sampling: Sampling, quantiles: Sequence[float]) -> None:
+    if n < 2 * sampling.replicates:
+        raise HdoptError(f"n is {n}; at least {2 * sampling.replicates} samples are needed, two per replicate")
+    for q in quantiles:
+        if not 0 < q < 1:
+            raise HdoptError(f"the quantile {q!r} is asked for; it must lie between 0 and 1")
+        if n < smallest_n(q):
+            raise HdoptError(
+                f"n is {n}, too small for the quantile {q:g} with its 95 % interval; the smallest n is {smallest_n(q)}"
+            )
+
+
+def _pilot(response: Response, space: InputSpace, sampling: Sampling, seed: int, n: int) -> Array:
+    u = next(sampling.blocks(seed, 0, min(PILOT, n), space.dimension))
+    return evaluate(response, space.sample(u), space.names, "the pilot sample")
+
+
+def _pooled_mean(parts: Sequence[Replicate]) -> float:
+    return float(np.average([part.mean for part in parts], weights=[part.n for part in parts]))
+
+
+def _pooled_std(parts: Sequence[Replicate]) -> float:
+    mean, weights = _pooled_mean(parts), [part.n for part in parts]
+    return float(np.sqrt(np.average([part.variance + (part.mean - mean) ** 2 for part in parts], weights=weights)))
+
+
+def yield_estimate(parts: Sequence[Replicate], sampling: Sampling) -> Estimate:
+    """Share within the limit. Over scramblings by Student's t, unless hardly any point lies beyond the limit (or
+    within): then Clopper-Pearson as for independent points, which scrambled ones, being more even, keep."""
+    n = sum(part.n for part in parts)
+    above = sum(part.above_limit for part in parts)
+    if sampling.independent_points:
+        return clopper_pearson(n - above, n)
+    if min(above, n - above) < FEW * len(parts):
+        exact = clopper_pearson(n - above, n)
+        few = "Clopper-Pearson (too few beyond the limit to compare scramblings)"
+        return Estimate(exact.value, exact.low, exact.high, few)
+    shares = over_scramblings([1 - part.above_limit / part.n for part in parts], 1 - above / n)
+    return Estimate(shares.value, max(shares.low, 0.0), min(shares.high, 1.0), shares.interval)
+
+
+def quantile_estimate(parts: Sequence[Replicate], pooled: Empirical, q: float, sampling: Sampling) -> Estimate:
+    """Quantile of all values together. Over scramblings: the t-interval of the share below it, turned back into values
+    (Woodruff 1952), which is right for skewed tails. For independent points: order statistics."""
+    n = pooled.n
+    value = pooled.ranked(_rank(q, n))
+    beyond = n * min(q, 1 - q)
+    if not sampling.independent_points and beyond >= FEW * len(parts):
+        half = student_half_width([part.values.at_most(value) / part.n for part in parts])
+        low, high = _rank(max(q - half, 0.0), n), _rank(min(q + half, 1.0), n)
+        return Estimate(value, pooled.ranked(low), pooled.ranked(high), f"t over {len(parts)} scramblings, inverted")
+    low, high = order_statistic_ranks(q, n)
+    kind = "order statistics" if sampling.independent_points else "order statistics (too few points beyond)"
+    return Estimate(value, pooled.ranked(max(low, 1)), pooled.ranked(min(high, n)), kind)
+
+
+def _rank(q: float, n: int) -> int:
+    return min(max(int(np.ceil(n * q - 1e-9)), 1), n)
+
+
+def _performance(
+    parts: Sequence[Replicate], pooled: Empirical, sampling: Sampling, limit: float
+) -> tuple[Estimate | None, tuple[str, ...]]:
+    """Ppk; over scramblings by Student's t, otherwise from the intervals of both percentiles, each at half the risk."""
+    needed, n = smallest_n(capability.UPPER_PERCENTILE, 0.975), pooled.n
+    if n < needed:
+        return None, (f"Ppk is left out: X99.865 with an interval needs n of at least {needed}, n is {n}",)
+
+    def performance(values: Empirical) -> float:
+        median, upper = (values.ranked(_rank(q, values.n)) for q in (capability.MEDIAN, capability.UPPER_PERCENTILE))
+        return capability.ppk(limit, median, upper)
+
+    value = performance(pooled)
+    if not np.isfinite(value):
+        return Estimate(value, value, value, "nothing varies"), ()
+    if not sampling.independent_points and n * (1 - capability.UPPER_PERCENTILE) >= FEW * len(parts):
+        return over_scramblings([performance(part.values) for part in parts], value), ()
+    ranks = [order_statistic_ranks(q, n, 0.975) for q in (capability.MEDIAN, capability.UPPER_PERCENTILE)]
+    medians, uppers = ([pooled.ranked(min(max(rank, 1), n)) for rank in pair] for pair in ranks)
+    corners = [capability.ppk(limit, median, upper) for median in medians for upper in uppers]
+    return Estimate(value, min(corners), max(corners), "order statistics of both percentiles"), ()
