@@ -1,5 +1,14 @@
 """Blind cases: recordings of a simulated bench with physics concealed in them, and the scorer of the answers.
 
-Nothing in this package but the tests' own files may import `hdopt`: the bench is a second, independent statement of the
-physics, so that a diagnosis cannot pass by agreeing with itself.
+The bench is a second statement of the physics, in the time domain and without a line of hdopt (a test reads the
+imports), so that a diagnosis cannot pass by agreeing with itself. A proof takes three steps, the truth sealed between:
+
+    python -m tests.blind.generate --out DIR --seed S [--families ...] [--share 0.1] [--workers 2]
+    python -m tests.blind.answer --dir DIR [--workers 2] -- hdopt diagnose
+    python -m tests.blind.score --dir DIR
+
+From Python: `suite.plan(seed)` gives specs, `cases.generate(spec)` a case (tables) and its key, `score.score(answers,
+keys)` the scores; `thresholds` holds the gate. From a motion to a file: `motion` (what the motor does), `bench` (the
+signal chain and the stages at which `hidden_*` physics acts), `instrument` (noise, resolution, gaps). `evidence` says
+of each case whether its records could decide at all: the key's `detectable` and `separable`.
 """

@@ -222,8 +222,9 @@ def _weigh(hidden, setups, plans, waves, together, noise_rms, instrument, rng):
     parts = [sampled(wave) for wave in waves]
     detectable, rivals = True, set()
     for rank, physics in enumerate(hidden):
-        others = [part for other, part in enumerate(parts) if other != rank]
-        beside = np.column_stack(others) if others else None
+        # A second physics is free to take up what it can of the first, so all its columns stand beside its wave.
+        others = [other for other in range(len(hidden)) if other != rank]
+        beside = [parts[other][:, None] for other in others] + [witness.family(hidden[other].id) for other in others]
         evidence = witness.weigh(parts[rank], physics.id, noise_rms, share, beside)
         detectable &= evidence.detectable
         rivals |= set(evidence.rivals)

@@ -34,7 +34,17 @@ DECISIVE = 50.0
 # rival that leaves hardly more holds those columns too, and counts as refuted by nothing.
 ZONE_BOUND = ("cs_tooth_harmonics", "fs_tooth_harmonics", "circular_spline_lobing")
 WORSE = 1.2
+# Physics outside the catalogue must be foreign to it: no entry may explain most of it.
+FOREIGN_SHARE = 0.25
 SAMPLES = 4000
+
+# Orders that bearings of 15 to 35 balls, ball/pitch 0.05 to 0.2, can have, in steps of STEP: cage, ball, races. Whole
+# numbers are left out: a bearing that met one to a thousandth would be a coincidence, and no one would believe it.
+STEP = 0.004
+BEARING_ORDERS = np.concatenate([np.arange(low, high, STEP) for low, high in ((0.37, 0.62), (1.05, 1.23), (6.0, 21.4))])
+BEARING_ORDERS = BEARING_ORDERS[np.abs(BEARING_ORDERS - np.round(BEARING_ORDERS)) > 0.02]
+# Orders of output encoders of 400 lines and more: whole numbers of lines.
+LINE_ORDERS = np.arange(400, 3001) / RATIO
 
 
 @dataclass(frozen=True)
@@ -44,7 +54,7 @@ class Evidence:
     against_base: float
     against: dict[str, float]
     own: float
-    unexplained_rms: float  # rad; what the refitted base leaves of the hidden wave
+    least_share: float  # of the evidence that a refuted rival must leave
 
     @property
     def detectable(self):
@@ -53,7 +63,7 @@ class Evidence:
     @property
     def rivals(self):
         """Catalogue entries that would explain the records as well as the truth."""
-        floor = max(DECISIVE, WORSE * self.own)
+        floor = max(DECISIVE, WORSE * self.own, self.least_share * self.against_base)
         return tuple(sorted(name for name, left in self.against.items() if left < floor))
 
 
@@ -98,19 +108,31 @@ class Witness:
         found = least_squares(left, start, bounds=(-1.5, 1.5), diff_step=1e-3, max_nfev=turns)
         return float(np.sqrt(np.mean(found.fun**2)) * truth.std())
 
-    def weigh(self, wave, own, noise_rms, effective_share, beside=None):
-        """Evidence of a sampled hidden `wave` (rad) of catalogue entry `own` ("" outside it)."""
-        base = self.base if beside is None else orthonormal(np.column_stack([self.base, beside]))
+    def family(self, name):
+        """All linear columns of a catalogue entry, side by side (none where they are tried one at a time)."""
+        candidates = [c for c in self.rivals().get(name, []) if not isinstance(c, OneOf)]
+        return np.column_stack([c.reshape(self.theta.size, -1) for c in candidates] or [np.empty((self.theta.size, 0))])
+
+    def weigh(self, wave, own, noise_rms, effective_share, beside=()):
+        """Evidence of a sampled hidden `wave` (rad) of entry `own` ("" outside the catalogue) beside other columns."""
+        base = orthonormal(np.column_stack([self.base, *beside])) if beside else self.base
         wave = wave - base @ (base.T @ wave)
         per_square = self.total * effective_share / wave.size / noise_rms**2
         against = {}
         for name, candidates in self.rivals().items():
             against[name] = per_square * min(_left(base, rival, wave) for rival in candidates)
+        # An encoder's line count and a bearing's geometry are free enough to meet each other's tones, and others'.
+        if own in ("", "encoder_interpolation"):
+            against["bearing_pass"] = per_square * _left_by_tone(base, self.theta, wave, BEARING_ORDERS, STEP)
+        if own in ("", "bearing_pass"):
+            against["encoder_interpolation"] = min(
+                against["encoder_interpolation"], per_square * _left_by_tone(base, self.theta, wave, LINE_ORDERS)
+            )
         return Evidence(
             float(per_square * wave @ wave),
             {name: left for name, left in against.items() if name != own},
             against[own] if own in ZONE_BOUND else 0.0,
-            float(np.sqrt(np.mean(wave**2))),
+            FOREIGN_SHARE if own == "" else 0.0,
         )
 
     def rivals(self):
@@ -200,6 +222,19 @@ def _left(base, rival, wave):
         seen = size > 1e-9 * size.max()
         return total - ((columns.T @ wave)[seen] ** 2 / size[seen]).max(initial=0.0)
     return total - np.sum((orthonormal(columns).T @ wave) ** 2)
+
+
+def _left_by_tone(base, theta, wave, orders, within=0.0):
+    """Sum of squares that base and the best tone (with its octave) leave of `wave`: `orders`, or `within` of one."""
+
+    def power(tried, take):
+        return np.abs(np.exp(-1j * np.outer(tried, theta[take])) @ wave[take])
+
+    best = orders[np.argsort(power(orders, slice(None, None, 8)))[-5:]]
+    if within:
+        near = [order + within * np.linspace(-1, 1, 33) for order in best]
+        best = [tried[np.argmax(power(tried, slice(None)))] for tried in near]
+    return min(_left(base, waves(theta, [order, 2 * order]), wave) for order in best)
 
 
 def _play(theta):

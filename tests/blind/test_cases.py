@@ -99,6 +99,8 @@ def test_evidence_finds_what_cannot_be_told_apart():
     assert "cs_tooth_harmonics" in lobing.rivals and not lobing.separable
     joint = [generate(Spec("single", seed, ("output_coupling",), 0.5))[1] for seed in range(2)]
     assert all("encoder_output_eccentricity" in k.rivals for k in joint if k.variants == ("output",))
+    _, lines = generate(Spec("single", 4, ("encoder_interpolation",), 0.1))
+    assert lines.parameters["encoder_interpolation"]["lines"]["value"] == 500 and lines.rivals == ("bearing_pass",)
     _, delay = generate(Spec("single", 1, ("channel_delay",), 1.0))
     assert delay.separable
 
