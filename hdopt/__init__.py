@@ -16,6 +16,7 @@ _EXPORTS: dict[str, str] = {
     "stack": "hdopt.tolerancing",
     "sobol": "hdopt.tolerancing",
     "allocate": "hdopt.tolerancing",
+    "run_study": "hdopt.run",
     "HdoptError": "hdopt.errors",
 }
 """Public name -> the module that has it."""

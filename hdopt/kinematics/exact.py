@@ -86,21 +86,20 @@ def deepest_points(drive: Drive, errors: DriveErrors, theta: ArrayLike) -> Deepe
         structure.passes_minor * np.sum(centre * minor, -1, keepdims=True) * minor
     )
 
-    def contour(phi: Array, rim: float, derivative: int) -> Array:
-        """Projected rim point, or its derivative by the contour angle `phi`; `phi` of shape (n, m) -> (n, m, 2)."""
+    def rim_point(phi: Array, rim: float, derivative: int) -> Array:
+        """A rim point in the wave generator's frame, or its derivative by the contour angle; (...) -> (..., 3)."""
         r = [profile.radius(phi, order) for order in range(derivative + 1)]
         sin, cos = np.sin(phi), np.cos(phi)
         if derivative == 0:
-            x, y, z = r[0] * sin, r[0] * cos, np.full_like(phi, rim * half_width)
-        elif derivative == 1:
-            x, y, z = r[1] * sin + r[0] * cos, r[1] * cos - r[0] * sin, np.zeros_like(phi)
-        else:
-            x, y = (r[2] - r[0]) * sin + 2 * r[1] * cos, (r[2] - r[0]) * cos - 2 * r[1] * sin
-            z = np.zeros_like(phi)
-        return np.einsum("nij,nmj->nmi", to_plane, np.stack([x, y, z], -1))
+            return np.stack([r[0] * sin, r[0] * cos, np.full_like(phi, rim * half_width)], -1)
+        if derivative == 1:
+            return np.stack([r[1] * sin + r[0] * cos, r[1] * cos - r[0] * sin, np.zeros_like(phi)], -1)
+        bent = r[2] - r[0]
+        return np.stack([bent * sin + 2 * r[1] * cos, bent * cos - 2 * r[1] * sin, np.zeros_like(phi)], -1)
 
-    def squared_radius(phi: Array, rim: float) -> Array:
-        return np.sum((contour(phi, rim, 0) + centre[:, None, :]) ** 2, -1)
+    def projected(phi: Array, rim: float, derivative: int) -> Array:
+        """One rim point for each input angle, on the plane of the circular spline; (n,) -> (n, 2)."""
+        return (to_plane @ rim_point(phi, rim, derivative)[:, :, None])[:, :, 0]
 
     grid = np.linspace(-ZONE_HALF_WIDTH, ZONE_HALF_WIDTH, GRID_POINTS)
     spacing = grid[1] - grid[0]
@@ -108,20 +107,19 @@ def deepest_points(drive: Drive, errors: DriveErrors, theta: ArrayLike) -> Deepe
     for start, side in ((0.0, 1.0), (np.pi, -1.0)):
         found = []
         for rim in (1.0, -1.0):
-            phi_grid = np.broadcast_to(start + grid, (len(theta), GRID_POINTS))
-            nearest = np.argmax(squared_radius(phi_grid, rim), axis=1)
-            phi = phi0 = start + grid[nearest][:, None]
+            on_grid = to_plane @ rim_point(start + grid, rim, 0).T + centre[:, :, None]
+            phi = phi0 = start + grid[np.argmax(np.sum(on_grid**2, axis=1), axis=1)]
             for _ in range(NEWTON_STEPS):
-                h = contour(phi, rim, 0) + centre[:, None, :]
-                h1, h2 = contour(phi, rim, 1), contour(phi, rim, 2)
+                h = projected(phi, rim, 0) + centre
+                h1, h2 = projected(phi, rim, 1), projected(phi, rim, 2)
                 slope = np.sum(h * h1, -1)
                 bend = np.sum(h1 * h1 + h * h2, -1)
                 # Away from a maximum (bend >= 0) a Newton step would leave it: stay on the grid point then.
                 step = np.where(bend < 0, slope / np.where(bend < 0, bend, -1.0), 0.0)
                 phi = phi0 + np.clip(phi - step - phi0, -spacing, spacing)
-            point = contour(phi, rim, 0)[:, 0] + centre
+            point = projected(phi, rim, 0) + centre
             seen_cs = np.arctan2(np.sum(point * minor, -1), side * np.sum(point * major, -1))
-            found.append([np.hypot(*point.T) - profile.semi_major, seen_cs, side * (phi[:, 0] - start)])
+            found.append([np.hypot(*point.T) - profile.semi_major, seen_cs, side * (phi - start)])
         deeper = found[0][0] >= found[1][0]
         chosen = [np.where(deeper, upper, lower) for upper, lower in zip(*found, strict=True)]
         # Rims are counted along the zone's own direction, as in the closed form: s k names one edge of the cam.

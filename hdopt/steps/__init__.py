@@ -1,10 +1,11 @@
-"""What `hdopt run` can do: each step turns a study into sections of the report and numbers for results.json."""
+"""What `hdopt run` can do: each step turns a study into sections of the report, numbers and files."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hdopt.errors import HdoptError, unknown_name
@@ -15,33 +16,62 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
+class Context:
+    """What a step has besides the study: the folder that files go to, and the seed of whatever is done at random."""
+
+    folder: Path
+    seed: int = 1
+
+
+@dataclass(frozen=True)
 class StepResult:
-    """What a step found: sections for people, JSON-ready numbers for programs."""
+    """What a step found: sections for people, JSON-ready numbers for programs, and the files it wrote.
+
+    `says` are lines for the terminal; `answer` is False where the answer is "no": infeasible, or a failed check.
+    """
 
     sections: tuple[Section, ...]
     results: Mapping[str, object] = field(default_factory=dict)
+    files: tuple[Path, ...] = ()
+    says: tuple[str, ...] = ()
+    answer: bool = True
 
 
-Step = Callable[["Study", int], StepResult]
-"""A step takes the study and the seed of whatever it does at random."""
+Step = Callable[["Study", Context], StepResult]
 
-STEPS: dict[str, str] = {
-    "waveform": "hdopt.steps.waveform:waveform",
-    "orders": "hdopt.steps.waveform:orders",
-    "lag": "hdopt.steps.waveform:lag",
-    "structures": "hdopt.steps.structures:structures",
-    "profiles": "hdopt.steps.profiles:profiles",
-    "sensitivities": "hdopt.steps.design:sensitivities",
-    "design_map": "hdopt.steps.design:design_map",
+
+@dataclass(frozen=True)
+class StepPlace:
+    """Where a step is ('module:function'), and the sections that make a study ask for it without listing it."""
+
+    place: str
+    asked_by: tuple[str, ...] = ()
+
+    def asked(self, sections: Mapping[str, object]) -> bool:
+        """Whether a study with these sections that lists no steps gets this one."""
+        return bool(self.asked_by) and all(section in sections for section in self.asked_by)
+
+
+ONE_DRIVE = ("drive", "errors")
+
+STEPS: dict[str, StepPlace] = {
+    "waveform": StepPlace("hdopt.steps.waveform:waveform", ONE_DRIVE),
+    "orders": StepPlace("hdopt.steps.waveform:orders", ONE_DRIVE),
+    "lag": StepPlace("hdopt.steps.waveform:lag", ONE_DRIVE),
+    "structures": StepPlace("hdopt.steps.structures:structures", ONE_DRIVE),
+    "profiles": StepPlace("hdopt.steps.profiles:profiles", ONE_DRIVE),
+    "sensitivities": StepPlace("hdopt.steps.design:sensitivities", ONE_DRIVE),
+    "design_map": StepPlace("hdopt.steps.design:design_map", ONE_DRIVE),
+    "paper_reproduction": StepPlace("hdopt.studies.paper_reproduction:paper_reproduction"),
 }
-"""Step -> where it is, in the order of a report; a step is imported only when a study asks for it."""
+"""Every step, in the order of a report; a step is imported only when a study asks for it."""
 
 
 def find_step(name: str) -> Step:
     """The step of this name; an unknown one is an error that names the nearest."""
     if name not in STEPS:
         raise HdoptError(unknown_name("step", name, STEPS))
-    module, _, attribute = STEPS[name].partition(":")
+    module, _, attribute = STEPS[name].place.partition(":")
     return getattr(import_module(module), attribute)
 
 

@@ -14,7 +14,7 @@ from hdopt.drive import Drive
 from hdopt.kinematics import peak_to_peak_arcmin
 from hdopt.report.sections.design_map import Design, pressure_angle_width_section
 from hdopt.report.sections.tornado import sensitivities_section
-from hdopt.steps import StepResult, requirement_arcmin
+from hdopt.steps import Context, StepResult, requirement_arcmin
 from hdopt.study import Study
 
 RELATIVE_CHANGE = 0.2
@@ -41,7 +41,7 @@ NAMES = {
 }
 
 
-def sensitivities(study: Study, seed: int) -> StepResult:
+def sensitivities(study: Study, context: Context) -> StepResult:
     """Each error, the pressure angle and the width alone, by 20 % to either side (directions and phases: 30 deg)."""
     drive, errors = study.drive, study.errors
     base = float(peak_to_peak_arcmin(drive, errors))
@@ -59,7 +59,7 @@ def sensitivities(study: Study, seed: int) -> StepResult:
     return StepResult((sensitivities_section(frame, base),), {"base_arcmin": base, **by_variable})
 
 
-def design_map(study: Study, seed: int) -> StepResult:
+def design_map(study: Study, context: Context) -> StepResult:
     """Converged peak-to-peak over pressure angle and wave-generator width, the errors as they are."""
     drive = study.drive
     angle, width = math.degrees(drive.geometry.pressure_angle), drive.wave_generator.width

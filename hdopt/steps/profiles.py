@@ -15,7 +15,7 @@ from hdopt.errors import MissingValue
 from hdopt.kinematics import peak_to_peak_arcmin
 from hdopt.profiles import Ellipse, Resal, TwoDisk, WaveGeneratorProfile, perimeter_error
 from hdopt.report.sections.profiles import profiles_section
-from hdopt.steps import StepResult
+from hdopt.steps import Context, StepResult
 from hdopt.study import Study
 
 USUAL_WRAP_ANGLE_DEG = 60.0
@@ -37,7 +37,7 @@ def alternatives(study: Study) -> dict[str, WaveGeneratorProfile]:
     return {own.name: own} | {profile.name: profile for profile in offered if profile.name != own.name}
 
 
-def profiles(study: Study, seed: int) -> StepResult:
+def profiles(study: Study, context: Context) -> StepResult:
     """Shape, curvature change, stress, contact and kinematic error of each profile."""
     phi = np.radians(np.arange(0.0, 360.5, 1.0))
     geometry = study.drive.geometry

@@ -13,7 +13,7 @@ from hdopt.kinematics import peak_to_peak_arcmin
 from hdopt.kinematics.lag import lag
 from hdopt.kinematics.waveform import relative_turn
 from hdopt.report.sections.structures import structures_section
-from hdopt.steps import StepResult, requirement_arcmin
+from hdopt.steps import Context, StepResult, requirement_arcmin
 from hdopt.study import Study
 
 SAMPLES_PER_TURN = 360
@@ -23,7 +23,7 @@ def with_structure(drive: Drive, structure: Structure) -> Drive:
     return replace(drive, wave_generator=replace(drive.wave_generator, structure=structure))
 
 
-def structures(study: Study, seed: int) -> StepResult:
+def structures(study: Study, context: Context) -> StepResult:
     """Peak-to-peak and lag of all four structures; lag is left out where a clearance it needs is not given."""
     rows, waveforms = [], {}
     for structure in Structure:

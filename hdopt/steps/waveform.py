@@ -11,7 +11,7 @@ from hdopt.report.sections.lag import lag_section
 from hdopt.report.sections.orders import spectrum_section
 from hdopt.report.sections.waveform import waveform_section
 from hdopt.spectrum import model_orders, order_spectrum
-from hdopt.steps import StepResult, requirement_arcmin
+from hdopt.steps import Context, StepResult, requirement_arcmin
 from hdopt.study import Study
 
 SAMPLES_PER_TURN = 720
@@ -19,7 +19,7 @@ PAPER_ORDERS = ("1/N", "1", "2", "2(1+1/2N)", "2(1+1/N)")
 """The orders that Jia 2021, Table 6 names."""
 
 
-def waveform(study: Study, seed: int) -> StepResult:
+def waveform(study: Study, context: Context) -> StepResult:
     """Kinematic error over one full relative turn."""
     theta, error = relative_turn(study.drive, study.errors, SAMPLES_PER_TURN)
     converged = float(peak_to_peak_arcmin(study.drive, study.errors))
@@ -28,7 +28,7 @@ def waveform(study: Study, seed: int) -> StepResult:
     return StepResult((section,), {"peak_to_peak_arcmin": converged, "required_arcmin": required})
 
 
-def orders(study: Study, seed: int) -> StepResult:
+def orders(study: Study, context: Context) -> StepResult:
     """Amplitudes at the model's orders."""
     ratio = study.drive.geometry.ratio
     theta, error = relative_turn(study.drive, study.errors, SAMPLES_PER_TURN)
@@ -49,7 +49,7 @@ def orders(study: Study, seed: int) -> StepResult:
     return StepResult((section,), {order.symbol: float(amplitude) for order, amplitude in amplitudes})
 
 
-def lag(study: Study, seed: int) -> StepResult:
+def lag(study: Study, context: Context) -> StepResult:
     """Lag at reversal over one input turn, with the clearances it is made of."""
     theta, error = relative_turn(study.drive, study.errors, SAMPLES_PER_TURN)
     whole = lag_of(study.drive, study.errors, theta, error)

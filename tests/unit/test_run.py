@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +12,8 @@ from cases import drive
 from hdopt.drive import Structure
 from hdopt.errors import HdoptError
 from hdopt.kinematics import peak_to_peak_arcmin
-from hdopt.run import run, steps_of
-from hdopt.steps import STEPS, find_step
+from hdopt.run import run_study, steps_of
+from hdopt.steps import Context, find_step
 from hdopt.steps.design import map_arcmin, sensitivities, with_width
 from hdopt.steps.profiles import alternatives, profiles
 from hdopt.steps.structures import structures
@@ -32,6 +33,8 @@ axis_eccentricity_mm = 0.01
 axis_eccentricity_direction_deg = 30
 """
 
+CONTEXT = Context(Path("unused"))
+
 
 @pytest.fixture(scope="module")
 def study():
@@ -45,10 +48,10 @@ def minimal(tmp_path):
 
 
 def test_a_run_leaves_a_page_its_numbers_and_the_results_of_each_step(study, tmp_path):
-    result = run(study, tmp_path)
+    result = run_study(study, tmp_path)
     assert result.report == tmp_path / "report.html"
     results = json.loads((tmp_path / "results.json").read_text())
-    assert list(results["steps"]) == list(STEPS)
+    assert list(results["steps"]) == list(steps_of(study)[1])
     assert results["steps"]["waveform"]["peak_to_peak_arcmin"] == pytest.approx(
         float(peak_to_peak_arcmin(study.drive, study.errors))
     )
@@ -58,8 +61,10 @@ def test_a_run_leaves_a_page_its_numbers_and_the_results_of_each_step(study, tmp
 
 def test_a_study_lists_its_steps(tmp_path, study):
     (tmp_path / "mine.toml").write_text('drive = "csf-25-80"\n[study]\nsteps = ["orders", "waveform"]\n')
-    assert steps_of(load_study(tmp_path / "mine.toml")) == ("orders", "waveform")
-    assert steps_of(study) == tuple(STEPS)
+    assert steps_of(load_study(tmp_path / "mine.toml")) == (True, ("orders", "waveform"))
+    listed, asked = steps_of(study)
+    assert not listed
+    assert set(asked) >= {"waveform", "orders", "lag", "structures", "profiles", "sensitivities", "design_map"}
 
 
 @pytest.mark.parametrize(
@@ -72,21 +77,23 @@ def test_a_study_lists_its_steps(tmp_path, study):
 def test_steps_that_cannot_be_done_are_refused_before_anything_runs(steps, message, tmp_path):
     (tmp_path / "mine.toml").write_text(f'drive = "csf-25-80"\n[study]\nsteps = {steps}\n')
     with pytest.raises(HdoptError, match=message):
-        run(load_study(tmp_path / "mine.toml"), tmp_path / "out")
+        run_study(load_study(tmp_path / "mine.toml"), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
 def test_steps_do_without_what_a_study_does_not_give(minimal):
-    frame = next(item.frame for item in find_step("structures")(minimal, 1).sections[0].items if hasattr(item, "frame"))
+    frame = next(
+        item.frame for item in find_step("structures")(minimal, CONTEXT).sections[0].items if hasattr(item, "frame")
+    )
     assert list(frame.columns) == ["structure", "peak_to_peak_arcmin"]
     with pytest.raises(HdoptError, match=r"the lag needs clearances.backlash_mm"):
-        find_step("lag")(minimal, 1)
+        find_step("lag")(minimal, CONTEXT)
     with pytest.raises(HdoptError, match=r"bending of the ring needs drive.flexspline_wall_mm"):
-        find_step("profiles")(minimal, 1)
+        find_step("profiles")(minimal, CONTEXT)
 
 
 def test_an_error_that_is_nil_and_its_direction_have_no_sensitivity(minimal):
-    found = sensitivities(minimal, 1).results
+    found = sensitivities(minimal, CONTEXT).results
     assert set(found) == {
         "base_arcmin",
         "Axis eccentricity",
@@ -111,12 +118,24 @@ def test_profiles_start_with_the_studys_own_and_all_deflect_alike(study):
     assert set(offered) == {"ellipse", "resal", "two_disk"}
     assert offered["ellipse"] is study.drive.wave_generator.profile
     assert [profile.semi_major for profile in offered.values()] == pytest.approx([31.046] * 3)
-    results = profiles(study, 1).results
+    results = profiles(study, CONTEXT).results
     assert results["resal"]["contact_angle_deg"] == pytest.approx(54.99, abs=0.03)  # Jia 2021, Table 4
 
 
 def test_structures_are_those_of_the_drive_with_nothing_else_changed(study):
-    results = structures(study, 1).results
+    results = structures(study, CONTEXT).results
     for structure in Structure:
         expected = float(peak_to_peak_arcmin(drive(structure=structure), study.errors))
         assert results[structure.value]["peak_to_peak_arcmin"] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_step_nobody_listed_is_left_out_where_a_number_is_missing(minimal, tmp_path):
+    result = run_study(minimal, tmp_path / "out")
+    assert "clearances.backlash_mm" in result.steps["lag"].results["left_out"]
+    assert "Left out: the lag needs clearances.backlash_mm" in result.report.read_text()
+
+
+def test_a_listed_step_with_a_missing_number_is_refused(tmp_path):
+    (tmp_path / "mine.toml").write_text(MINIMAL + '[study]\nsteps = ["lag"]\n')
+    with pytest.raises(HdoptError, match=r"the lag needs clearances.backlash_mm"):
+        run_study(load_study(tmp_path / "mine.toml"), tmp_path / "out")
