@@ -17,6 +17,8 @@ _EXPORTS: dict[str, str] = {
     "sobol": "hdopt.tolerancing",
     "allocate": "hdopt.tolerancing",
     "run_study": "hdopt.run",
+    "diagnose": "hdopt.diagnosis",
+    "read_recording": "hdopt.recording",
     "HdoptError": "hdopt.errors",
 }
 """Public name -> the module that has it."""

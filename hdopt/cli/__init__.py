@@ -16,6 +16,7 @@ COMMANDS: dict[str, str] = {
     "stack": "Monte Carlo stack of the tolerances: distribution, yield, Ppk; tails and worst case on request.",
     "sobol": "Which tolerances matter: Sobol' indices with intervals, Shapley effects where inputs are correlated.",
     "allocate": "Least-cost tolerances that keep the requirement, verified.",
+    "diagnose": "What physics recordings of a drive hold that the model leaves out.",
     "run": "Everything a study file asks for, with report.html.",
     "studies": "The shipped studies, a line each.",
 }

@@ -1,0 +1,142 @@
+"""The protocol behind which every effect of the catalogue stands, and the terms it puts into a fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.diagnosis.samples import Samples
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An estimated number with its 95 % interval and unit."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+    def to_dict(self) -> dict[str, object]:
+        return {"value": self.value, "low": self.low, "high": self.high, "unit": self.unit}
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect written as columns of a linear fit at a given shape (its parameters that are not linear).
+
+    `columns` (n, p) in arcmin per coefficient; or `zones` (2, n, p) in mm, which act inside the larger-zone rule of the
+    base. `steps` names the shape parameters that may move in the fit, with a step for their derivative; `trials` is how
+    many different shapes the search looked at, which the evidence pays for.
+    """
+
+    effect: str
+    shape: Mapping[str, float]
+    columns: Array | None = None
+    zones: Array | None = None
+    steps: Mapping[str, float] = field(default_factory=dict)
+    trials: float = 1.0
+    odds: float = 0.0
+    """Log prior odds of this variant against the effect's plainest one."""
+
+    @property
+    def width(self) -> int:
+        source = self.columns if self.columns is not None else self.zones
+        return source.shape[-1]
+
+    @property
+    def freedom(self) -> int:
+        return self.width + len(self.steps)
+
+
+class Probe(Protocol):
+    """What a search may ask of the residual: it answers with the base (and the effects already found) refitted."""
+
+    samples: Samples
+    residual: Array
+    base_value: Array
+
+    def gain(self, term: Term) -> float:
+        """Drop of the weighted sum of squares, in units of the noise variance, when `term` joins the fit."""
+
+    def spectrum(self, orders: Array) -> Array:
+        """Amplitude (arcmin) of the residual at each order, by least squares."""
+
+
+class Effect(Protocol):
+    """One physics left out of the base model."""
+
+    id: str
+    domain: str
+    """Where it lives: order, angle, direction, reversal, torque, speed, temperature or time."""
+    separating: str
+    """The measurement that would show it apart from others."""
+
+    def lacks(self, samples: Samples) -> str | None:
+        """What the recordings would need to show this effect, or None where they can."""
+
+    def search(self, probe: Probe) -> Sequence[Term]:
+        """The best terms for this residual, one for each variant worth considering."""
+
+    def term(self, samples: Samples, shape: Mapping[str, float], base_value: Array | None = None) -> Term:
+        """The term at a given shape."""
+
+    def parameters(self, term: Term, estimate: Estimate) -> dict[str, Parameter]:
+        """The effect's parameters with units and intervals."""
+
+    def sentence(self, parameters: Mapping[str, Parameter], rms_arcmin: float) -> str:
+        """One plain sentence for an engineer."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Fitted coefficients of one term, then its free shape parameters, with their covariance."""
+
+    values: Array
+    covariance: Array
+
+    def parameter(self, index: int, unit: str, scale: float = 1.0, offset: float = 0.0) -> Parameter:
+        """Coefficient `index` times `scale` plus `offset`, with its 95 % interval."""
+        return self.derived(lambda v: scale * v[index] + offset, unit)
+
+    def derived(self, function: Callable[[Array], float], unit: str) -> Parameter:
+        """Any function of the values, with an interval by its gradient (delta method)."""
+        value = float(function(self.values))
+        gradient = np.zeros(len(self.values))
+        for i in range(len(self.values)):
+            step = 1e-4 * max(abs(self.values[i]), math.sqrt(max(self.covariance[i, i], 0.0)), 1e-12)
+            up, down = self.values.copy(), self.values.copy()
+            up[i] += step
+            down[i] -= step
+            gradient[i] = (function(up) - function(down)) / (2 * step)
+        half = 1.96 * math.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0))
+        return Parameter(value, value - half, value + half, unit)
+
+    def amplitude(self, sin: int, cos: int, unit: str = "arcmin") -> Parameter:
+        """Amplitude of a pair of sine and cosine coefficients."""
+        return self.derived(lambda v: math.hypot(v[sin], v[cos]), unit)
+
+    def phase_deg(self, sin: int, cos: int) -> Parameter:
+        """Phase phi of a sin(x + phi) from its sine and cosine coefficients, deg, in (-180, 180]."""
+        value = math.degrees(math.atan2(self.values[cos], self.values[sin]))
+        spread = self.derived(lambda v: (math.degrees(math.atan2(v[cos], v[sin])) - value + 180) % 360 - 180, "deg")
+        return Parameter(value, value + spread.low - spread.value, value + spread.high - spread.value, "deg")
+
+
+def sine_columns(phase: Array, harmonics: Sequence[float]) -> Array:
+    """sin and cos of each multiple of `phase`, shape (n, 2 len(harmonics)): sin first."""
+    return np.column_stack([f(h * phase) for h in harmonics for f in (np.sin, np.cos)])
+
+
+def best_terms(probe: Probe, terms: Sequence[Term], keep: int = 1) -> list[Term]:
+    """The `keep` terms with the largest gain after paying for their freedom."""
+    cost = math.log(max(len(probe.residual), 2))
+    ranked = sorted(terms, key=lambda term: probe.gain(term) - cost * term.freedom, reverse=True)
+    return ranked[:keep]

@@ -1,0 +1,121 @@
+"""One damaged tooth: a pulse each time a meshing zone passes it.
+
+A tooth of the circular spline stands still: zone 1 passes it at one input angle, zone 2 half a turn later. A tooth of
+the flexspline turns with the output, against the wave generator: it is passed at one value of theta (1 + 1/N), the FS
+advance of Jia 2021, Eqs. (31a), (31b). The pulse adds to the deviation of the zone that meets it; seen at the output
+it may also appear once an output turn (a defect of what turns with the output). Its shape is taken as a Gaussian over
+the angle of contact. Units: um of arc (or arcmin), angle deg, width deg (standard deviation). Prior: width 0.5 to 20
+deg.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hdopt.diagnosis.effect import Parameter, Term, best_terms
+from hdopt.recording import TURN
+
+WIDTHS_DEG = (1.2, 2.5, 5.0, 10.0, 18.0)
+COORDINATES = ("cs", "fs", "cs_once", "fs_once", "output")
+"""CS or FS tooth met by both zones; CS or FS tooth seen once a turn whichever zone drives; fixed output angle."""
+
+
+class LocalToothDefect:
+    id = "local_tooth_defect"
+    domain = "angle"
+    needs_base = False
+    separating = (
+        "turn the circular spline by some teeth, and the flexspline against the output: the pulse moves with its part"
+    )
+
+    def lacks(self, samples):
+        if samples.rows_per_turn < 40:
+            return "at least 40 samples an input turn"
+        return None if samples.span_turns >= 3 else "at least 3 input turns"
+
+    def search(self, probe):
+        samples = probe.samples
+        found = []
+        for index, name in enumerate(COORDINATES):
+            if name in ("cs", "fs") and probe.fit.problem.base is None:
+                continue
+            if name == "output" and samples.span_turns < 0.1 * samples.ratio:
+                continue
+            coordinate, period = self.coordinate(samples, name)
+            centres = self._candidates(probe, coordinate, period, name)
+            terms = [self.term(samples, {"centre": c, "width_deg": w, "on": float(index)}) for c, w in centres]
+            if terms:
+                found += best_terms(probe, terms)
+        return best_terms(probe, found, 2)
+
+    @staticmethod
+    def coordinate(samples, name):
+        """The angle at which the pulse is fixed, in rad of wave-generator travel, and its period."""
+        if name.startswith("fs"):
+            return samples.theta * (1 + 1 / samples.ratio), TURN
+        if name == "output":
+            return samples.theta, TURN * samples.ratio
+        return samples.theta, TURN
+
+    def _candidates(self, probe, coordinate, period, name):
+        """Centres and widths where the folded residual has the strongest pulses."""
+        bins = round(128 * period / TURN)
+        cell = (np.mod(coordinate, period) / period * bins).astype(int) % bins
+        count = np.bincount(cell, minlength=bins).astype(float)
+        folded = np.bincount(cell, probe.residual, bins)
+        best = []
+        for width in WIDTHS_DEG:
+            sigma = math.radians(width) / period * bins
+            reach = int(4 * sigma) + 2
+            kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
+            if 2 * reach + 1 > bins:
+                continue
+            wrapped = np.r_[folded[-reach:], folded, folded[:reach]]
+            weight = np.r_[count[-reach:], count, count[:reach]]
+            score = np.convolve(wrapped, kernel, "valid")
+            norm = np.sqrt(np.convolve(weight, kernel**2, "valid")) + 1e-9
+            score = np.abs(score / norm)
+            for at in np.argsort(score)[-2:]:
+                best.append(((at + 0.5) * period / bins, width))
+        return best
+
+    def term(self, samples, shape, base_value=None):
+        name = COORDINATES[int(shape["on"])]
+        coordinate, period = self.coordinate(samples, name)
+        shape = {**shape, "width_deg": min(max(shape["width_deg"], 0.5), 25.0)}
+        sigma = math.radians(shape["width_deg"])
+
+        def pulse(shift):
+            off = np.mod(coordinate - shape["centre"] - shift + period / 2, period) - period / 2
+            return np.exp(-0.5 * (off / sigma) ** 2)
+
+        steps = {"centre": 0.05 * sigma, "width_deg": 0.05 * shape["width_deg"]}
+        trials = 60.0 * period / TURN
+        if name in ("cs", "fs"):
+            zones = np.stack([pulse(0.0), pulse(math.pi)])[:, :, None]
+            return Term(self.id, dict(shape), zones=zones, steps=steps, trials=trials)
+        return Term(self.id, dict(shape), columns=pulse(0.0)[:, None], steps=steps, trials=trials)
+
+    def parameters(self, term, estimate):
+        name = COORDINATES[int(term.shape["on"])]
+        found = {
+            "angle_deg": estimate.parameter(1, "deg", scale=math.degrees(1)),
+            "width_deg": estimate.parameter(2, "deg"),
+        }
+        in_zone = name in ("cs", "fs")
+        found["height_um" if in_zone else "height_arcmin"] = (
+            estimate.parameter(0, "um", scale=1e3) if in_zone else estimate.parameter(0, "arcmin")
+        )
+        code = {"c": 1.0, "f": 2.0, "o": 3.0}[name[0]]
+        found["spline_code"] = Parameter(code, code, code, "1")
+        return found
+
+    def sentence(self, parameters, rms_arcmin):
+        spline = {1.0: "circular spline", 2.0: "flexspline", 3.0: "flexspline (output side)"}
+        part = spline[parameters["spline_code"].value]
+        return (
+            f"A local defect on the {part} at {parameters['angle_deg'].value % 360:.1f} deg makes a pulse "
+            f"{parameters['width_deg'].value:.2g} deg wide each time it is met."
+        )

@@ -1,0 +1,49 @@
+"""Lost motion: play between input and output, a step of the error at each reversal.
+
+Jia 2021, Eqs. (33)-(35): the output lags by the play of the gear flanks, 2 pi (e_t - tau)/l_FS, and of the
+cross-slide's two slots, the sum of e_b/(N r_i), whose lever arms vary over the input turn. While the play is crossed
+the output stands still, so the error changes by the full step over as much input travel as makes the same output
+angle. Units: lost_motion arcmin, full step between the two directions. Prior: 0 to 10 arcmin.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hdopt.diagnosis.effect import Term, best_terms
+
+
+class LostMotion:
+    id = "lost_motion"
+    domain = "reversal"
+    needs_base = False
+    separating = "reverse slowly at several input angles and speeds: play steps at once, and alike at every speed"
+
+    def lacks(self, samples):
+        return None if samples.reverses else "a reversal"
+
+    def search(self, probe):
+        plain = self.term(probe.samples, {"ramp_arcmin": 0.5})
+        varying = [self.term(probe.samples, {"ramp_arcmin": 0.5, "order": k}) for k in (1.0, 2.0, 4.0)]
+        return [plain, *best_terms(probe, varying)]
+
+    def term(self, samples, shape, base_value=None):
+        # In crossing the play the travel in arcmin equals the play itself.
+        crossing = np.clip(samples.travel * 60 / max(shape["ramp_arcmin"], 1e-3), 0, 1)
+        crossing = np.where(samples.first | samples.locked, 1.0, crossing)
+        step = samples.direction * (crossing - 0.5)
+        columns = [step]
+        if "order" in shape:
+            angle = shape["order"] * samples.theta
+            columns += [step * np.sin(angle), step * np.cos(angle)]
+        return Term(self.id, dict(shape), columns=np.column_stack(columns), trials=3.0 if "order" in shape else 1.0)
+
+    def parameters(self, term, estimate):
+        found = {"lost_motion_arcmin": estimate.derived(lambda v: abs(v[0]), "arcmin")}
+        if "order" in term.shape:
+            found["variation_arcmin"] = estimate.amplitude(1, 2)
+        return found
+
+    def sentence(self, parameters, rms_arcmin):
+        varies = " and varies over the input turn" if "variation_arcmin" in parameters else ""
+        return f"Play: at each reversal the output lags by {parameters['lost_motion_arcmin'].value:.2g} arcmin{varies}."

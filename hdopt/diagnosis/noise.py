@@ -1,0 +1,80 @@
+"""Coloured noise: an autoregressive model of the residual, and the filter that makes it white.
+
+Every fit of the diagnosis is generalized least squares in this filter (Box, Jenkins, "Time Series Analysis", AR(p)),
+so that slow wander of the bench is not taken for slow physics. The order is chosen by BIC and kept low: a narrow line
+in the residual must stay visible.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.diagnosis.samples import Samples
+
+Array = NDArray[np.float64]
+
+HIGHEST_ORDER = 4
+
+
+@dataclass(frozen=True)
+class Noise:
+    """AR coefficients (x_t = sum a_k x_{t-k} + e_t), standard deviation of e, and a weight for each row (0 where the
+    filter would reach over a gap)."""
+
+    ar: Array
+    sigma: float
+    root_weight: Array
+
+    @classmethod
+    def white(cls, samples: Samples, sigma: float = 1.0) -> Noise:
+        return cls(np.zeros(0), sigma, np.sqrt(samples.weight))
+
+    def whiten(self, values: Array) -> Array:
+        """`values` (n,) or (n, q), filtered and weighted along the first axis."""
+        filtered = values.copy()
+        for lag, coefficient in enumerate(self.ar, start=1):
+            filtered[lag:] -= coefficient * values[:-lag]
+        return filtered * (self.root_weight if values.ndim == 1 else self.root_weight[:, None])
+
+    @property
+    def inflation(self) -> float:
+        """Long-run variance over innovation variance: how much slower slow averages settle than in white noise."""
+        return float(1 / max(1 - self.ar.sum(), 1e-3) ** 2)
+
+
+def estimate(samples: Samples, residual: Array, highest_order: int = HIGHEST_ORDER) -> Noise:
+    """AR noise from a residual that holds no structure any more."""
+    piece = samples.piece
+    n = len(residual)
+    longest = np.bincount(piece).max()
+    highest = int(min(highest_order, longest // 20))
+    covariance = np.empty(highest + 1)
+    for lag in range(highest + 1):
+        same = piece[lag:] == piece[: n - lag]
+        products = residual[lag:][same] * residual[: n - lag][same]
+        covariance[lag] = products.mean() if len(products) else 0.0
+    best_ar, best_score, error, ar = np.zeros(0), np.inf, covariance[0], np.zeros(0)
+    for order in range(highest + 1):
+        if order:
+            reflection = (
+                (covariance[order] - ar @ covariance[order - 1 : 0 : -1]) / error
+                if order > 1
+                else covariance[1] / error
+            )
+            reflection = float(np.clip(reflection, -0.995, 0.995))
+            ar = np.r_[ar - reflection * ar[::-1], reflection]
+            error *= 1 - reflection**2
+        score = n * np.log(max(error, 1e-300)) + order * np.log(n)
+        if score < best_score - 6:
+            best_ar, best_score = ar, score
+    order = len(best_ar)
+    valid = np.ones(n, bool)
+    valid[:order] = False
+    for lag in range(1, order + 1):
+        valid[lag:] &= piece[lag:] == piece[:-lag]
+    noise = Noise(best_ar, 1.0, np.where(valid, np.sqrt(samples.weight), 0.0))
+    white = noise.whiten(residual)
+    return Noise(best_ar, float(np.sqrt(np.sum(white**2) / max(valid.sum(), 1))), noise.root_weight)

@@ -1,0 +1,211 @@
+"""Explanations without physics that compete with the catalogue: where one of them wins, the verdict is `unknown`.
+
+A sine at any order, a sine at any frequency in time, a jump, a trend, an order whose size changes with time, an even
+function of torque or speed: each is a plain description of structure, searched over all its shapes like an effect and
+priced like one. A catalogue effect that merely resembles such a structure loses against it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hdopt.diagnosis.effect import Term, best_terms, sine_columns
+from hdopt.recording import TURN
+
+ODDS = -3.0
+"""Log prior odds against the catalogue's explanations at equal fit."""
+
+
+class AnyOrder:
+    """One sine, or three neighbours (a modulated sine), at any order."""
+
+    id = "_sine_in_angle"
+    domain = "asynchronous order"
+    needs_base = False
+
+    def lacks(self, samples):
+        return None if samples.span_turns >= 4 else "at least 4 input turns"
+
+    def search(self, probe):
+        from hdopt.diagnosis.generic import strongest_orders
+
+        span = probe.samples.span_turns
+        highest = min(0.45 * probe.samples.rows_per_turn, probe.order_range[1])
+        lines = strongest_orders(probe, 3, lowest=max(2 / span, probe.order_range[0]), highest=highest)
+        if not lines:
+            return []
+        found = []
+        for line in lines[:2]:
+            near = [self.term(probe.samples, {"order": line + d / span}) for d in np.linspace(-0.3, 0.3, 5)]
+            found += best_terms(probe, near)
+        best = best_terms(probe, found)[0]
+        order = best.shape["order"]
+        modulated = [
+            self.term(probe.samples, {"order": order, "side": s})
+            for s in np.unique(np.round(np.geomspace(1.2 / span, 0.5, 24), 5))
+            if s < order
+        ]
+        return [best, *best_terms(probe, modulated)]
+
+    def term(self, samples, shape, base_value=None):
+        orders = [shape["order"]]
+        if "side" in shape:
+            orders += [shape["order"] - shape["side"], shape["order"] + shape["side"]]
+        span = max(samples.span_turns, 1.0)
+        trials = 4 * span * 0.45 * samples.rows_per_turn * (24.0 if "side" in shape else 1.0)
+        return Term(
+            self.id,
+            dict(shape),
+            columns=sine_columns(samples.theta, orders),
+            steps={"order": 0.01 / span},
+            trials=trials,
+            odds=ODDS,
+        )
+
+
+class AnyFrequency:
+    """A sine at any fixed frequency in time, slow waves among them."""
+
+    id = "_sine_in_time"
+    domain = "time"
+    needs_base = False
+
+    def lacks(self, samples):
+        return None if samples.time is not None and not samples.locked else "a time column"
+
+    def search(self, probe):
+        samples = probe.samples
+        time = samples.time - samples.time.min()
+        duration = float(np.ptp(time))
+        step = duration / max(4 * len(samples), 64)
+        length = 1 << int(np.ceil(np.log2(4 * duration / step)))
+        cell = np.minimum((time / step).astype(int), length - 1)
+        amplitude = np.abs(
+            np.fft.rfft(np.bincount(cell, probe.residual - probe.residual.mean(), minlength=length)[:length])
+        )
+        frequencies = np.arange(len(amplitude)) / (length * step)
+        usual = float(np.median(np.diff(samples.time)[np.diff(samples.piece) == 0])) if len(samples) > 2 else step
+        amplitude[(frequencies < 0.4 / duration) | (frequencies > 0.45 / max(usual, step))] = 0
+        found = []
+        for _ in range(3):
+            at = int(np.argmax(amplitude))
+            found.append(frequencies[at])
+            amplitude[max(at - 8, 0) : at + 8] = 0
+        slow = list(np.array([0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8]) / duration)
+        terms = [
+            self.term(samples, {"frequency_hz": f + d / duration})
+            for f in found
+            for d in (np.linspace(-0.3, 0.3, 5) if f > 0 else [])
+            if f + d / duration > 0
+        ] + [self.term(samples, {"frequency_hz": f}) for f in slow]
+        return best_terms(probe, terms)
+
+    def term(self, samples, shape, base_value=None):
+        duration = float(np.ptp(samples.time))
+        frequency = max(shape["frequency_hz"], 0.2 / duration)
+        return Term(
+            self.id,
+            {"frequency_hz": frequency},
+            columns=sine_columns(TURN * (samples.time - samples.time.min()), [frequency]),
+            steps={"frequency_hz": 0.01 / duration},
+            trials=float(len(samples)),
+            odds=ODDS,
+        )
+
+
+class Jump:
+    """One or two jumps at a moment of the recording, as of something that slipped."""
+
+    id = "_jump"
+    domain = "time"
+    needs_base = False
+
+    def lacks(self, samples):
+        return None if not samples.locked else "an input that turns"
+
+    def search(self, probe):
+        samples = probe.samples
+        running = np.cumsum(probe.white_residual)
+        count = np.arange(1, len(running) + 1)
+        n = len(running)
+        score = np.abs(running - running[-1] * count / n) / np.sqrt(np.maximum(count * (n - count) / n, 1.0))
+        edge = max(10, n // 200)
+        score[:edge] = score[-edge:] = 0
+        grid = np.unique(np.r_[np.argmax(score) + 1, np.linspace(edge, n - edge, 60).astype(int)])
+        first = best_terms(probe, [self.term(samples, {"row": float(i)}) for i in grid])[0]
+        near = np.unique(np.clip(first.shape["row"] + np.linspace(-n / 60, n / 60, 41), edge, n - edge).astype(int))
+        first = best_terms(probe, [self.term(samples, {"row": float(i)}) for i in near])[0]
+        return [first]
+
+    def term(self, samples, shape, base_value=None):
+        column = (np.arange(len(samples)) >= shape["row"]).astype(float)
+        return Term(self.id, dict(shape), columns=column[:, None], trials=float(len(samples)), odds=ODDS)
+
+
+class ChangingOrder:
+    """A whole order, or a whole order of the flexspline, whose amplitude changes steadily over the recording."""
+
+    id = "_changing_order"
+    domain = "time"
+    needs_base = False
+
+    def lacks(self, samples):
+        return None if samples.span_turns >= 4 else "at least 4 input turns"
+
+    def search(self, probe):
+        ratio = probe.samples.ratio
+        orders = [k * f for k in (1, 2, 3, 4) for f in (1.0, 1 + 1 / ratio)]
+        return best_terms(probe, [self.term(probe.samples, {"order": o}) for o in orders])
+
+    def term(self, samples, shape, base_value=None):
+        along = np.linspace(-1, 1, len(samples))[:, None]
+        return Term(
+            self.id, dict(shape), columns=along * sine_columns(samples.theta, [shape["order"]]), trials=8.0, odds=ODDS
+        )
+
+
+class EvenLoad:
+    """An even function of torque, or an order whose size follows the torque."""
+
+    id = "_even_in_torque"
+    domain = "torque"
+    needs_base = False
+
+    def lacks(self, samples):
+        return None if samples.torque is not None and np.std(samples.torque) > 0 else "torque that varies"
+
+    def search(self, probe):
+        return best_terms(probe, [self.term(probe.samples, {"kind": float(k)}) for k in range(4)])
+
+    def term(self, samples, shape, base_value=None):
+        torque = samples.torque / np.max(np.abs(samples.torque))
+        kind = int(shape["kind"])
+        if kind < 2:
+            columns = (np.abs(torque) if kind == 0 else torque**2)[:, None]
+        else:
+            columns = torque[:, None] * sine_columns(samples.theta, [1.0 if kind == 2 else 2.0])
+        return Term(self.id, dict(shape), columns=columns, trials=4.0, odds=ODDS)
+
+
+class EvenSpeed:
+    """A function of speed that is the same in both directions."""
+
+    id = "_even_in_speed"
+    domain = "speed"
+    needs_base = False
+
+    def lacks(self, samples):
+        if samples.speed is None or np.std(np.abs(samples.speed)) < 0.05 * np.max(np.abs(samples.speed)):
+            return "speed that varies"
+        return None
+
+    def search(self, probe):
+        return best_terms(probe, [self.term(probe.samples, {"power": p}) for p in (1.0, 2.0)])
+
+    def term(self, samples, shape, base_value=None):
+        speed = np.abs(samples.speed) / np.max(np.abs(samples.speed))
+        return Term(self.id, dict(shape), columns=(speed ** shape["power"])[:, None], trials=2.0, odds=ODDS)
+
+
+OUTSIDE = {e.id: e for e in (AnyOrder(), AnyFrequency(), Jump(), ChangingOrder(), EvenLoad(), EvenSpeed())}
+"""Descriptions that compete with the catalogue."""

@@ -1,0 +1,87 @@
+"""Looking at what a fit leaves: gains of further terms with everything already fitted projected out, and its
+spectrum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.diagnosis.effect import Term
+from hdopt.diagnosis.fit import Fit, shape_columns, term_columns
+from hdopt.recording import TURN
+
+Array = NDArray[np.float64]
+
+
+class FitProbe:
+    """A `Probe` on a fit. Terms of the fit listed in `keep` stay in it, the others' contributions return to the
+    residual.
+    """
+
+    def __init__(self, fit: Fit, keep: Sequence[int] | None = None, order_range: tuple[float, float] = (0.0, 1e9)):
+        keep = range(len(fit.terms)) if keep is None else keep
+        self.fit = fit
+        self.samples = fit.problem.samples
+        self.base_value = fit.base_value
+        self.order_range = order_range
+        self.noise = fit.problem.noise
+        self.residual = fit.residual + sum(
+            (fit.contribution(i) for i in range(len(fit.terms)) if i not in keep), np.zeros(len(self.samples))
+        )
+        design = [fit.base_jacobian, fit.problem.nuisance]
+        for i in keep:
+            design.append(term_columns(fit.terms[i], fit.zone, fit.problem.base))
+            design.append(shape_columns(fit.terms[i], fit.coefficients[i], fit.problem, fit.zone, fit.base_value))
+        design = np.column_stack(design)
+        white = self.noise.whiten(design)
+        # The prior on the base keeps directions the data leave open from swallowing an effect.
+        prior = np.sqrt(fit.prior_precision(design.shape[1])) * self.noise.sigma
+        augmented = np.vstack([white, np.diag(prior)])
+        scale = np.sqrt((augmented**2).sum(0))
+        basis, _, _ = np.linalg.svd(augmented / np.where(scale > 0, scale, 1), full_matrices=False)
+        rank = int(np.sum(_ > 1e-7 * _[0]))
+        self.basis = np.asfortranarray(basis[: len(white), :rank])
+        self.white_residual = self.project(self.noise.whiten(self.residual))
+
+    def project(self, white: Array) -> Array:
+        """Whitened columns with base, offsets and kept terms taken out."""
+        return white - self.basis @ (self.basis.T @ white)
+
+    def columns(self, term: Term) -> Array:
+        """The term's columns, whitened and projected."""
+        return self.project(self.noise.whiten(term_columns(term, self.fit.zone, self.fit.problem.base)))
+
+    def solve(self, term: Term) -> tuple[float, Array]:
+        white = self.noise.whiten(term_columns(term, self.fit.zone, self.fit.problem.base))
+        absorbed = self.basis.T @ white
+        gram, moment = white.T @ white - absorbed.T @ absorbed, white.T @ self.white_residual
+        scale = np.sqrt(np.maximum((white**2).sum(0), 1e-300))
+        # A column that the base absorbs to a millionth has nothing left to say.
+        gram = gram / np.outer(scale, scale) + 1e-6 * np.eye(len(gram))
+        coefficients = np.linalg.solve(gram, moment / scale) / scale
+        return float(moment @ coefficients) / self.noise.sigma**2, coefficients
+
+    def gain(self, term: Term) -> float:
+        return self.solve(term)[0]
+
+    @cached_property
+    def _fft(self) -> tuple[Array, float]:
+        theta = self.samples.theta - self.samples.theta.min()
+        per_turn = 8 * 2 ** int(np.ceil(np.log2(max(self.samples.rows_per_turn, 16))))
+        span = theta.max() / TURN + 1
+        length = 1 << int(np.ceil(np.log2(4 * span * per_turn)))
+        length = min(length, 1 << 21)
+        per_turn = min(per_turn, int(length / (2.5 * span)))
+        cell = np.round(theta / TURN * per_turn).astype(np.int64)
+        signal = np.bincount(cell, self.residual - self.residual.mean(), minlength=length)[:length]
+        return 2 * np.abs(np.fft.rfft(signal)) / len(theta), length / per_turn
+
+    def spectrum(self, orders: Array) -> Array:
+        """Amplitude (arcmin) of the residual at each order, by the Fourier sum at the nearest quarter resolution."""
+        amplitude, periods = self._fft
+        index = np.round(np.asarray(orders) * periods).astype(np.int64)
+        return amplitude[np.clip(index, 0, len(amplitude) - 1)]

@@ -1,0 +1,221 @@
+"""Recordings of one drive, gathered into the rows that the diagnosis works on.
+
+Consecutive samples within one cell of input angle are averaged: 64 to 128 cells a turn hold every order up to about
+25, which is where all effects but tooth mesh and encoder interpolation live. Those two are looked for on the rows as
+recorded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.recording import TURN, Recording
+from hdopt.recording_sync import find_passes
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+CELLS_PER_TURN = 128
+MOST_ROWS = 14_000
+
+
+def cells_for(recordings: Sequence[Recording]) -> int:
+    """Cells a turn: 128, or fewer (down to 64) where the recordings are long."""
+    turns = sum(float(np.abs(np.diff(recording.input_angle)).sum()) / TURN for recording in recordings)
+    return int(np.clip(MOST_ROWS / max(turns, 1.0), 64, CELLS_PER_TURN)) // 8 * 8
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Rows of all recordings together; every array has shape (n,).
+
+    `theta` input angle (rad), `error` KE (arcmin), `direction` +1/-1, `travel` output angle in deg since the last
+    reversal, `first` rows before the first reversal, `record` the recording, `piece` contiguous rows, `block` whole
+    input turns; `time` (s), `speed` (input, rad/s), `torque` (Nm), `temperature` (deg C) or None; `weight` samples
+    behind a row relative to the usual.
+    """
+
+    ratio: float
+    theta: Array
+    error: Array
+    direction: Array
+    travel: Array
+    first: NDArray[np.bool_]
+    record: Index
+    piece: Index
+    block: Index
+    weight: Array
+    time: Array | None
+    speed: Array | None
+    torque: Array | None
+    temperature: Array | None
+    locked: bool
+    quantum: float
+
+    def __len__(self) -> int:
+        return len(self.theta)
+
+    @property
+    def records(self) -> int:
+        return int(self.record[-1]) + 1
+
+    @property
+    def blocks(self) -> int:
+        return int(self.block[-1]) + 1
+
+    @property
+    def reverses(self) -> bool:
+        """Whether both directions are there, a fifth of a turn each at least."""
+        forward, backward = (self.direction > 0).mean(), (self.direction < 0).mean()
+        return min(forward, backward) > 0.02
+
+    @property
+    def span_turns(self) -> float:
+        """Input turns between the lowest and the highest angle of any one recording."""
+        return max(float(np.ptp(self.theta[self.record == r])) for r in range(self.records)) / TURN
+
+    @property
+    def rows_per_turn(self) -> float:
+        """Usual number of rows in an input turn."""
+        step = np.abs(np.diff(self.theta))
+        step = step[(np.diff(self.piece) == 0) & (step > 0)]
+        return TURN / float(np.median(step)) if len(step) else 1.0
+
+    def rows(self, mask: NDArray) -> Samples:
+        """Only the rows in `mask`."""
+        changes = {name: value[mask] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return replace(self, **changes)
+
+
+def gather(recordings: Sequence[Recording], cells_per_turn: int | None) -> Samples:
+    """All recordings as one `Samples`; `cells_per_turn` None keeps every row as recorded."""
+    parts = [_one_record(recording, cells_per_turn) for recording in recordings]
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0] if name not in OPTIONAL}
+    for name in OPTIONAL:
+        complete = all(part[name] is not None for part in parts)
+        columns[name] = np.concatenate([part[name] for part in parts]) if complete else None
+    record = np.repeat(np.arange(len(parts)), [len(part["theta"]) for part in parts])
+    piece = _renumber(record, columns["piece"])
+    block = _turn_blocks(record, columns.pop("pass_index"), columns["theta"], columns["piece"])
+    columns["piece"] = piece
+    locked = all(recording.input_locked for recording in recordings)
+    return Samples(
+        ratio=recordings[0].ratio,
+        record=record,
+        block=block if not locked else np.minimum(np.arange(len(record)) * 40 // len(record), 39),
+        locked=locked,
+        quantum=max(recording.quantum_arcmin for recording in recordings),
+        **columns,
+    )
+
+
+OPTIONAL = ("time", "speed", "torque", "temperature")
+
+
+def _one_record(recording: Recording, cells_per_turn: int | None) -> dict[str, Array | None]:
+    n = len(recording)
+    segment = recording.segment if recording.segment is not None else np.zeros(n, np.int64)
+    if recording.input_locked:
+        # The input stands: what moves is the torque, and passes are its sweeps.
+        drive_by = recording.torque if recording.torque is not None else np.arange(n, dtype=float)
+        passes = find_passes(drive_by, 0.05 * float(np.ptp(drive_by)))
+        cell = np.arange(n) // max(1, n // 4000)
+    else:
+        passes = find_passes(recording.input_angle)
+        cell = np.arange(n) if cells_per_turn is None else np.floor(recording.input_angle / TURN * cells_per_turn)
+    change = (np.diff(cell) != 0) | (np.diff(passes.index) != 0) | (np.diff(segment) != 0)
+    starts = np.r_[0, np.flatnonzero(change) + 1]
+    counts = np.diff(np.r_[starts, n]).astype(float)
+
+    def mean(values):
+        return None if values is None else np.add.reduceat(values, starts) / counts
+
+    theta, time = mean(recording.input_angle), mean(recording.time)
+    usual = np.median(counts)
+    scale = 1.0 if recording.input_locked else np.degrees(1.0) / recording.ratio
+    return {
+        "theta": theta,
+        "error": mean(recording.error_arcmin),
+        "direction": passes.direction[starts],
+        "travel": mean(passes.since_reversal) * scale,
+        "first": passes.first[starts],
+        "piece": segment[starts],
+        "pass_index": passes.index[starts],
+        "weight": np.clip(counts / usual, 0.1, 4.0),
+        "time": time,
+        "speed": None if time is None else _speed(theta, time, segment[starts]),
+        "torque": mean(quiet(recording.torque, segment)),
+        "temperature": mean(quiet(recording.temperature, segment)),
+    }
+
+
+def quiet(values: Array | None, segment: Index) -> Array | None:
+    """A slow channel with its read-out noise averaged away: noise in a regressor would make its effect look smaller.
+
+    The longest of several centred means whose difference from the record is still nothing but the noise that
+    neighbouring samples show.
+    """
+    if values is None or len(values) < 200:
+        return values
+    jumps = np.diff(values, 2)
+    noise = 1.4826 * float(np.median(np.abs(jumps))) / np.sqrt(6)
+    if noise <= 0:
+        noise = float(np.median(np.abs(np.diff(values)[np.diff(values) != 0]))) if np.any(np.diff(values)) else 0.0
+    best = values
+    inner = np.diff(segment) == 0
+    for window in (5, 9, 17, 33, 65, 129):
+        kernel = np.ones(window) / window
+        padded = np.pad(values, window // 2, mode="edge")
+        smooth = np.convolve(padded, kernel, "valid")
+        # Near a gap the mean would mix both sides: keep the record there.
+        near_gap = np.convolve(np.r_[False, ~inner].astype(float), np.ones(window), "same") > 0
+        smooth = np.where(near_gap, values, smooth)
+        off = float(np.mean((values - smooth) ** 2))
+        if off > 1.1 * noise**2 * (1 - 1 / window):
+            break
+        best = smooth
+    return best
+
+
+def _speed(theta: Array, time: Array, segment: Index, half_window: int = 2) -> Array:
+    """Input speed by least squares over five neighbouring rows of one segment (clock jitter and encoder steps average
+    out).
+    """
+    n = len(theta)
+    offsets = np.arange(-half_window, half_window + 1)
+    rows = np.clip(np.arange(n)[:, None] + offsets, 0, n - 1)
+    good = segment[rows] == segment[:, None]
+    count = np.maximum(good.sum(1), 1)
+    t = np.where(good, time[rows], 0.0)
+    a = np.where(good, theta[rows], 0.0)
+    t_mean, a_mean = t.sum(1) / count, a.sum(1) / count
+    dt = np.where(good, time[rows] - t_mean[:, None], 0.0)
+    spread = (dt**2).sum(1)
+    slope = (dt * np.where(good, theta[rows] - a_mean[:, None], 0.0)).sum(1)
+    return np.divide(slope, spread, out=np.zeros(n), where=spread > 0)
+
+
+def _renumber(*keys: Index) -> Index:
+    """0, 1, 2, ... counted up wherever one of the keys changes from one row to the next."""
+    change = np.zeros(len(keys[0]), np.int64)
+    for key in keys:
+        change[1:] |= np.diff(key) != 0
+    return np.cumsum(change)
+
+
+def _turn_blocks(record: Index, pass_index: Index, theta: Array, segment: Index) -> Index:
+    """Whole input turns; a rest shorter than a third of a turn joins the block before it (or after it, at a start)."""
+    turn = np.floor(theta / TURN).astype(np.int64)
+    block = _renumber(record, pass_index, turn, segment)
+    size = np.bincount(block)
+    usual = np.median(size)
+    small = size < usual / 3
+    keep = ~small
+    if not keep.any():
+        return np.zeros(len(block), np.int64)
+    merged = np.cumsum(keep) - 1
+    return np.maximum(merged, 0)[block]

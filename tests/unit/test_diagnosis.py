@@ -1,0 +1,293 @@
+"""The diagnosis on records made here: base recovery, one record an effect, honest verdicts, the contract, the command.
+
+These records are the effect's own equation on top of the model, with noise: they show that the machinery finds what is
+there. Whether the physics is right is asked by `tests/blind`, whose records come from a bench that shares no code.
+"""
+
+import json
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hdopt.cli import main
+from hdopt.diagnosis import diagnose
+from hdopt.diagnosis.base import base_estimate, fit_base, to_cartesian, to_drive_errors
+from hdopt.diagnosis.effects import EFFECTS
+from hdopt.diagnosis.fit import Problem, refine
+from hdopt.diagnosis.noise import Noise, estimate
+from hdopt.diagnosis.pipeline import gather, offsets
+from hdopt.diagnosis.waveform import BaseModel
+from hdopt.errors import HdoptError
+from hdopt.kinematics.waveform import kinematic_error_arcmin
+from hdopt.recording import recording_from_table
+from hdopt.study import load_study
+
+TURN = 2 * np.pi
+NOISE = 0.02
+
+
+@pytest.fixture(scope="module")
+def study():
+    return load_study(drive="csf-25-80")
+
+
+@pytest.fixture(scope="module")
+def drive(study):
+    return study.drive
+
+
+def bench(study, hidden=None, turns=40, rate=100, seed=0, speeds=(1.0,)):
+    """A record forward and back at each speed (rad/s): the model, what is `hidden` (a function of a dict), noise."""
+    rng = np.random.default_rng(seed)
+    parts = []
+    for index, speed in enumerate(speeds):
+        there = np.arange(turns * rate) * TURN / rate
+        theta = np.r_[there, there[::-1]] + 0.2
+        direction = np.r_[np.ones(len(there)), -np.ones(len(there))]
+        time = np.arange(len(theta)) * (TURN / rate / speed)
+        since = np.r_[there, there]
+        torque = 6 * np.sin(0.37 * theta + index)
+        state = {
+            "theta": theta, "direction": direction, "time": time, "speed": speed * direction, "since": since,
+            "torque": torque, "index": index,
+        }  # fmt: skip
+        error = kinematic_error_arcmin(study.drive, study.errors, theta) + rng.normal(0, NOISE, len(theta))
+        if hidden is not None:
+            error = error + hidden(state)
+        output = theta / 80 - np.radians(error / 60)
+        table = pd.DataFrame(
+            {
+                "time_s": time,
+                "input_angle_deg": np.degrees(theta),
+                "output_angle_deg": np.degrees(output),
+                "torque_Nm": torque,
+            }
+        )
+        parts.append(recording_from_table(table, 80.0, name=f"record {index}"))
+    return parts
+
+
+def test_waveform_is_the_models(drive, study):
+    """The compiled form for fits and the library's waveform are one model (both sum the same terms: rounding only)."""
+    rng = np.random.default_rng(2)
+    base = BaseModel.of(drive)
+    theta = np.linspace(0, 80 * TURN, 4001)
+    for _ in range(5):
+        errors = to_drive_errors(rng.normal(size=12) * 0.005, float(base.constants[2]))
+        value, _, _ = base.evaluate(theta, to_cartesian(errors, float(base.constants[2])))
+        np.testing.assert_allclose(value, kinematic_error_arcmin(drive, errors, theta), atol=1e-10)
+
+
+def test_jacobian_is_the_slope(drive):
+    rng = np.random.default_rng(4)
+    base = BaseModel.of(drive)
+    theta = np.linspace(0, 20, 997)
+    parameters = rng.normal(size=12) * 0.005
+    _, _, jacobian = base.evaluate(theta, parameters)
+    for j in range(12):
+        step = np.eye(12)[j] * 1e-7
+        slope = (base.evaluate(theta, parameters + step)[0] - base.evaluate(theta, parameters - step)[0]) / 2e-7
+        # The median: a central difference is wrong where it straddles a change of zone or rim.
+        assert np.median(np.abs(slope - jacobian[:, j])) < 1e-5
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_base_recovers_the_waveform_and_what_is_identifiable(drive, study, seed):
+    """To the noise: the fit of 12 numbers to 8000 samples leaves no more than the noise and a few parts of it."""
+    samples = gather(bench(study, turns=80, seed=seed, rate=60), None)
+    problem = Problem(samples, BaseModel.of(drive), offsets(samples), Noise.white(samples, NOISE))
+    fit = refine(fit_base(problem, np.random.default_rng(seed)))
+    assert np.std(fit.residual) < 1.02 * NOISE
+    found = base_estimate(fit)
+    # What the teeth of the flexspline do stands alone at its orders: its amplitude is identifiable.
+    amplitude = found.parameters["fs_tooth_amplitude_mm"]
+    assert amplitude.low - 2e-5 <= study.errors.fs_tooth_amplitude <= amplitude.high + 2e-5
+    assert found.open_combinations  # e1 against a_CS and the small tilts are not
+
+
+def test_errors_and_cartesian_are_inverse(study):
+    there = to_cartesian(study.errors, 4.5)
+    np.testing.assert_allclose(to_drive_errors(there, 4.5).to_matrix(), study.errors.to_matrix(), atol=1e-12)
+
+
+def test_noise_model_finds_its_own_colour(study):
+    samples = gather(bench(study), None)
+    rng = np.random.default_rng(0)
+    white = rng.normal(size=len(samples))
+    red = np.zeros(len(samples))
+    for i in range(1, len(red)):
+        red[i] = 0.7 * red[i - 1] + white[i]
+    noise = estimate(samples, red)
+    assert noise.ar[0] == pytest.approx(0.7, abs=0.03)
+    assert noise.sigma == pytest.approx(1.0, rel=0.03)
+    assert len(estimate(samples, white).ar) == 0
+
+
+def test_nothing_hidden_is_adequate(study, drive):
+    diagnosis = diagnose(bench(study), drive)
+    assert diagnosis.verdict == "adequate"
+    assert diagnosis.effects == ()
+    assert max(diagnosis.below_detection.values()) < 0.5
+    assert diagnosis.fit["heldout_rms_base_arcmin"] == pytest.approx(NOISE, rel=0.1)
+
+
+HIDDEN = {
+    "encoder_input_eccentricity": lambda s: 0.12 * np.sin(s["theta"] + 0.5),
+    "encoder_output_eccentricity": lambda s: 0.12 * np.sin(s["theta"] / 80 + 0.5),
+    "output_coupling": lambda s: 0.12 * np.sin(2 * s["theta"] / 80 + 0.5),
+    "encoder_interpolation": lambda s: 0.08 * np.sin(25 * s["theta"]) + 0.08 * np.sin(50 * s["theta"] + 1),
+    "bearing_pass": lambda s: (
+        0.1 * np.sin((0.43 - 0.57 / 80) * s["theta"]) + 0.1 * np.sin(9 * 0.86 * (1 + 1 / 80) * s["theta"])
+    ),
+    "circular_spline_lobing": lambda s: 0.12 * np.sin(6 * s["theta"] + 0.3),
+    "torsional_windup": lambda s: s["torque"] / 31000 * 10800 / math.pi,
+    "hysteresis": lambda s: 0.15 * s["direction"] * (1 - 2 * np.exp(-np.degrees(s["since"]) / 80 / 1.5)),
+    "lost_motion": lambda s: 0.15 * s["direction"],
+    "thermal_drift": lambda s: 0.5 * (1 - np.exp(-s["time"] / 100)),
+    "channel_delay": lambda s: 2e-3 * s["speed"] / 80 * 10800 / math.pi,
+    "local_tooth_defect": lambda s: (
+        0.6 * np.exp(-0.5 * ((np.mod(s["theta"] * 81 / 80 - 2 + math.pi, TURN) - math.pi) / 0.09) ** 2)
+    ),
+}
+SPEEDS = {"channel_delay": (1.0, 2.5, 5.0), "lost_motion": (1.0, 2.0), "hysteresis": (1.0, 2.0)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", HIDDEN)
+def test_one_effect_is_found_by_name(study, drive, name):
+    diagnosis = diagnose(bench(study, HIDDEN[name], speeds=SPEEDS.get(name, (1.0,))), drive)
+    assert diagnosis.verdict == "named", diagnosis.to_dict()["effects"]
+    assert [found.id for found in diagnosis.effects] == [name]
+    assert diagnosis.fit["heldout_rms_extended_arcmin"] < 0.8 * diagnosis.fit["heldout_rms_base_arcmin"]
+    assert diagnosis.fit["false_alarm_p"] < 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "parameter", "value"),
+    [
+        ("torsional_windup", "stiffness_1", 31000.0),
+        ("lost_motion", "lost_motion_arcmin", 0.3),
+        ("hysteresis", "half_loop_arcmin", 0.15),
+        ("hysteresis", "transition_deg", 1.5),
+        ("thermal_drift", "time_constant_s", 100.0),
+        ("channel_delay", "delay_s", 2e-3),
+        ("output_coupling", "amplitude_arcmin", 0.12),
+    ],
+)
+def test_parameters_come_back_within_their_intervals(study, drive, name, parameter, value):
+    """Within twice the 95 % interval: of seven, one may well lie outside of it once."""
+    diagnosis = diagnose(bench(study, HIDDEN[name], speeds=SPEEDS.get(name, (1.0,)), seed=5), drive)
+    found = diagnosis.effects[0].parameters[parameter]
+    assert abs(found.value - value) < found.high - found.low
+    assert found.high - found.low < 0.5 * value
+
+
+@pytest.mark.slow
+def test_structure_outside_the_catalogue_is_unknown(study, drive):
+    diagnosis = diagnose(bench(study, lambda s: 0.12 * np.sin(3.37 * s["theta"])), drive)
+    assert diagnosis.verdict == "unknown"
+    assert diagnosis.effects == ()
+    assert diagnosis.where["orders_per_input_turn"][0] == pytest.approx(3.37, abs=0.02)
+
+
+def test_one_direction_at_one_speed_cannot_show_a_delay(study, drive):
+    record = bench(study)[0]
+    half = len(record) // 2
+    table = pd.DataFrame(
+        {
+            "time_s": record.time[:half],
+            "input_angle_deg": np.degrees(record.input_angle[:half]),
+            "output_angle_deg": np.degrees(record.input_angle[:half]) / 80 - record.error_arcmin[:half] / 60,
+        }
+    )
+    diagnosis = diagnose(recording_from_table(table, 80.0), drive)
+    assert diagnosis.verdict == "adequate"
+    said = " ".join(diagnosis.warnings)
+    assert "channel_delay cannot be seen here" in said
+    assert "lost_motion cannot be seen here: it needs a reversal" in said
+
+
+def test_short_record_is_insufficient(study, drive):
+    record = bench(study, turns=1)[0]
+    assert diagnose(record, drive).verdict == "insufficient"
+
+
+def test_without_a_drive_model(study):
+    rng = np.random.default_rng(0)
+    theta = np.r_[np.linspace(0, 20, 2000), np.linspace(20, 0, 2000)]
+    direction = np.repeat([1.0, -1.0], 2000)
+    error = 3 * direction + rng.normal(0, 0.3, 4000)
+    table = pd.DataFrame(
+        {
+            "time_s": np.arange(4000) * 0.01,
+            "input_angle_deg": np.degrees(theta),
+            "output_angle_deg": np.degrees(theta) / 7.2 - error / 60,
+        }
+    )
+    diagnosis = diagnose(recording_from_table(table, 7.2), ratio=7.2)
+    assert "lost_motion" in {found.id for found in diagnosis.effects}
+    assert diagnosis.base.parameters == {}
+
+
+@pytest.mark.slow
+def test_same_seed_same_answer(study, drive):
+    records = bench(study, HIDDEN["output_coupling"])
+    assert diagnose(records, drive, seed=0).to_dict() == diagnose(records, drive, seed=0).to_dict()
+
+
+def test_the_catalogue_is_complete_and_speaks():
+    assert len(EFFECTS) == 16
+    for name, effect in EFFECTS.items():
+        assert effect.id == name
+        assert effect.separating and effect.domain
+
+
+def test_command_writes_the_contract(study, tmp_path):
+    record = bench(study, HIDDEN["output_coupling"])[0]
+    table = pd.DataFrame(
+        {
+            "time_s": record.time,
+            "input_angle_deg": np.degrees(record.input_angle),
+            "output_angle_deg": np.degrees(record.input_angle) / 80 - record.error_arcmin / 60,
+        }
+    )
+    file, out, page, fitted = (tmp_path / name for name in ("r.csv", "o.json", "o.html", "fitted.toml"))
+    table.to_csv(file, index=False)
+    with pytest.raises(SystemExit) as end:
+        main(["diagnose", str(file), "--json", str(out), "--report", str(page), "--write-study", str(fitted)])
+    assert end.value.code == 0
+    result = json.loads(out.read_text())
+    assert {"schema", "verdict", "effects", "ambiguous_with", "separating_test", "base", "fit", "below_detection",
+            "warnings"} <= set(result)  # fmt: skip
+    assert result["effects"][0]["id"] == "output_coupling"
+    assert set(result["effects"][0]["where"]) == {
+        "domain", "orders_per_input_turn", "direction", "share_of_residual", "rms_arcmin",
+    }  # fmt: skip
+    assert result["effects"][0]["where"]["orders_per_input_turn"] == [0.025]
+    assert "twice a turn" in page.read_text()
+    assert load_study(fitted).errors.fs_tooth_amplitude == pytest.approx(study.errors.fs_tooth_amplitude, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--drive", "none"], "give --ratio X"),
+        (["--drive", "csf-25-81"], "unknown study"),
+        (["--columns", "input=a:deg"], "either output= or error="),
+    ],
+)
+def test_unusable_input_ends_with_two(tmp_path, capsys, arguments, message):
+    file = tmp_path / "r.csv"
+    file.write_text("time_s,input_angle_deg,output_angle_deg\n0,0,0\n")
+    with pytest.raises(SystemExit) as end:
+        main(["diagnose", str(file), *arguments])
+    assert end.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+def test_no_recordings():
+    with pytest.raises(HdoptError, match="at least one file"):
+        diagnose([])
