@@ -95,7 +95,7 @@ def _cell(value: Any, write: Callable[[Any], str]) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if _is_number(value):
-        return minus(write(value))
+        return minus(_without_sign_of_zero(write(value)))
     return str(value)
 
 
@@ -110,6 +110,11 @@ def _is_missing(value: Any) -> bool:
 def minus(text: str) -> str:
     """A leading hyphen as the minus sign that is as wide as a digit."""
     return "−" + text[1:] if text.startswith("-") else text
+
+
+def _without_sign_of_zero(text: str) -> str:
+    """'-0.000', what rounding leaves of a small number, as '0.000'."""
+    return text[1:] if text[:1] in "+-" and not text.strip("+-0.") else text
 
 
 def _formatter(spec: str) -> Callable[[Any], str]:

@@ -157,7 +157,7 @@ class Page:
         for x, y in self.evaluate(f"look.probes({index})"):
             for step in (1, 0):  # a mouse arrives, it does not appear
                 self._call("Input.dispatchMouseEvent", type="mouseMoved", x=x - step, y=y)
-            self.wait(0.12)
+            self.wait(0.08)
             if text := self.evaluate(f"look.label({index})"):
                 return text
         return ""
@@ -231,8 +231,10 @@ class Findings:
     files: tuple[Path, ...]
 
 
-def check_report(browser: Chromium, html: Path, folder: Path, no_hover: Sequence[str] = ()) -> Findings:
-    """Open `html` at both widths and on paper; pictures and PDF go to `folder`.
+def check_report(
+    browser: Chromium, html: Path, folder: Path, no_hover: Sequence[str] = (), pictures: bool = True
+) -> Findings:
+    """Open `html` at both widths and on paper; the PDF, and screenshots if `pictures`, go to `folder`.
 
     Looked for: messages in the console, requests of any kind, figures without marks, traces without points, figures
     whose hover shows no label (but `no_hover`, by key), anything wider than the screen, a PDF that is not one.
@@ -252,7 +254,7 @@ def check_report(browser: Chromium, html: Path, folder: Path, no_hover: Sequence
                 labels[figure["key"]] = page.hover_text(index)
         problems += [f"{key}: hovering shows no label" for key, text in labels.items() if not text]
         page.evaluate("scrollTo({top: 0, behavior: 'instant'})")
-        files = [page.screenshot(folder / "wide.png")]
+        files = [page.screenshot(folder / "wide.png")] if pictures else []
         pdf = page.print_pdf(folder / "report.pdf")
         files.append(pdf)
         pages = count_pages(pdf)
@@ -263,7 +265,8 @@ def check_report(browser: Chromium, html: Path, folder: Path, no_hover: Sequence
     with browser.open(html, NARROW) as page:
         problems += _figure_problems(page.figures(), "narrow")
         problems += [f"at {NARROW[0]} px: {overflow}" for overflow in page.evaluate("look.overflow()")]
-        files.append(page.screenshot(folder / "narrow.png"))
+        if pictures:
+            files.append(page.screenshot(folder / "narrow.png"))
         problems += page.errors + [f"requested {url}" for url in page.requests]
     return Findings(
         tuple(dict.fromkeys(problems)), tuple(f["key"] for f in drawn), labels, load_seconds, pages, tuple(files)

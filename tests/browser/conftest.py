@@ -37,7 +37,7 @@ def look_at(browser: Chromium, tmp_path: Path, request: pytest.FixtureRequest) -
     def look(html: Path, no_hover: tuple[str, ...] = ()) -> Findings:
         kept = os.environ.get("HDOPT_SCREENSHOTS")
         folder = Path(kept) / request.node.name if kept else tmp_path / "pictures"
-        findings = check_report(browser, html, folder, no_hover)
+        findings = check_report(browser, html, folder, no_hover, pictures=bool(kept))
         assert not findings.problems, "\n".join(findings.problems)
         return findings
 
