@@ -8,7 +8,8 @@ imports), so that a diagnosis cannot pass by agreeing with itself. A proof takes
     python -m tests.blind.score --dir DIR
 
 From Python: `suite.plan(seed)` gives specs, `cases.generate(spec)` a case (tables) and its key, `score.score(answers,
-keys)` the scores; `thresholds` holds the gate. From a motion to a file: `motion` (what the motor does), `bench` (the
-signal chain and the stages at which `hidden_*` physics acts), `instrument` (noise, resolution, gaps). `evidence` says
-of each case whether its records could decide at all: the key's `detectable` and `separable`.
+keys)` the scores, `proof.prove(diagnose, seed, share=0.05)` all three steps; `thresholds` holds the gate. From a motion
+to a file: `motion` (what the motor does), `bench` (the signal chain and the stages at which `hidden_*` physics acts),
+`instrument` (noise, resolution, gaps). `evidence` says of each case whether its records could decide at all: the key's
+`detectable` and `separable`.
 """

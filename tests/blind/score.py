@@ -26,12 +26,15 @@ from tests.blind.marking import (
 from tests.blind.scores import Bin, CaseScore, Rate, Scores
 
 
-def score(answers, keys):
-    """Scores of `answers` (id -> contract dictionary) against `keys` (dictionaries as the generator seals them)."""
+def score(answers, keys, raised=None):
+    """Scores of `answers` (id -> contract dictionary) against `keys` (dictionaries as the generator seals them).
+
+    `raised` (id -> message) says of cases without an answer why there is none.
+    """
     cases, invalid, coverage, statements = [], [], defaultdict(list), []
     for key in keys:
         answer = answers.get(key["id"])
-        problem = check_answer(answer)
+        problem = (raised or {}).get(key["id"]) or check_answer(answer)
         if problem:
             invalid.append(f"{key['id']}: {problem}")
             cases.append(_case(key, {"verdict": "invalid", "effects": []}, 0.0, problem, float("nan"), False))

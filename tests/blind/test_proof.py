@@ -1,0 +1,58 @@
+"""The three steps together, with stand-ins for the diagnosis whose scores are known beforehand."""
+
+import json
+import sys
+
+import pytest
+
+from tests.blind import answer, generate
+from tests.blind.proof import prove
+from tests.blind.score import read, score
+
+ADEQUATE = {"schema": 1, "verdict": "adequate", "effects": [], "ambiguous_with": [], "fit": {}}
+
+
+def test_who_always_says_adequate_raises_no_alarm_and_finds_nothing():
+    scores = prove(lambda recordings: ADEQUATE, seed=3, share=0.02)
+    assert scores.false_alarms.hits == 0 and scores.false_alarms.n == 6
+    assert scores.exact_gate[0] == 0 and scores.unknown_recall.hits == 0
+    assert scores.improvement[0] == 0 and not scores.passed
+
+
+def test_who_always_says_unknown_recognises_the_unknown_and_nothing_else():
+    scores = prove(lambda recordings: ADEQUATE | {"verdict": "unknown"}, seed=3, share=0.02)
+    assert scores.false_alarms.hits == scores.false_alarms.n == 6
+    assert scores.unknown_recall.value == 1 and scores.unknown_named.hits == 0 and scores.exact_gate[0] == 0
+
+
+def test_who_falls_over_is_shown():
+    def fall(recordings):
+        raise ZeroDivisionError(f"{len(recordings)} recordings")
+
+    scores = prove(fall, seed=3, families=("nothing",), share=0.01)
+    assert scores.false_alarms.hits == 3
+    assert "ZeroDivisionError" in scores.invalid[0]
+
+
+def test_the_commands_in_a_row(tmp_path, capsys):
+    generate.main(["--out", str(tmp_path), "--seed", "4", "--families", "nothing", "--nothing", "2", "--workers", "2"])
+    stand_in = tmp_path / "diagnose.py"
+    # The second case gets no answer, so that a failing command is seen to be reported.
+    stand_in.write_text(
+        "import json, sys\n"
+        "if 'case-0002' in sys.argv[1]: sys.exit('no idea')\n"
+        "assert sys.argv[sys.argv.index('--drive') + 1] == 'csf-25-80'\n"
+        f"json.dump({ADEQUATE!r}, open(sys.argv[sys.argv.index('--json') + 1], 'w'))\n"
+    )
+    status = answer.main(["--dir", str(tmp_path), "--", sys.executable, str(stand_in)])
+    said = capsys.readouterr()
+    assert status == 1 and "1 of 2 cases answered" in said.out
+    assert "case-0002: exit status 1: no idea" in said.err
+    assert json.loads((tmp_path / "answers" / "case-0001.json").read_text()) == ADEQUATE
+    scores = score(*read(tmp_path))
+    assert scores.false_alarms.hits == 1 and scores.invalid == ("case-0002: no answer",)
+
+
+def test_shares_keep_a_part_of_every_family():
+    with pytest.raises(ValueError, match="unknown family"):
+        prove(lambda recordings: ADEQUATE, seed=0, families=("nothing", "everything"))
