@@ -199,7 +199,10 @@ class _Cam(_Carrier):
         half = self.width / 2
         faces = ((half, 1),) if slot else ((-half, -1), (half, 1))
         body = Prism(self.contour, -half, half, bottom_edge, top_edge)
-        return (Part("cam", STEEL, (body,), bore, self.countersink(), faces, slot, bolts, self.contour),)
+        sliding = slot is not None
+        return (
+            Part("cam", STEEL, (body,), bore, self.countersink(), faces, slot, bolts, self.contour, False, sliding),
+        )
 
     def integral_parts(self) -> tuple[Part, ...]:
         # The keyway lies on the major axis, where the wall is thickest, and so marks that axis.
@@ -209,14 +212,9 @@ class _Cam(_Carrier):
         seat = self.take("hub_seat_mm", lambda: 2.0 * math.ceil(bore.reach + self.wall)) / 2
         bore = self.shaft_bore(MAJOR, seat, "hub")
         clearance, tap = THREADS[self._thread()]
+        self._require_hub_room(seat)
         bolts = self._bolts(seat, clearance, 6)
         flange = seat + self.wall if bolts is None else bolts.radius + bolts.hole / 2 + self.wall
-        if seat + self.wall > self.room or flange > self.room:
-            raise HdoptError(
-                f"the hub (seat {2 * seat:.4g} mm, flange {2 * flange:.4g} mm) is larger than the cam's largest inner "
-                f"circle allows ({2 * self.room:.4g} mm, wall {self.wall:g} mm); give a smaller export.bore_mm, or "
-                "export.hub = false to bore the cam itself"
-            )
         thickness = self.take("hub_flange_thickness_mm", lambda: max(1.0, round(0.8 * self.width) / 2))
         half, edge = self.width / 2, BrokenEdge.chamfer(self.take("chamfer_mm"))
         body = (
@@ -227,6 +225,14 @@ class _Cam(_Carrier):
         faces = ((-half - thickness, -1), (half, 1))
         hub = Part("hub", DARK_STEEL, body, bore, self.countersink(), faces, bolts=tapped)
         return (hub, *self.parts(PlainBore(seat), bolts))
+
+    def _require_hub_room(self, seat: float) -> None:
+        if seat + self.wall > self.room:
+            raise HdoptError(
+                f"the hub's seat of {2 * seat:.4g} mm is larger than the cam allows: {2 * (self.room - self.wall):.4g} "
+                f"mm, with a wall of {self.wall:g} mm; give a smaller export.bore_mm, or export.hub = false to bore "
+                "the cam itself"
+            )
 
     def _thread(self) -> str:
         return self.take(
@@ -242,8 +248,8 @@ class _Cam(_Carrier):
         if not low <= radius <= high:
             raise HdoptError(
                 f"a bolt circle of {2 * radius:.4g} mm with {hole:g} mm holes does not fit: between the bore or seat "
-                f"and the rim it may have {2 * low:.4g} to {2 * high:.4g} mm; change export.bolt_circle_mm, "
-                "export.bolt_thread or export.bolt_count"
+                f"and the rim it may have {2 * low:.4g} to {2 * high:.4g} mm; change export.bore_mm, "
+                "export.bolt_circle_mm, export.bolt_thread or export.bolt_count"
             )
         if 2 * radius * math.sin(math.pi / count) < 1.5 * hole and count > 1:
             raise HdoptError(f"{count} holes of {hole:g} mm run into each other; give fewer in export.bolt_count")
@@ -299,7 +305,8 @@ class _TwoDiscs(_Carrier):
             Prism(Circle(journal, -self.offset), 0.0, half, top_edge=chamfer),
         )
         faces = ((half, 1),) if slot else ((step - thickness, -1), (half, 1))
-        hub = Part("eccentric_hub", DARK_STEEL, body, bore, self.countersink(), faces, slot)
+        sliding = slot is not None
+        hub = Part("eccentric_hub", DARK_STEEL, body, bore, self.countersink(), faces, slot, clearance_hole=sliding)
         hole = journal + self.take("journal_clearance_mm")
         bottom_edge, top_edge = self.outer_edges()
         discs = tuple(
@@ -435,7 +442,7 @@ class _CrossSlide:
             Tongue(self.radius, self.widths[2] - self.clearance, MINOR, top, top + self.depth),
         )
         slot = Slot(self.widths[1], self.depth, self.radius, MAJOR, self.radius, closed=False)
-        return Part("floating_disc", GREEN, body, bore, slot=slot)
+        return Part("floating_disc", GREEN, body, bore, slot=slot, clearance_hole=True)
 
     def input_disc(self, back: float) -> Part:
         """The disc on the shaft; its keyway lies across the block, which it would otherwise cut in two."""

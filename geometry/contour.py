@@ -201,18 +201,15 @@ def _profile_area(curve: ParallelCurve) -> float:
 
 def _support(profile: WaveGeneratorProfile, direction_deg: float) -> float:
     """How far the profile reaches in a direction, mm."""
-    from scipy.optimize import minimize_scalar
-
     direction = math.radians(direction_deg)
-
-    def reach(phi: ArrayLike) -> Array:
-        return profile.radius(phi) * np.cos(np.asarray(phi) - direction)
-
-    step = 2 * math.pi / _GRID
-    near = direction + step * np.arange(-_GRID // 4, _GRID // 4)
-    start = near[np.argmax(reach(near))]
-    best = minimize_scalar(lambda phi: -float(reach(phi)), bounds=(start - step, start + step), method="bounded")
-    return max(-float(best.fun), float(reach(start)))
+    near = direction + 2 * math.pi / _GRID * np.arange(-_GRID // 4, _GRID // 4)
+    phi = float(near[np.argmax(profile.radius(near) * np.cos(near - direction))])
+    for _ in range(4):
+        # Newton's method for the angle at which r cos(phi - direction) has no slope.
+        r, r1, r2 = (float(profile.radius(phi, order)) for order in (0, 1, 2))
+        cos, sin = math.cos(phi - direction), math.sin(phi - direction)
+        phi -= (r1 * cos - r * sin) / ((r2 - r) * cos - 2 * r1 * sin)
+    return float(profile.radius(phi)) * math.cos(phi - direction)
 
 
 def _dot(a: Array, b: Array) -> Array:

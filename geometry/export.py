@@ -18,8 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hdopt.drive import Drive
-from hdopt.errors import HdoptError
+from hdopt.errors import HdoptError, unknown_name
 from hdopt.geometry.assembly import WaveGeneratorModel, wave_generator_model
+from hdopt.geometry.dimensions import Dimension, key_dimensions, tolerance_bounds
 from hdopt.geometry.formats import FORMATS
 from hdopt.geometry.step import Identity
 from hdopt.study.export import ExportSection
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     import cadquery as cq
 
     from hdopt.geometry.part import Part
+    from hdopt.study import Study
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,7 @@ class Job:
     drive: Drive
     model: WaveGeneratorModel
     options: ExportSection
+    dimensions: tuple[Dimension, ...]
     identity: Identity
 
     @cached_property
@@ -51,7 +54,14 @@ class ExportResult:
     files: Mapping[str, Path]
     checks: Mapping[str, Mapping[str, Any]]
     model: WaveGeneratorModel
+    dimensions: tuple[Dimension, ...]
     identity: Identity
+
+    @property
+    def profile_deviation_um(self) -> float | None:
+        """Largest deviation of a profile in any file from its analytic curve, um; None where no file shows one."""
+        found = [check.get("max_profile_deviation_um") for check in self.checks.values()]
+        return max((value for value in found if value is not None), default=None)
 
     def to_dict(self) -> dict[str, Any]:
         step = self.checks.get("step", {})
@@ -65,7 +75,8 @@ class ExportResult:
             "files": {kind: str(path) for kind, path in self.files.items()},
             "structure": self.model.structure.value,
             "parts": parts,
-            "max_profile_deviation_um": step.get("max_profile_deviation_um"),
+            "max_profile_deviation_um": self.profile_deviation_um,
+            "dimensions": [dimension.to_dict() for dimension in self.dimensions],
             "checks": dict(self.checks),
             "assumptions": {assumption.key: assumption.value for assumption in self.model.assumptions},
             "notes": list(self.model.notes),
@@ -74,32 +85,58 @@ class ExportResult:
 
 
 def export(
-    drive: Drive, files: Mapping[str, str | Path], options: ExportSection | None = None, name: str = "wave generator"
+    study: Study, files: Mapping[str, str | Path], tolerances: Mapping[str, float] | None = None
 ) -> ExportResult:
-    """Write the wave generator of `drive` to `files` (a key of `FORMATS` -> path) and check each file from disk.
+    """Write a study's wave generator to `files` (a key of `FORMATS` -> path) and check each file from disk.
 
-    `name` is the study's. Raises `HdoptError` for input that cannot be made, and `hdopt.geometry.check.CheckFailed`
-    where a file fails its check: then no file of this export is left.
+    `tolerances` are those of an allocation, by study key (mm or deg) or contributor; without them the study's own hold.
+    Raises `HdoptError` for input that cannot be made, and `hdopt.geometry.check.CheckFailed` where a file fails its
+    check: then no file of this export is left.
     """
+    section = study.sections.get("export", ExportSection())
+    bounds = {**tolerance_bounds(study.data), **(tolerances or {})}
+    return export_drive(study.drive, files, section, study.name, bounds, study.data.get("contributors"))
+
+
+def export_drive(
+    drive: Drive,
+    files: Mapping[str, str | Path],
+    options: ExportSection | None = None,
+    name: str = "wave generator",
+    bounds: Mapping[str, float] | None = None,
+    contributors: Mapping[str, Any] | None = None,
+) -> ExportResult:
+    """The same for a drive at hand; `name` is what the files call their study."""
     options = options or ExportSection()
     for kind in files:
         if kind not in FORMATS:
-            from hdopt.errors import unknown_name
-
             raise HdoptError(unknown_name("file format", kind, FORMATS))
     targets = {kind: Path(path) for kind, path in files.items()}
     if len({path.resolve() for path in targets.values()}) < len(targets):
         raise HdoptError("two files of the export have the same name; give each its own")
-    model = wave_generator_model(drive, options)
-    identity = Identity(f"wave generator {name}", name, fingerprint(drive, options), version("hdopt"))
-    job = Job(drive, model, options, identity)
+    job = make_job(drive, options, name, bounds, contributors)
     checks = {}
     with staged(targets) as passing:
         for kind, path in passing.items():
             FORMATS[kind].write(path, job)
         for kind, path in passing.items():
             checks[kind] = FORMATS[kind].check(path, job, targets[kind].name)
-    return ExportResult(targets, checks, model, identity)
+    return ExportResult(targets, checks, job.model, job.dimensions, job.identity)
+
+
+def make_job(
+    drive: Drive,
+    options: ExportSection,
+    name: str,
+    bounds: Mapping[str, float] | None = None,
+    contributors: Mapping[str, Any] | None = None,
+) -> Job:
+    """Everything that is known before a solid is made: the parts, their key dimensions, and what files will say."""
+    model = wave_generator_model(drive, options)
+    identity = Identity(f"wave generator {name}", name, fingerprint(drive, options), version("hdopt"))
+    width, zone = drive.wave_generator.width, options.profile_tolerance_mm
+    table = key_dimensions(model.structure, model.parts, width, zone, bounds or {}, contributors)
+    return Job(drive, model, options, table, identity)
 
 
 def fingerprint(drive: Drive, options: ExportSection) -> str:
@@ -131,7 +168,8 @@ def staged(targets: Mapping[str, Path]) -> Iterator[dict[str, Path]]:
             os.replace(path, targets[kind])
     finally:
         for path in passing.values():
-            path.unlink(missing_ok=True)
+            if path.exists():
+                path.unlink()
 
 
 def _require_writable(passing: Path, target: Path) -> None:

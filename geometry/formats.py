@@ -36,5 +36,47 @@ class Step:
         return check_step(read_step(path), job.model, job.identity, job.options.step_schema, name).to_dict()
 
 
-FORMATS: dict[str, Format] = {"step": Step()}
+class Dxf:
+    description = "DXF of the profile for wire cutting, with bore and tolerance zone"
+
+    def write(self, path: Path, job: Job) -> None:
+        from hdopt.geometry.dxf import write_dxf
+
+        write_dxf(path, job)
+
+    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+        from hdopt.geometry.dxf import check_dxf
+
+        return check_dxf(path, job, name)
+
+
+class Stl:
+    description = "STL mesh of all parts in their places, for printing"
+
+    def write(self, path: Path, job: Job) -> None:
+        from hdopt.geometry.mesh import write_stl
+
+        write_stl(path, job)
+
+    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+        from hdopt.geometry.mesh import check_stl
+
+        return check_stl(path, job, name)
+
+
+class ThreeMf:
+    description = "3MF mesh with named, coloured parts, for printing"
+
+    def write(self, path: Path, job: Job) -> None:
+        from hdopt.geometry.mesh import write_3mf
+
+        write_3mf(path, job)
+
+    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+        from hdopt.geometry.mesh import check_3mf
+
+        return check_3mf(path, job, name)
+
+
+FORMATS: dict[str, Format] = {"step": Step(), "dxf": Dxf(), "stl": Stl(), "3mf": ThreeMf()}
 """Format -> what writes and checks it; the names are the options of `hdopt export`."""

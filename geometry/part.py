@@ -120,6 +120,8 @@ class Part:
     bolts: BoltCircle | None = None
     contour: Contour | None = None
     context: bool = False
+    clearance_hole: bool = False
+    """Whether the bore passes the shaft without holding it."""
 
     @property
     def walls(self) -> tuple[Contour, ...]:

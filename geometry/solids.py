@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from functools import singledispatch
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hdopt.errors import HdoptError
-from hdopt.geometry.contour import Circle, Contour, ParallelCurve
+from hdopt.geometry.contour import Array, Circle, Contour, ParallelCurve
 
 if TYPE_CHECKING:
     import cadquery as cq
+    from OCP.Geom import Geom_BSplineCurve
     from OCP.TopoDS import TopoDS_Wire
 
 BUILD_TOLERANCE = 1e-6
@@ -61,16 +62,9 @@ def _(contour: ParallelCurve, stations: Sequence[Station]) -> cq.Solid:
 
 def spans_needed(curve: ParallelCurve) -> int:
     """Spline spans for one turn that keep the spline within `BUILD_TOLERANCE` of the curve, measured between points."""
-    from scipy.interpolate import BSpline
-
-    spans = 64
+    spans, worst = 64, math.inf
     while spans <= MOST_SPANS:
-        worst = 0.0
-        for start, end in zip(curve.breaks[:-1], curve.breaks[1:], strict=True):
-            knots, coefficients = spline_piece(curve, start, end, spans)
-            spline = BSpline(_full_knots(knots), coefficients, 3)
-            between = knots[:-1, None] + np.diff(knots)[:, None] * np.array([0.21, 0.5, 0.79])
-            worst = max(worst, np.abs(curve.deviation(spline(between.ravel()))).max())
+        worst = max(_error_between(curve, start, end, spans) for start, end in _pieces(curve))
         if worst <= BUILD_TOLERANCE:
             return spans
         spans *= 2
@@ -80,20 +74,44 @@ def spans_needed(curve: ParallelCurve) -> int:
     )
 
 
-def spline_piece(curve: ParallelCurve, start: float, end: float, spans: int) -> tuple[NDArray, NDArray]:
-    """Knots and control points of the cubic spline for one smooth piece of a curve, exact in end tangents."""
-    from scipy.interpolate import make_interp_spline
-
-    count = max(8, math.ceil(spans * (end - start) / (2 * math.pi)))
-    phi = np.linspace(start, end, count + 1)
-    # Ends are approached from inside the piece: at its ends the third derivative may jump.
-    tangents = curve.tangents([start, end])
-    spline = make_interp_spline(phi, curve.points(phi), k=3, bc_type=([(1, tangents[0])], [(1, tangents[1])]))
-    return phi, spline.c
+def _pieces(curve: ParallelCurve) -> list[tuple[float, float]]:
+    return list(itertools.pairwise(curve.breaks.tolist()))
 
 
-def _full_knots(knots: NDArray) -> NDArray:
-    return np.concatenate([[knots[0]] * 3, knots, [knots[-1]] * 3])
+def _parameters(start: float, end: float, spans: int) -> Array:
+    """The angles at which a piece of a curve is held, for so many spans in a whole turn."""
+    return np.linspace(start, end, max(8, math.ceil(spans * (end - start) / (2 * math.pi))) + 1)
+
+
+def _spline(curve: ParallelCurve, start: float, end: float, spans: int, z: float) -> Geom_BSplineCurve:
+    """The cubic spline through points of one smooth piece, with the curve's end tangents; its parameter is phi.
+
+    Both tangents are the curve's own, so neighbouring pieces join smoothly although the third derivative jumps there.
+    """
+    from OCP.GeomAPI import GeomAPI_Interpolate
+    from OCP.gp import gp_Pnt, gp_Vec
+    from OCP.TColgp import TColgp_HArray1OfPnt
+    from OCP.TColStd import TColStd_HArray1OfReal
+
+    phi = _parameters(start, end, spans)
+    points, parameters = TColgp_HArray1OfPnt(1, len(phi)), TColStd_HArray1OfReal(1, len(phi))
+    for index, ((x, y), angle) in enumerate(zip(curve.points(phi).tolist(), phi.tolist(), strict=True), 1):
+        points.SetValue(index, gp_Pnt(x, y, z))
+        parameters.SetValue(index, angle)
+    interpolation = GeomAPI_Interpolate(points, parameters, False, 1e-9)
+    first, last = (gp_Vec(x, y, 0.0) for x, y in curve.tangents([start, end]).tolist())
+    interpolation.Load(first, last, False)
+    interpolation.Perform()
+    return interpolation.Curve()
+
+
+def _error_between(curve: ParallelCurve, start: float, end: float, spans: int) -> float:
+    """Largest distance of the spline from the curve at points between those that it was made from, mm."""
+    spline = _spline(curve, start, end, spans, 0.0)
+    phi = _parameters(start, end, spans)
+    between = phi[:-1, None] + np.diff(phi)[:, None] * np.array([0.21, 0.5, 0.79])
+    points = [spline.Value(angle) for angle in between.ravel().tolist()]
+    return float(np.abs(curve.deviation([(point.X(), point.Y()) for point in points])).max())
 
 
 def _wire(curve: ParallelCurve, z: float, spans: int) -> TopoDS_Wire:
@@ -101,29 +119,11 @@ def _wire(curve: ParallelCurve, z: float, spans: int) -> TopoDS_Wire:
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeVertex, BRepBuilderAPI_MakeWire
     from OCP.gp import gp_Pnt
 
-    pieces = list(zip(curve.breaks[:-1], curve.breaks[1:], strict=True))
-    corners = [
-        BRepBuilderAPI_MakeVertex(gp_Pnt(*map(float, curve.points(start)[0]), z)).Vertex() for start, _ in pieces
-    ]
+    pieces = _pieces(curve)
+    corners = [BRepBuilderAPI_MakeVertex(gp_Pnt(*curve.points(start)[0].tolist(), z)).Vertex() for start, _ in pieces]
     wire = BRepBuilderAPI_MakeWire()
     for index, (start, end) in enumerate(pieces):
-        spline = _occ_spline(*spline_piece(curve, start, end, spans), z)
+        spline = _spline(curve, start, end, spans, z)
         edge = BRepBuilderAPI_MakeEdge(spline, corners[index], corners[(index + 1) % len(corners)])
         wire.Add(edge.Edge())
     return wire.Wire()
-
-
-def _occ_spline(knots: NDArray, points: NDArray, z: float):
-    from OCP.Geom import Geom_BSplineCurve
-    from OCP.gp import gp_Pnt
-    from OCP.TColgp import TColgp_Array1OfPnt
-    from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal
-
-    poles = TColgp_Array1OfPnt(1, len(points))
-    for index, (x, y) in enumerate(points.tolist(), 1):
-        poles.SetValue(index, gp_Pnt(x, y, z))
-    values, multiplicities = TColStd_Array1OfReal(1, len(knots)), TColStd_Array1OfInteger(1, len(knots))
-    for index, knot in enumerate(knots.tolist(), 1):
-        values.SetValue(index, knot)
-        multiplicities.SetValue(index, 4 if index in (1, len(knots)) else 1)
-    return Geom_BSplineCurve(poles, values, multiplicities, 3)

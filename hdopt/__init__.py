@@ -19,6 +19,7 @@ _EXPORTS: dict[str, str] = {
     "run_study": "hdopt.run",
     "diagnose": "hdopt.diagnosis",
     "read_recording": "hdopt.recording",
+    "export": "hdopt.geometry.export",
     "HdoptError": "hdopt.errors",
 }
 """Public name -> the module that has it."""

@@ -17,6 +17,7 @@ COMMANDS: dict[str, str] = {
     "sobol": "Which tolerances matter: Sobol' indices with intervals, Shapley effects where inputs are correlated.",
     "allocate": "Least-cost tolerances that keep the requirement, verified.",
     "diagnose": "What physics recordings of a drive hold that the model leaves out.",
+    "export": "The wave generator as checked STEP, DXF, STL and 3MF files.",
     "run": "Everything a study file asks for, with report.html.",
     "studies": "The shipped studies, a line each.",
 }

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from hdopt.study.base import Section
 
 _Length = float | None
 
 
-class ExportSection(BaseModel):
-    """Sizes in mm, angles in degrees, as a study file gives them."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+class ExportSection(Section):
+    """[export]"""
 
     bore_mm: _Length = Field(None, gt=0, description="preferred size next to a quarter of the cam's minor diameter")
     mount: Literal["keyway", "d_bore", "plain"] = Field("keyway", description="keyway of DIN 6885-1")

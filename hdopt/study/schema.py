@@ -27,6 +27,7 @@ SECTIONS: dict[str, str] = {
     "published": "hdopt.study.published:PublishedSection",
     "linear_stack": "hdopt.study.tolerances:LinearStackSection",
     "allocate": "hdopt.study.costs:AllocateSection",
+    "export": "hdopt.study.export:ExportSection",
 }
 """Section -> where its model is; a model is imported only when a study has the section."""
 

@@ -7,13 +7,19 @@ from dataclasses import replace
 import cadquery as cq
 import numpy as np
 import pytest
-from conftest import drive
+from wave_generators import drive
 
 from hdopt.drive import Structure
 from hdopt.geometry.assembly import wave_generator_model
 from hdopt.geometry.check import PROFILE_TOLERANCE, interferences
 from hdopt.geometry.step import read_step
 from hdopt.study.export import ExportSection
+
+QUICK = {
+    *(("ellipse", structure) for structure in Structure),
+    *((profile, Structure.INTEGRAL) for profile in ("resal", "two_disk", "measured")),
+    ("two_disk", Structure.AUTOMATIC),
+}
 
 PARTS = {
     Structure.INTEGRAL: ["hub", "cam"],
@@ -23,8 +29,16 @@ PARTS = {
 }
 
 
-@pytest.mark.parametrize("structure", Structure)
-@pytest.mark.parametrize("profile", ["ellipse", "resal", "two_disk", "measured"])
+EVERY_PROFILE_AND_STRUCTURE = [
+    # The parallel curve is the same whatever hangs on it: the quick checks take each structure and each profile once.
+    pytest.param(profile, structure, marks=[] if quick else pytest.mark.slow)
+    for profile in ("ellipse", "resal", "two_disk", "measured")
+    for structure in Structure
+    for quick in [(profile, structure) in QUICK]
+]
+
+
+@pytest.mark.parametrize(("profile", "structure"), EVERY_PROFILE_AND_STRUCTURE)
 def test_every_profile_and_structure_passes_its_check(exported, profile, structure):
     result = exported(profile, structure)
     names = [part["name"] for part in result.to_dict()["parts"]]
@@ -87,6 +101,7 @@ def test_interference_is_found(exported):
     assert "floating_disc and cam overlap" in interferences(moved("cam", 0, 0, -0.101))[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("profile", ["ellipse", "two_disk"])
 def test_context_stands_around_without_touching(exported, profile):
     result = exported(profile, context=True)
