@@ -55,7 +55,6 @@ class StepPlace:
 ONE_DRIVE = ("drive", "errors")
 
 STEPS: dict[str, StepPlace] = {
-    "published": StepPlace("hdopt.steps.published:published", ("published",)),
     "waveform": StepPlace("hdopt.steps.waveform:waveform", ONE_DRIVE),
     "orders": StepPlace("hdopt.steps.waveform:orders", ONE_DRIVE),
     "lag": StepPlace("hdopt.steps.waveform:lag", ONE_DRIVE),
@@ -63,6 +62,7 @@ STEPS: dict[str, StepPlace] = {
     "profiles": StepPlace("hdopt.steps.profiles:profiles", ONE_DRIVE),
     "sensitivities": StepPlace("hdopt.steps.design:sensitivities", ONE_DRIVE),
     "design_map": StepPlace("hdopt.steps.design:design_map", ONE_DRIVE),
+    "paper_reproduction": StepPlace("hdopt.studies.paper_reproduction:paper_reproduction"),
 }
 """Every step, in the order of a report; a step is imported only when a study asks for it."""
 

@@ -24,7 +24,6 @@ SECTIONS: dict[str, str] = {
     "tolerances": "hdopt.study.tolerances:TolerancesSection",
     "requirement": "hdopt.study.tolerances:RequirementSection",
     "contributors": "hdopt.study.tolerances:ContributorsSection",
-    "published": "hdopt.study.published:PublishedSection",
     "linear_stack": "hdopt.study.tolerances:LinearStackSection",
     "allocate": "hdopt.study.costs:AllocateSection",
     "export": "hdopt.study.export:ExportSection",

@@ -71,7 +71,7 @@ def test_a_study_lists_its_steps(tmp_path, study):
     ("steps", "message"),
     [
         ('["wavefrom"]', r"mine.toml, line 3, study.steps: unknown step 'wavefrom'; did you mean 'waveform'"),
-        ("[]", r"mine.toml, line 3, study.steps: is empty; name at least one of published, waveform"),
+        ("[]", r"mine.toml, line 3, study.steps: is empty; name at least one of waveform, orders"),
     ],
 )
 def test_steps_that_cannot_be_done_are_refused_before_anything_runs(steps, message, tmp_path):
@@ -139,24 +139,3 @@ def test_a_listed_step_with_a_missing_number_is_refused(tmp_path):
     (tmp_path / "mine.toml").write_text(MINIMAL + '[study]\nsteps = ["lag"]\n')
     with pytest.raises(HdoptError, match=r"the lag needs clearances.backlash_mm"):
         run_study(load_study(tmp_path / "mine.toml"), tmp_path / "out")
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("a,b\n", "the first line must read table,case,quantity,published,sampling_deg,set"),
-        ("{h}T,c,peak_to_peek_arcmin,1,10,\n", "line 2: unknown quantity 'peak_to_peek_arcmin'; did you mean"),
-        ("{h}T,c,contact_angle_deg,one,10,\n", "line 2: published and sampling_deg must be numbers"),
-        ("{h}T,c,contact_angle_deg,1,10,no_such_key=1\n", "--set unknown key 'no_such_key'"),
-    ],
-)
-def test_a_file_of_published_numbers_that_cannot_be_used_says_where(content, message, tmp_path):
-    (tmp_path / "numbers.csv").write_text(content.format(h="table,case,quantity,published,sampling_deg,set\n"))
-    (tmp_path / "mine.toml").write_text('drive = "csf-25-80"\n[published]\nfile = "numbers.csv"\nsource = "S"\n')
-    with pytest.raises(HdoptError, match=message):
-        find_step("published")(load_study(tmp_path / "mine.toml"), Context(tmp_path))
-
-
-def test_the_step_published_needs_its_section(study, tmp_path):
-    with pytest.raises(HdoptError, match=r"the step 'published' needs a \[published\] section"):
-        find_step("published")(study, Context(tmp_path))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdopt.report import Figure, KeyFigures, Section, Table, Text
+from hdopt.report import Figure, KeyFigures, Section, Table
 from hdopt.report.theme import BLUE, GREY, INK, VERMILLION, faded, figure
 
 if TYPE_CHECKING:
@@ -21,14 +20,13 @@ def published_section(
     source: str,
     sampling: str = "10 deg over 80 turns",
     tolerance_arcmin: float = 0.02,
-    remarks: Sequence[str] = (),
     key: str = "published",
 ) -> Section:
     """Each published value with its re-computation.
 
     `frame` has a row a case: `case`, `published_arcmin`, `sampled_arcmin` (computed on the published sampling) and
     `converged_arcmin` (nan where it has no meaning); further columns are shown in the table. `sampling` names that
-    sampling, `source` the publication; `remarks` are paragraphs shown as they are.
+    sampling, `source` the publication.
     """
     difference = (frame["sampled_arcmin"] - frame["published_arcmin"]).rename("difference_arcmin")
     excess = 100 * (frame["converged_arcmin"] / frame["sampled_arcmin"] - 1)
@@ -47,7 +45,6 @@ def published_section(
                     "Converged above sampled": f"{np.nanmedian(excess):.1f} %",
                 }
             ),
-            *(Text(remark) for remark in remarks),
             Figure(
                 f"{key}-cases",
                 "Published, sampled as published, and converged",
