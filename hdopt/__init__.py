@@ -20,6 +20,7 @@ _EXPORTS: dict[str, str] = {
     "diagnose": "hdopt.diagnosis",
     "read_recording": "hdopt.recording",
     "export": "hdopt.geometry.export",
+    "search": "hdopt.trade",
     "HdoptError": "hdopt.errors",
 }
 """Public name -> the module that has it."""

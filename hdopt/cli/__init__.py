@@ -18,6 +18,7 @@ COMMANDS: dict[str, str] = {
     "allocate": "Least-cost tolerances that keep the requirement, verified.",
     "diagnose": "What physics recordings of a drive hold that the model leaves out.",
     "export": "The wave generator as checked STEP, DXF, STL and 3MF files.",
+    "search": "Which design: the best under limits, fronts, and what the choice costs.",
     "run": "Everything a study file asks for, with report.html.",
     "studies": "The shipped studies, a line each.",
 }

@@ -1,0 +1,86 @@
+"""Fronts between two quantities: one is minimised while the other is held to a falling limit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hdopt.trade.problem import DesignProblem, Limit
+from hdopt.trade.quantities import find_quantity
+from hdopt.trade.solve import Method, Solution, solve
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+
+KEPT_EQUAL = 1e-9
+"""Relative difference below which two values count as equal."""
+
+
+def front(problem: DesignProblem, second: str, points: int, method: Method, best: Solution) -> list[Solution]:
+    """Feasible designs between the least objective (`best`) and the best of the quantity `second`.
+
+    Epsilon-constraint: the second quantity's limit is moved in even steps from what the best design has to the best it
+    can be, and each search starts from its neighbour's design. Not yet freed of dominated points.
+    """
+    quantity = find_quantity(second)
+    other = _with_objective(problem, second)
+    extreme = solve(other, method, [best.values]) if quantity.small_is_good else None
+    if extreme is None or not extreme.feasible:
+        return [best]
+    design = problem.space.design(problem.combination, best.values)
+    high, low = quantity.value(problem.trade, design), extreme.objective
+    found = [best]
+    for bound in np.linspace(high, low, points)[1:]:
+        limited = problem.with_limits(Limit(second, float(bound) + abs(low) * KEPT_EQUAL))
+        solution = solve(limited, method, [found[-1].values])
+        if not solution.feasible:
+            solution = solve(limited, method, [extreme.values])
+        if solution.feasible:
+            found.append(solution)
+        if solution.outcome.interrupted:
+            break
+    return found
+
+
+def _with_objective(problem: DesignProblem, objective: str) -> DesignProblem:
+    from dataclasses import replace
+
+    limits = tuple(limit for limit in problem.limits if limit.quantity != objective)
+    return replace(problem, objective=objective, limits=limits)
+
+
+def non_dominated(points: ArrayLike) -> Array:
+    """Which rows of `points` (n, d), small is good, no other row beats in everything: boolean (n,).
+
+    Of rows that are equal the first stays.
+    """
+    points = np.asarray(points, float)
+    kept = np.ones(len(points), bool)
+    for i, point in enumerate(points):
+        no_worse = (points <= point).all(axis=1)
+        better = no_worse & (points < point).any(axis=1)
+        equal_before = no_worse & (points == point).all(axis=1) & (np.arange(len(points)) < i)
+        kept[i] = not (better.any() or equal_before.any())
+    return kept
+
+
+def pareto(items: Iterable[T], points: Sequence[Sequence[float]]) -> list[T]:
+    """The non-dominated of `items`, sorted by the first coordinate of their `points`."""
+    items, points = list(items), np.asarray(points, float).reshape(-1, 2)
+    chosen = np.flatnonzero(non_dominated(points))
+    return [items[i] for i in chosen[np.argsort(points[chosen, 0])]]
+
+
+def hypervolume(points: ArrayLike, reference: Sequence[float]) -> float:
+    """Area between the `points` (n, 2), small is good, and a `reference` point that is worse in both."""
+    points = np.asarray(points, float).reshape(-1, 2)
+    points = points[(points < np.asarray(reference)).all(axis=1)]
+    if len(points) == 0:
+        return 0.0
+    points = points[non_dominated(points)]
+    points = points[np.argsort(points[:, 0])]
+    right = np.append(points[1:, 0], reference[0])
+    return float(np.sum((right - points[:, 0]) * (reference[1] - points[:, 1])))
