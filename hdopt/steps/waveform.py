@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from hdopt.kinematics import peak_to_peak_arcmin
 from hdopt.kinematics.lag import lag as lag_of
 from hdopt.kinematics.waveform import relative_turn
@@ -50,10 +48,10 @@ def orders(study: Study, context: Context) -> StepResult:
 
 
 def lag(study: Study, context: Context) -> StepResult:
-    """Lag at reversal over one input turn, with the clearances it is made of."""
+    """Lag at reversal over one full relative turn, with the clearances it is made of."""
     theta, error = relative_turn(study.drive, study.errors, SAMPLES_PER_TURN)
     whole = lag_of(study.drive, study.errors, theta, error)
-    turn = theta <= 2 * math.pi
-    parts = {"Tooth backlash": whole.backlash_arcmin[turn], "Cross-slide": whole.cross_slide_arcmin[turn]}
+    parts = {"Tooth backlash": whole.backlash_arcmin, "Cross-slide": whole.cross_slide_arcmin}
     shown = {name: values for name, values in parts.items() if values.any()}
-    return StepResult((lag_section(theta[turn], whole.total_arcmin[turn], shown),), whole.to_dict())
+    section = lag_section(theta, whole.total_arcmin, shown, whole.interference)
+    return StepResult((section,), whole.to_dict())

@@ -104,11 +104,22 @@ def test_the_tornado_puts_the_strongest_on_top_and_bars_end_at_the_values():
 
 def test_lag_below_zero_is_interference_and_said():
     theta = np.linspace(0, 2 * np.pi, 361)
-    free = lag_section(theta, 1 + 0.1 * np.sin(theta), {"backlash": 1 + 0.1 * np.sin(theta)})
-    assert "no play" not in free.summary
-    tight = lag_section(theta, np.sin(theta) - 1e-9, {"backlash": np.sin(theta)})
-    assert "over 50 % of the turn the teeth have no play at all" in tight.summary
+    free = lag_section(theta, 1 + 0.1 * np.sin(theta), {"backlash": 1 + 0.1 * np.sin(theta)}, 0.0)
+    assert "interfere" not in free.summary
+    tight = lag_section(theta, np.sin(theta) - 1e-9, {"backlash": np.sin(theta)}, 0.5)
+    assert "over 50 % of the angles the flanks interfere" in tight.summary
     assert key_figures(tight)["Smallest"] == "-1.000 arcmin"
+
+
+def test_lag_of_several_turns_is_the_first_within_the_band_of_all():
+    theta = np.arange(3 * 360) * (2 * np.pi / 360)
+    values = np.sin(theta) + np.floor(theta / (2 * np.pi) + 1e-9)
+    section = lag_section(theta, values, {"Tooth backlash": values}, 0.0)
+    lowest, highest, first = item(section, "lag-turn").figure.data
+    assert np.allclose(lowest.y, np.sin(theta[:360]))
+    assert np.allclose(highest.y, np.sin(theta[:360]) + 2)
+    assert np.allclose(first.y[:360], lowest.y)
+    assert key_figures(section)["Largest"] == "3.000 arcmin"
 
 
 def test_published_values_are_counted_against_the_tolerance():

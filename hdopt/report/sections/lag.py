@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hdopt.report import Figure, KeyFigures, Section
 from hdopt.report.sections.words import label
-from hdopt.report.theme import INK, PALETTE, VERMILLION, faded, figure
+from hdopt.report.theme import GREY, INK, PALETTE, VERMILLION, faded, figure
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -20,17 +20,19 @@ def lag_section(
     theta: NDArray[np.float64],
     lag_arcmin: NDArray[np.float64],
     parts: Mapping[str, NDArray[np.float64]],
+    interference: float,
     *,
     key: str = "lag",
 ) -> Section:
-    """Lag over the input angle `theta` (rad, shape (n,)): the whole, and its `parts` by name, arcmin, shape (n,).
+    """Lag over the input angle `theta` (rad, even, one or more whole turns, shape (n,)).
 
-    A lag below zero is interference: the teeth have no play there. It is shown as such, never clipped.
+    `lag_arcmin` is the whole, `parts` its parts by name, each of shape (n,); `interference` the share of the angles
+    where the teeth have no backlash left. What is below zero is shown as such, never clipped. Of several turns the
+    first is drawn, within the band of all.
     """
     lag_arcmin = np.asarray(lag_arcmin, float)
-    tight = float(np.mean(lag_arcmin < 0))
-    says = f"Output lags by {lag_arcmin.mean():.3f} arcmin on average when the input reverses"
-    says += f"; over {100 * tight:.0f} % of the turn the teeth have no play at all." if tight else "."
+    says = f"The output lags by {lag_arcmin.mean():.3f} arcmin on average when the input reverses"
+    says += f"; over {100 * interference:.0f} % of the angles the flanks interfere." if interference else "."
     return Section(
         key,
         "Lag at reversal",
@@ -46,7 +48,8 @@ def lag_section(
                 f"{key}-turn",
                 "Lag over a turn of the wave generator",
                 _lag(theta, lag_arcmin, parts),
-                ("The thick line is the whole. " if len(parts) > 1 else "") + "Below zero the teeth interfere.",
+                "The first turn, in the band of all. Where the tooth backlash is below zero the flanks interfere: "
+                "the teeth deviate by more than the backlash gives.",
             ),
         ),
         says,
@@ -56,12 +59,30 @@ def lag_section(
 def _lag(
     theta: NDArray[np.float64], lag_arcmin: NDArray[np.float64], parts: Mapping[str, NDArray[np.float64]]
 ) -> go.Figure:
-    angle = np.degrees(theta)
     made = figure("Input angle [deg]", "Lag [arcmin]", height=360)
-    for colour, (name, values) in zip(PALETTE, parts.items() if len(parts) > 1 else (), strict=False):
+    turns = max(1, round((theta[-1] - theta[0]) / (2 * np.pi)))
+    points = len(theta) // turns
+    first = slice(0, points + 1 if turns > 1 else None)
+    angle = np.degrees(theta[first] - theta[0])
+    if turns > 1:
+        by_turn = lag_arcmin[: turns * points].reshape(turns, points)
+        for name, edge, fill in (("", by_turn.min(axis=0), None), ("All turns", by_turn.max(axis=0), "tonexty")):
+            made.add_scatter(
+                x=angle[:points],
+                y=edge,
+                mode="lines",
+                line={"width": 0, "color": GREY},
+                fill=fill,
+                fillcolor=faded(GREY, 0.2),
+                name=name or "All turns, lowest",
+                showlegend=bool(name),
+                hoverinfo="skip",
+            )
+    drawn = parts if len(parts) > 1 else {}
+    for colour, (name, values) in zip(PALETTE, drawn.items(), strict=False):
         made.add_scatter(
             x=angle,
-            y=np.broadcast_to(values, angle.shape),
+            y=np.asarray(values)[first],
             mode="lines",
             name=label(name),
             line={"color": colour, "width": 1.8},
@@ -69,16 +90,16 @@ def _lag(
         )
     made.add_scatter(
         x=angle,
-        y=lag_arcmin,
+        y=lag_arcmin[first],
         mode="lines",
         name="Lag",
         line={"color": INK, "width": 3},
         hovertemplate="%{x:.1f} deg: %{y:.3f} arcmin",
     )
-    lowest = min(0.0, *(float(np.min(values)) for values in (lag_arcmin, *parts.values())))
+    lowest = min(0.0, *(float(np.min(values)) for values in (lag_arcmin, *drawn.values())))
     if lowest < 0:
         made.add_hrect(lowest * 1.1, 0, fillcolor=faded(VERMILLION, 0.08), line_width=0, layer="below")
         made.add_annotation(x=0.01, xref="paper", xanchor="left", y=0, yanchor="top", text="interference")
-    made.update_xaxes(range=[angle[0], angle[-1]], dtick=90 if angle[-1] <= 720 else None)
+    made.update_xaxes(range=[angle[0], angle[-1]], dtick=90)
     made.update_yaxes(rangemode="tozero", zeroline=True, zerolinecolor=INK, zerolinewidth=1)
     return made

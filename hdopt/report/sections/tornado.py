@@ -77,7 +77,7 @@ def _tornado(frame: pd.DataFrame, base_arcmin: float) -> go.Figure:
         )
     reach = frame[["low_arcmin", "high_arcmin"]].to_numpy(float)
     low, high = min(reach.min(), base_arcmin), max(reach.max(), base_arcmin)
-    room = 0.28 * (high - low or 1)
+    room = 0.36 * (high - low or 1)
     made.update_xaxes(range=[low - room, high + room])
     made.update_yaxes(showgrid=False, ticks="", showline=False)
     made.add_vline(base_arcmin, line={"color": INK, "width": 1.2})
