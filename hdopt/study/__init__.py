@@ -9,7 +9,6 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hdopt.deviations import DriveErrors
 from hdopt.drive import Clearances, Drive, Load
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.study.document import (
@@ -24,6 +23,7 @@ from hdopt.study.document import (
 )
 
 if TYPE_CHECKING:
+    from hdopt.deviations import DriveErrors
     from hdopt.study.base import Section
 
 DEFAULT_STUDY = "csf-25-80"

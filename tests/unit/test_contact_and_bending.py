@@ -1,0 +1,115 @@
+"""Contact angle, teeth in mesh, flank pressure, curvature change and bending stress."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cases import CSF_25_80, PROFILES, drive
+
+from hdopt.bending import bending_stress, curvature_change, max_bending_stress, max_curvature_change
+from hdopt.contact import (
+    contact_angle,
+    homogenization_coefficient,
+    mean_flank_pressure,
+    meshing_teeth,
+    tip_overlap,
+)
+from hdopt.drive import Load, Material
+from hdopt.errors import HdoptError, MissingValue
+
+EVERY = pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES.keys())
+STEEL = Material(206_000.0, 0.3)
+
+
+class CosineRing:
+    """w = w0 cos 2 phi: the ring whose curvature change has a textbook value."""
+
+    name, tip_is_smooth = "cosine", True
+
+    def __init__(self, radius, deflection):
+        self.undeformed, self.deflection = radius, deflection
+        self.semi_major = radius + deflection
+
+    def radius(self, phi, derivative=0):
+        w0, phi = self.deflection, np.asarray(phi, float)
+        if derivative == 0:
+            return self.undeformed + w0 * np.cos(2 * phi)
+        return -2 * w0 * np.sin(2 * phi) if derivative == 1 else -4 * w0 * np.cos(2 * phi)
+
+
+@EVERY
+def test_tips_cross_at_the_contact_angle_and_overlap_inside_it(profile):
+    angle = contact_angle(CSF_25_80, profile)
+    assert tip_overlap(CSF_25_80, profile, angle) == pytest.approx(0, abs=1e-12)
+    assert (tip_overlap(CSF_25_80, profile, np.linspace(0, 0.999 * angle)) > 0).all()
+    assert (tip_overlap(CSF_25_80, profile, np.linspace(1.001 * angle, np.pi / 2)) < 0).all()
+
+
+def test_contact_needs_tips_that_reach_and_that_clear():
+    short = replace(CSF_25_80, flexspline_addendum=0.01, circular_spline_addendum=0.01)
+    shallow = replace(CSF_25_80, flexspline_inner_radius=30.65, flexspline_addendum=0.9)
+    with pytest.raises(HdoptError, match=r"never reach each other: their tips miss by 0\.0?\d+ mm"):
+        contact_angle(replace(short, flexspline_inner_radius=30.8), PROFILES["ellipse"])
+    with pytest.raises(HdoptError, match="overlap all round"):
+        contact_angle(shallow, PROFILES["ellipse"])
+    with pytest.raises(MissingValue, match="the contact angle needs drive.flexspline_addendum_mm"):
+        contact_angle(replace(CSF_25_80, flexspline_addendum=None), PROFILES["ellipse"])
+
+
+def test_more_teeth_in_mesh_even_out_more():
+    assert meshing_teeth(CSF_25_80, np.pi) == 81
+    assert homogenization_coefficient(25.0) == pytest.approx(0.2)
+    assert homogenization_coefficient(25.0, 0.8) == pytest.approx(0.16)
+    with pytest.raises(HdoptError, match=r"k_B is 0.5; .* gives 0.8 to 1.0"):
+        homogenization_coefficient(25.0, 0.5)
+
+
+def test_flank_pressure_is_load_over_the_summed_overlap():
+    design = replace(drive(), load=Load(torque=63_000.0, tooth_face_width=15.0))
+    angle = contact_angle(CSF_25_80, design.wave_generator.profile)
+    # By hand: every tooth of one flank in both zones, at its own place.
+    pitch = 2 * np.pi / CSF_25_80.circular_spline_teeth
+    teeth = np.arange(pitch / 2, angle, pitch)
+    depth = 2 * tip_overlap(CSF_25_80, design.wave_generator.profile, teeth).sum()
+    force = 63_000.0 / (CSF_25_80.module * CSF_25_80.flexspline_teeth / 2)
+    # A sum over single teeth against an integral over the angle: they differ by less than half a tooth of 26.
+    assert mean_flank_pressure(design) == pytest.approx(force / (15.0 * depth), rel=0.02)
+    assert mean_flank_pressure(design, 126_000.0) == pytest.approx(2 * mean_flank_pressure(design))
+
+
+@pytest.mark.parametrize(
+    ("load", "missing"),
+    [(Load(torque=1.0), "load.tooth_face_width_mm"), (Load(tooth_face_width=1.0), "load.torque_nm")],
+)
+def test_flank_pressure_says_which_number_is_missing(load, missing):
+    with pytest.raises(MissingValue, match=f"the flank pressure needs {missing}"):
+        mean_flank_pressure(replace(drive(), load=load))
+
+
+def test_small_cosine_deflection_bends_the_tip_by_three_w0_over_r_squared():
+    ring, geometry = CosineRing(30.65, 1e-4), replace(CSF_25_80, flexspline_wall=1e-6)
+    # Timoshenko's linear ring, right to first order in w0/R = 3e-6.
+    assert curvature_change(geometry, ring, 0.0) == pytest.approx(3 * 1e-4 / 30.65**2, rel=1e-4)
+    assert curvature_change(geometry, ring, np.pi / 2) == pytest.approx(-3 * 1e-4 / 30.65**2, rel=1e-4)
+
+
+@EVERY
+def test_largest_curvature_change_is_the_largest(profile):
+    phi = np.linspace(0, 2 * np.pi, 40_001)
+    assert max_curvature_change(CSF_25_80, profile) == pytest.approx(
+        np.abs(curvature_change(CSF_25_80, profile, phi)).max(), rel=1e-6
+    )
+
+
+def test_stress_of_a_ring_and_of_a_plate():
+    assert bending_stress(STEEL, 0.74, 1e-3) == pytest.approx(206_000 * 0.74 * 1e-3 / 2)
+    assert bending_stress(STEEL, 0.74, 1e-3, plate=True) == pytest.approx(206_000 * 0.74e-3 / 2 / (1 - 0.09))
+    design = replace(drive(), material=STEEL)
+    assert max_bending_stress(design, plate=True) == pytest.approx(max_bending_stress(design) / 0.91)
+
+
+def test_stress_says_which_number_is_missing():
+    with pytest.raises(MissingValue, match=r"bending stress needs material.modulus_mpa and material.poisson"):
+        max_bending_stress(drive())
+    with pytest.raises(MissingValue, match=r"drive.flexspline_wall_mm"):
+        curvature_change(replace(CSF_25_80, flexspline_wall=None), PROFILES["resal"], 0.0)

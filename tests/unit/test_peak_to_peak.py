@@ -1,0 +1,71 @@
+"""The compiled peak-to-peak against the search that looks everywhere, and against walking the beat."""
+
+import numpy as np
+import pytest
+from cases import BASE_ERRORS, PROFILES, drive, random_errors
+
+from hdopt.deviations import DriveErrors
+from hdopt.drive import DriveGeometry, Structure
+from hdopt.kinematics import peak_to_peak_arcmin
+from hdopt.kinematics.extremes import (
+    extremes_arcmin,
+    peak_to_peak_by_search_arcmin,
+    walked_peak_to_peak_arcmin,
+)
+
+SMOOTH = [profile for profile in PROFILES.values() if profile.tip_is_smooth]
+
+
+@pytest.mark.parametrize("structure", Structure, ids=lambda structure: structure.value)
+@pytest.mark.parametrize("profile", SMOOTH, ids=lambda profile: profile.name)
+def test_kernel_finds_what_the_search_finds(profile, structure):
+    design, errors = drive(profile, structure), random_errors(60, seed=len(profile.name))
+    difference = np.abs(peak_to_peak_arcmin(design, errors) - peak_to_peak_by_search_arcmin(design, errors))
+    # What the kernel promises: parabolas stand for the branches next to an extreme.
+    assert np.quantile(difference, 0.95) < 1e-3
+    assert difference.max() < 5e-3
+
+
+def test_search_is_the_limit_of_walking_the_beat():
+    converged = np.ptp(extremes_arcmin(drive(), BASE_ERRORS))
+    walked = [walked_peak_to_peak_arcmin(drive(), BASE_ERRORS, np.radians(grid), 80) for grid in (1.0, 0.2, 0.05)]
+    assert walked == sorted(walked)
+    assert walked[-1] < converged < walked[-1] + 0.0005
+
+
+@pytest.mark.parametrize("teeth", [(100, 102), (101, 103), (200, 202)])
+def test_other_tooth_numbers_odd_ones_too(teeth):
+    design = drive(geometry=DriveGeometry(*teeth, 0.5, 0.3, 30.65))
+    errors = random_errors(20, seed=3)
+    found, searched = peak_to_peak_arcmin(design, errors), peak_to_peak_by_search_arcmin(design, errors)
+    assert found == pytest.approx(searched, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    "errors",
+    [
+        DriveErrors(),
+        DriveErrors(wg_eccentricity=0.005, wg_tilt_major=0.002),
+        DriveErrors(fs_tooth_amplitude=0.002),
+        DriveErrors(cs_tooth_amplitude=0.002, cs_tooth_phase=1.0),
+        DriveErrors(axis_eccentricity=0.01),
+        DriveErrors(axis_tilt_x=0.01),
+    ],
+)
+def test_single_causes_and_none(errors):
+    searched = np.ptp(extremes_arcmin(drive(), errors))
+    assert float(peak_to_peak_arcmin(drive(), errors)) == pytest.approx(searched, abs=1e-6)
+
+
+def test_arrays_keep_their_shape_and_workers_do_not_matter():
+    errors = random_errors(20_000, seed=1)
+    one, two = (peak_to_peak_arcmin(drive(), errors, workers) for workers in (1, 2))
+    assert np.array_equal(one, two)
+    grid = BASE_ERRORS.with_(axis_eccentricity=np.linspace(0, 0.01, 3)[:, None], wg_tilt_major=np.zeros(4))
+    assert peak_to_peak_arcmin(drive(), grid).shape == (3, 4)
+
+
+def test_a_measured_profile_goes_through_its_contour():
+    measured, analytic = (drive(PROFILES["measured"]), drive())
+    expected = np.ptp(extremes_arcmin(analytic, BASE_ERRORS, "exact"))
+    assert float(peak_to_peak_arcmin(measured, BASE_ERRORS)) == pytest.approx(expected, abs=1e-5)
