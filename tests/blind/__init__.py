@@ -13,3 +13,9 @@ to a file: `motion` (what the motor does), `bench` (the signal chain and the sta
 `instrument` (noise, resolution, gaps). `evidence` says of each case whether its records could decide at all: the key's
 `detectable` and `separable`.
 """
+
+import os
+
+# The matrices here are small and many: threads would spend their time waiting for each other. Takes hold where numpy is
+# not loaded yet, which is so in the commands above.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

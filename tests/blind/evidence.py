@@ -190,8 +190,11 @@ class Witness:
 
 
 def orthonormal(columns):
-    left, size, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
-    return left[:, size > 1e-9 * size[0]]
+    """Orthonormal basis of the columns' span, by way of their products: one large operation instead of hundreds."""
+    columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    size, turn = np.linalg.eigh(columns.T @ columns)
+    kept = size > 1e-9 * size[-1]
+    return columns @ (turn[:, kept] / np.sqrt(size[kept]))
 
 
 def waves(angle, orders):
