@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ FEASIBLE = 1e-9
 """Violation of the requirement, relative to its limit, that is left to rounding."""
 GAP = 1e-7
 """Relative gap to the proven lower bound at which a choice among grades is called optimal."""
-ROUNDS = 500
+ROUNDS = 200
 
 
 class Infeasible(HdoptError):
@@ -128,9 +129,10 @@ class Solution:
 def solve(items: Sequence[Item], requirement: Requirement) -> Solution:
     """Least total cost of the items' tolerances under the requirement.
 
-    Convex costs: one conic problem (Clarabel). Grades or piecewise costs that are not convex: a mixed-integer linear
-    problem (HiGHS), with tangents added where a cost or the requirement is curved until they close. Raises
-    `Infeasible` where no allowed tolerances meet the requirement.
+    Convex costs: one conic problem (Clarabel). Grades or piecewise costs that are not convex: outer approximation
+    (Duran and Grossmann 1986), a mixed-integer linear problem (HiGHS) whose tangents are drawn where the conic problem
+    of each of its choices ends; its value is a proven lower bound. Raises `Infeasible` where no allowed tolerances meet
+    the requirement.
     """
     check_feasible(items, requirement)
     if any(item.cost.discrete for item in items):
@@ -287,37 +289,76 @@ def _solve_with_choices(items: Sequence[Item], requirement: Requirement) -> Solu
         else:
             curved.append(i)
             constraints += [_cost_tangent(items[i], t[i], cost[i], x) for x in _first_tangents(low[i], high[i])]
-    start = np.where(np.isfinite(high) & (high < 1e6), (low + np.minimum(high, 1e6)) / 2, np.maximum(low, 1.0))
-    constraints.append(_requirement_tangent(requirement, scale, unit, t, start))
+    constraints.append(_requirement_tangent(requirement, scale, unit, t, np.clip(np.ones(len(items)), low, high)))
     best: tuple[float, Array] | None = None
-    bound = -math.inf
+    bound, tried = -math.inf, set()
     for _ in range(ROUNDS):
         problem = cp.Problem(cp.Minimize(cp.sum(cost)), constraints)
         problem.solve(solver=cp.HIGHS, mip_rel_gap=1e-9, mip_abs_gap=1e-12)
         if problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
-            raise Infeasible(
-                f"no choice of grades meets the requirement {requirement.limit:g} ({problem.status}); the best "
-                f"reachable is {requirement.value(low * scale):.6g}; allow finer grades or relax the requirement",
-                requirement.value(low * scale),
-            )
+            break  # no choice is left that the tangents allow
         bound = max(bound, float(problem.value))
-        at = np.clip(t.value, low, high)
-        at = np.array([_snap(item, x * item.scale) for item, x in zip(items, at, strict=True)]) / scale
-        if requirement.value(at * scale) <= requirement.limit + 1e-10 * unit:
-            total = sum(float(item.cost.cost(x * item.scale)) for item, x in zip(items, at, strict=True))
+        at = np.clip(t.value, low, high) * scale
+        choice = tuple(_choice(item, x) for item, x in zip(items, at, strict=True))
+        solved = _solve_choice(items, requirement, choice)
+        if solved is None:
+            # the choice itself breaks the requirement, or no room is left beside it: cut it off
+            tightest = [c if isinstance(c, float) else x for c, x in zip(choice, low * scale, strict=True)]
+            at = np.array(tightest)
+        else:
+            at = solved
+            total = sum(float(item.cost.cost(x)) for item, x in zip(items, at, strict=True))
             if best is None or total < best[0]:
-                best = total, at * scale
-            if best[0] - bound <= GAP * abs(best[0]):
-                break
-        constraints.append(_requirement_tangent(requirement, scale, unit, t, at))
-        constraints += [_cost_tangent(items[i], t[i], cost[i], at[i]) for i in curved]
+                best = total, at
+        closed = best is not None and best[0] - bound <= GAP * abs(best[0])
+        if closed or choice in tried:
+            break
+        tried.add(choice)
+        constraints.append(_requirement_tangent(requirement, scale, unit, t, at / scale))
+        constraints += [_cost_tangent(items[i], t[i], cost[i], at[i] / scale[i]) for i in curved]
     if best is None:
-        raise HdoptError("no feasible choice was found although one exists; check the cost data and the bounds")
-    return _finish(items, requirement, best[1], lower_bound=bound, marginal_cost=None, solver="HiGHS with tangents")
+        reachable = requirement.value(low * scale)
+        raise Infeasible(
+            f"no choice of grades meets the requirement {requirement.limit:g} ({problem.status}); the best reachable "
+            f"is {reachable:.6g}; allow finer grades or relax the requirement",
+            reachable,
+        )
+    return _finish(
+        items, requirement, best[1], lower_bound=min(bound, best[0]), marginal_cost=None, solver="HiGHS and Clarabel"
+    )
 
 
-def _snap(item: Item, tolerance: float) -> float:
-    return item.cost.nearest(tolerance).tolerance if isinstance(item.cost, GradeTable) else tolerance
+def _choice(item: Item, tolerance: float) -> float | tuple[tuple[float, float], ...] | None:
+    """What a master problem's solution chose for an item: a grade's tolerance, the ends of a segment, or nothing."""
+    if isinstance(item.cost, GradeTable):
+        return float(item.cost.nearest(tolerance).tolerance)
+    if isinstance(item.cost, Piecewise) and not item.cost.convex:
+        ends = list(pairwise(item.cost.points))
+        return min(ends, key=lambda pair: max(pair[0][0] - tolerance, tolerance - pair[1][0]))
+    return None
+
+
+def _solve_choice(items: Sequence[Item], requirement: Requirement, choice: tuple) -> Array | None:
+    """Least-cost tolerances once all choices are made, None where they leave no room."""
+    chosen = np.array([c if isinstance(c, float) else 0.0 for c in choice])
+    free = [i for i, c in enumerate(choice) if not isinstance(c, float)]
+    if not free:
+        return chosen if requirement.value(chosen) <= requirement.limit * (1 + FEASIBLE) else None
+    remaining = Requirement(
+        requirement.limit,
+        requirement.linear[free],
+        requirement.quadratic[free],
+        requirement.offset + float(requirement.linear @ chosen),
+        math.hypot(requirement.rest, float(np.linalg.norm(requirement.quadratic * chosen))),
+        requirement.rule,
+    )
+    convex = [items[i] if choice[i] is None else replace(items[i], cost=Piecewise(choice[i])) for i in free]
+    try:
+        check_feasible(convex, remaining)
+    except Infeasible:
+        return None
+    chosen[free] = list(_solve_convex(convex, remaining).tolerances.values())
+    return chosen
 
 
 def _first_tangents(low: float, high: float) -> Array:

@@ -18,6 +18,7 @@ from scipy import special
 from hdopt.engine import Engine
 from hdopt.errors import HdoptError
 from hdopt.tolerance.allocate import Infeasible, Item, Requirement, Solution, solve, total_cost
+from hdopt.tolerance.cost import GradeTable
 from hdopt.tolerance.intervals import Estimate
 from hdopt.tolerance.linearise import linearise
 from hdopt.tolerance.response import Response, evaluate
@@ -32,20 +33,21 @@ MODEL_POINTS = 2**17
 """Points of the sample, the same at every step, whose quantile the convex models follow."""
 NEIGHBOURS = 200
 """Drives on either side of the quantile whose mean slope is the quantile's slope."""
+CURVE_POINTS = 2**15
 DESIGN_POINTS = 2**20
 COMPARE_POINTS = 2**17
 STEP = 0.01
 """Relative step of slopes: small against the curvature, large against rounding."""
 REACH = 1.6
 """Factor by which one convex model may move a tolerance."""
-SETTLED = 2e-4
+SHRINK = 0.6
+"""What is left of that reach after each step."""
+SETTLED = 5e-4
 """Relative change of cost and of the constraint below which successive models agree."""
 MAX_STEPS = 25
 CORRECTIONS = 8
 CLOSE = 1e-4
 """How near below the limit, relative to it, the measured response of a continuous design is brought."""
-
-RULES = ("equal scaling", "worst case", "rss", "yield")
 
 
 @dataclass(frozen=True)
@@ -273,7 +275,7 @@ def _tangent(problem: Problem, rule: str, value: float, slopes: Array, at: Array
     return Requirement(problem.limit, slopes, np.zeros_like(slopes), value - float(slopes @ at), rule=rule)
 
 
-def _quantile_constraint(problem: Problem, target: float, seed: int) -> _Constraint:
+def _quantile_constraint(problem: Problem, target: float, seed: int, points: int = MODEL_POINTS) -> _Constraint:
     """The target quantile of the response on one fixed sample, as a function of the tolerances, with its tangents."""
     names = problem.space.names
     replicates = 4
@@ -282,7 +284,7 @@ def _quantile_constraint(problem: Problem, target: float, seed: int) -> _Constra
         [
             block
             for replicate in range(replicates)
-            for block in sampling.blocks(seed, replicate, MODEL_POINTS // replicates, len(names))
+            for block in sampling.blocks(seed, replicate, points // replicates, len(names))
         ]
     )
     rank = min(math.ceil(target * len(u)), len(u)) - 1
@@ -335,9 +337,16 @@ def _successive(problem: Problem, constraint: _Constraint, measured: Callable[[A
         at, cost = moved, solution.total_cost
         if settled:
             break
-        reach = 1 + (reach - 1) * 0.75
-    near = [_within(item, t, 1.2) for item, t in zip(problem.items, at, strict=True)]
+        reach = 1 + (reach - 1) * SHRINK
+    near = [_chosen(_within(item, t, 1.2), t) for item, t in zip(problem.items, at, strict=True)]
     return _corrected(problem, near, constraint.model(at), measured), step
+
+
+def _chosen(item: Item, tolerance: float) -> Item:
+    """The item with its grade settled, so that corrections move the others only."""
+    if isinstance(item.cost, GradeTable):
+        return replace(item, cost=GradeTable((item.cost.nearest(tolerance),)))
+    return item
 
 
 def _corrected(
@@ -351,7 +360,7 @@ def _corrected(
         excess = value - problem.limit
         if excess <= 0 and (best is None or solution.total_cost < best.total_cost):
             best = solution
-        if -CLOSE * problem.limit <= excess <= 0 or (best is not None and best.grades):
+        if -CLOSE * problem.limit <= excess <= 0 or len(solution.grades) == len(items):
             break
         limit -= excess + CLOSE / 2 * problem.limit
     if best is None:
@@ -404,7 +413,7 @@ def yield_cost_curve(problem: Problem, limits: Sequence[float], seed: int = 1) -
     curve = []
     for limit in limits:
         other = replace(problem, limit=float(limit))
-        constraint = _quantile_constraint(other, target, seed)
+        constraint = _quantile_constraint(other, target, seed, CURVE_POINTS)
         try:
             cost = _successive(other, constraint, constraint.value)[0].total_cost
         except Infeasible:
