@@ -53,6 +53,7 @@ class StepPlace:
 
 
 ONE_DRIVE = ("drive", "errors")
+MANY_DRIVES = ("drive", "tolerances", "requirement")
 
 STEPS: dict[str, StepPlace] = {
     "waveform": StepPlace("hdopt.steps.waveform:waveform", ONE_DRIVE),
@@ -62,6 +63,9 @@ STEPS: dict[str, StepPlace] = {
     "profiles": StepPlace("hdopt.steps.profiles:profiles", ONE_DRIVE),
     "sensitivities": StepPlace("hdopt.steps.design:sensitivities", ONE_DRIVE),
     "design_map": StepPlace("hdopt.steps.design:design_map", ONE_DRIVE),
+    "stack": StepPlace("hdopt.steps.tolerances:stack", MANY_DRIVES),
+    "sobol": StepPlace("hdopt.steps.tolerances:sobol", MANY_DRIVES),
+    "allocate": StepPlace("hdopt.steps.tolerances:allocate", ("allocate",)),
     "paper_reproduction": StepPlace("hdopt.studies.paper_reproduction:paper_reproduction"),
 }
 """Every step, in the order of a report; a step is imported only when a study asks for it."""

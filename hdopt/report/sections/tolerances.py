@@ -38,7 +38,9 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
     figures = {
         "Yield": f"{100 * conforming.value:.3f} % ({100 * conforming.low:.3f} to {100 * conforming.high:.3f})",
         "Required": f"{100 * stack.required_yield:.2f} % within {stack.limit:g} {unit}",
-        f"Quantile {stack.required_yield:g}": f"{quantile.value:.4g} {unit} ({quantile.low:.4g} to {quantile.high:.4g})",
+        f"Quantile {stack.required_yield:g}": (
+            f"{quantile.value:.4g} {unit} ({quantile.low:.4g} to {quantile.high:.4g})"
+        ),
         "Beyond the limit": f"{stack.ppm.value:.0f} ppm ({stack.ppm.low:.0f} to {stack.ppm.high:.0f})",
     }
     if stack.ppk is not None:
@@ -70,8 +72,8 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
                 f"{key}-distribution",
                 "Distribution under the tolerances",
                 _distribution(stack),
-                f"{stack.n} drives, {stack.sampling}. The vertical lines are the limit and the quantile of the required "
-                "yield with its interval.",
+                f"{stack.n} drives, {stack.sampling}. The vertical lines are the limit and the quantile of the "
+                "required yield with its interval.",
             ),
             Table(
                 f"{key}-figures",
@@ -90,8 +92,8 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
             Table(f"{key}-contributions-table", "Contributions", shares, formats={"share": ".4f"}),
             *(Text(note) for note in (*stack.notes, *result.notes)),
         ),
-        f"As toleranced the drives {verdict} the requirement: {100 * conforming.value:.2f} % stay within {stack.limit:g} "
-        f"{unit}, {100 * stack.required_yield:.2f} % must. Most comes from {listed(most)}.",
+        f"As toleranced the drives {verdict} the requirement: {100 * conforming.value:.2f} % stay within "
+        f"{stack.limit:g} {unit}, {100 * stack.required_yield:.2f} % must. Most comes from {listed(most)}.",
     )
 
 
@@ -153,8 +155,8 @@ def sobol_section(result: SobolResult, key: str = "sobol") -> Section:
                 f"{key}-indices",
                 "First-order and total Sobol' indices",
                 _indices(sobol),
-                f"{sobol.evaluations} drives; whiskers: {sobol.interval}. What the total index has more than the first is "
-                "the input's part in interactions.",
+                f"{sobol.evaluations} drives; whiskers: {sobol.interval}. What the total index has more than the first "
+                "is the input's part in interactions.",
             ),
             Table(f"{key}-table", "Sobol' indices", sobol.to_frame().reset_index(), formats=_index_formats()),
             Figure(
