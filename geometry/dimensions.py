@@ -85,11 +85,13 @@ def _sizes(part: Part, zone: float) -> list[Dimension]:
     rows = []
 
     def add(name: str, nominal: float, tolerance: str, source: str) -> None:
-        rows.append(Dimension(part.name, name, nominal, tolerance, source))
+        row = Dimension(part.name, name, nominal, tolerance, source)
+        if row not in rows:
+            rows.append(row)
 
     if isinstance(part.contour, Circle):
         add("disc diameter", 2 * part.contour.radius, "h6", "export")
-        add("offset of the disc's axis", abs(part.contour.offset), f"+-{zone / 2:g}", "export")
+        add("offset of the disc's axis", abs(part.contour.offset), f"±{zone / 2:g}", "export")
     elif part.contour is not None:
         box = part.contour.box
         add("major axis", box[3] - box[1], f"profile {zone:g}", "export")
@@ -102,7 +104,7 @@ def _sizes(part: Part, zone: float) -> list[Dimension]:
             add("hole for the journal", 2 * first.inner.radius, "H7", "fit")
     for piece in part.body[1:]:
         if isinstance(piece, Prism) and isinstance(piece.outline, Circle):
-            add("seat" if not piece.outline.offset else "journal", 2 * piece.outline.radius, "h6", "fit")
+            add("seat" if not piece.outline.offset else "journals", 2 * piece.outline.radius, "h6", "fit")
     if part.clearance_hole:
         add("clearance hole", 2 * part.bore.radius, "H13", "fit")
     elif part.bore:

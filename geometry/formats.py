@@ -78,5 +78,40 @@ class ThreeMf:
         return check_3mf(path, job, name)
 
 
-FORMATS: dict[str, Format] = {"step": Step(), "dxf": Dxf(), "stl": Stl(), "3mf": ThreeMf()}
+class Svg:
+    description = "SVG drawing: front view with dimensions, section, key dimensions"
+
+    def write(self, path: Path, job: Job) -> None:
+        from hdopt.geometry.drawing import draw
+
+        path.write_text(draw(job), encoding="utf-8")
+
+    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+        from hdopt.geometry.drawing import check_drawing
+
+        return check_drawing(path, job, name)
+
+
+class Png:
+    description = "PNG picture of the parts, pulled apart"
+
+    def write(self, path: Path, job: Job) -> None:
+        from hdopt.geometry.picture import write_png
+
+        write_png(path, job)
+
+    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+        from hdopt.geometry.picture import check_png
+
+        return check_png(path, job, name)
+
+
+FORMATS: dict[str, Format] = {
+    "step": Step(),
+    "dxf": Dxf(),
+    "stl": Stl(),
+    "3mf": ThreeMf(),
+    "svg": Svg(),
+    "png": Png(),
+}
 """Format -> what writes and checks it; the names are the options of `hdopt export`."""

@@ -17,8 +17,8 @@ COMMANDS: dict[str, str] = {
     "sobol": "Which tolerances matter: Sobol' indices with intervals, Shapley effects where inputs are correlated.",
     "allocate": "Least-cost tolerances that keep the requirement, verified.",
     "diagnose": "What physics recordings of a drive hold that the model leaves out.",
-    "export": "The wave generator as checked STEP, DXF, STL and 3MF files.",
     "search": "Which design: the best under limits, fronts, and what the choice costs.",
+    "export": "The wave generator as checked STEP, DXF, STL, 3MF, drawing and picture.",
     "run": "Everything a study file asks for, with report.html.",
     "studies": "The shipped studies, a line each.",
 }

@@ -21,12 +21,14 @@ from hdopt.errors import HdoptError
 @click.option("--dxf", metavar="FILE", help="DXF of the profile for wire cutting, with bore and tolerance zone.")
 @click.option("--stl", metavar="FILE", help="STL mesh of all parts in their places.")
 @click.option("--3mf", "threemf", metavar="FILE", help="3MF mesh with named, coloured parts.")
+@click.option("--svg", metavar="FILE", help="Drawing: front view with dimensions, section, key dimensions.")
+@click.option("--png", metavar="FILE", help="Rendered picture of the parts, pulled apart.")
 @click.option("--context", is_flag=True, help="With bearing races, flexspline ring and circular spline.")
 @click.option("--allocation", metavar="FILE", help="Tolerances from the JSON that `hdopt allocate` wrote.")
 @json_option
 @seed_option
 def command(study, drive, overrides, structure, context, allocation, json_file, seed, threemf, **files) -> int:
-    """The wave generator as checked files: STEP, DXF, STL and 3MF.
+    """The wave generator as checked files: STEP, DXF, STL, 3MF, a drawing (SVG) and a picture (PNG).
 
     STUDY is a study file or a shipped study; without one, the shipped drive csf-25-80 is taken. Every file is read back
     from disk and compared with closed-form values before it bears its name; exit status 1 says that one failed, and
@@ -85,4 +87,4 @@ def _lines(result):
     for kind, path in values["files"].items():
         yield f"  wrote and checked {path} ({kind})"
     if not values["files"]:
-        yield "  nothing written: give --step, --dxf, --stl or --3mf"
+        yield "  nothing written: give --step, --dxf, --stl, --3mf, --svg or --png"

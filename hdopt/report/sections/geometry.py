@@ -1,0 +1,74 @@
+"""The wave generator as it is to be made: drawing, picture, key dimensions, and what the check of its files found."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from hdopt.report import KeyFigures, Picture, Section, Table, Text
+
+if TYPE_CHECKING:
+    from hdopt.geometry.export import ExportResult
+
+
+def geometry_section(
+    result: ExportResult, drawing_svg: str, picture_png: bytes | None = None, *, key: str = "geometry"
+) -> Section:
+    """The section of an export: `drawing_svg` and `picture_png` as the export wrote them."""
+    values = result.to_dict()
+    made = [part for part in values["parts"] if not part["context"]]
+    figures = {"parts": str(len(made)), "fingerprint": result.identity.fingerprint}
+    if result.profile_deviation_um is not None:
+        figures["profile in the files, off the analytic curve"] = f"{result.profile_deviation_um:.2g} um at most"
+    items = [KeyFigures(figures)]
+    items.append(
+        Picture(
+            f"{key}-drawing",
+            "Wave generator",
+            drawing_svg,
+            "Front view, section through the major axis, parts pulled apart. Lengths in mm.",
+        )
+    )
+    if picture_png is not None:
+        items.append(Picture(f"{key}-picture", "Parts, pulled apart along the axis", picture_png))
+    items += [_parts(key, made), _dimensions(key, result), *_assumptions(key, result)]
+    items += [Text(note[0].upper() + note[1:] + ".") for note in values["notes"]]
+    return Section(key, "Wave generator to be made", tuple(items), _summary(values))
+
+
+def _summary(values: dict) -> str:
+    files = ", ".join(kind.upper() for kind in values["files"])
+    if not files:
+        return "The parts, their key dimensions and the tolerances that the study allows them."
+    return (
+        f"The parts, their key dimensions and the tolerances that the study allows them. Every file ({files}) was read "
+        "back from disk and compared with closed-form values before it was given its name."
+    )
+
+
+def _parts(key: str, made: list[dict]) -> Table:
+    rows = [(_words(part["name"]), part["volume_mm3"], *part["bounding_box_mm"]) for part in made]
+    frame = pd.DataFrame(rows, columns=["part", "volume [mm³]", "x [mm]", "y [mm]", "z [mm]"])
+    formats = {"volume [mm³]": ".3f", "x [mm]": ".4f", "y [mm]": ".4f", "z [mm]": ".4f"}
+    return Table(f"{key}-parts", "Parts", frame, "Volume and extents as measured in the file.", formats)
+
+
+def _dimensions(key: str, result: ExportResult) -> Table:
+    rows = [(_words(row.part), row.name, row.nominal, row.tolerance, row.source) for row in result.dimensions]
+    frame = pd.DataFrame(rows, columns=["part", "dimension", "nominal [mm]", "tolerance", "from"])
+    caption = "Tolerances are those of the study, or of its allocation; the last column says where each comes from."
+    return Table(f"{key}-dimensions", "Key dimensions", frame, caption, {"nominal [mm]": ".4f"})
+
+
+def _assumptions(key: str, result: ExportResult) -> list[Table]:
+    if not result.model.assumptions:
+        return []
+    rows = [(assumption.key, str(assumption.value), assumption.reason) for assumption in result.model.assumptions]
+    frame = pd.DataFrame(rows, columns=["key", "value", "why"])
+    caption = "Give a key in the study's [export] section to replace it."
+    return [Table(f"{key}-assumed", "Sizes that the study does not give", frame, caption)]
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
