@@ -84,7 +84,7 @@ def render(tmp_path, **options):
         pytest.skip(str(reason))
 
 
-def test_picture_shows_the_cam_in_its_colour(tmp_path):
+def test_picture_shows_the_cam_in_its_colour_and_a_blank_one_fails(tmp_path, monkeypatch):
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOImage import vtkPNGReader
 
@@ -99,6 +99,12 @@ def test_picture_shows_the_cam_in_its_colour(tmp_path):
     assert np.mean((blue > red + 15) & (blue > green)) > 0.1
     assert np.mean((red > 250) & (green > 250) & (blue > 250)) > 0.3
 
+    result.files["png"].unlink()
+    monkeypatch.setattr(picture, "_scene", lambda job: {})
+    with pytest.raises(CheckFailed, match="it is blank"):
+        export_drive(drive(), {"png": tmp_path / "wave.png"}, ExportSection(hub=False))
+    assert list(tmp_path.iterdir()) == []
+
 
 def test_machine_without_opengl_is_told_what_to_install(monkeypatch, tmp_path):
     # VTK's renderer for machines with neither display nor EGL; its library is not part of the wheel.
@@ -109,19 +115,6 @@ def test_machine_without_opengl_is_told_what_to_install(monkeypatch, tmp_path):
         assert "install libegl1" in str(error) and list(tmp_path.iterdir()) == []
     else:
         pytest.skip("this machine has OSMesa")
-
-
-def test_blank_picture_fails_the_check(tmp_path, monkeypatch):
-    original = picture._scene
-
-    def nothing(job):
-        return {name: values for name, values in original(job).items() if name == "none"}
-
-    render(tmp_path)
-    (tmp_path / "wave.png").unlink()
-    monkeypatch.setattr(picture, "_scene", nothing)
-    with pytest.raises(CheckFailed, match="it is blank"):
-        export_drive(drive(), {"png": tmp_path / "wave.png"}, ExportSection(hub=False))
 
 
 def test_report_section_shows_drawing_parts_and_tolerances(tmp_path):
