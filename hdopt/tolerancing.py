@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -338,11 +338,13 @@ def allocate(
     curve: Sequence[float] | None = None,
     seed: int = 1,
     engine: Engine | str | None = None,
+    progress: Callable[[Sequence[str]], Iterable[str]] = iter,
 ) -> AllocateResult:
     """Least-cost tolerances of a study by `rule` ('worst_case', 'rss' or 'yield'; the study's own if None).
 
-    `compare` also runs the other rules; `curve` gives the cost at multiples of the requirement. Raises
-    `hdopt.tolerance.allocate.Infeasible` where no allowed tolerances meet the requirement.
+    `compare` also runs the other rules; `curve` gives the cost at multiples of the requirement; `progress` is told of
+    each rule of a drive as it begins. Raises `hdopt.tolerance.allocate.Infeasible` where no allowed tolerances meet
+    the requirement.
     """
     from hdopt.study.costs import AllocateSection
 
@@ -355,7 +357,7 @@ def allocate(
     curve = settings.curve if curve is None else curve
     if "linear_stack" in study.sections:
         return _allocate_linear(study, rule, compare, curve, settings.verify_n, seed, engine)
-    return _allocate_drive(study, rule, compare, curve, settings.verify_n, seed, engine)
+    return _allocate_drive(study, rule, compare, curve, settings.verify_n, seed, engine, progress)
 
 
 def verification_seed(seed: int) -> int:
@@ -408,6 +410,7 @@ def _allocate_drive(
     verify_n: int,
     seed: int,
     engine: Engine | str | None,
+    progress: Callable[[Sequence[str]], Iterable[str]],
 ) -> AllocateResult:
     from hdopt.tolerance import allocate_response as methods
 
@@ -422,10 +425,16 @@ def _allocate_drive(
         "rss": lambda: methods.allocate_by_rss(problem, seed),
         "yield": lambda: methods.allocate_by_yield(problem, seed, verify_n),
     }
-    chosen = by_rule[rule]()
-    outcomes = []
-    for name, run in by_rule.items() if compare else ():
-        outcomes.append(_outcome(name, chosen) if name == rule else _attempt(name, run))
+    # the chosen rule first: where it has no answer the others are not asked
+    order = [rule, *(name for name in by_rule if name != rule)] if compare else [rule]
+    found: dict[str, RuleOutcome] = {}
+    for name in progress(order):
+        if name == rule:
+            chosen = by_rule[name]()
+            found[name] = _outcome(name, chosen)
+        else:
+            found[name] = _attempt(name, by_rule[name])
+    outcomes = [found[name] for name in by_rule if name in found] if compare else []
     fresh = verification_seed(seed)
     verified = methods.verify(problem, chosen.tolerances, fresh, verify_n).conforming
     status = "verified" if verified.low >= stated.required_yield else "not verified"

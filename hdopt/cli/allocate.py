@@ -6,7 +6,7 @@ import sys
 
 import click
 
-from hdopt.cli.common import drive_option, emit, json_option, seed_option, set_option, study_argument
+from hdopt.cli.common import drive_option, emit, json_option, progress, seed_option, set_option, study_argument
 
 
 @click.command()
@@ -29,7 +29,9 @@ def command(study, drive, overrides, rule, compare, engine, json_file, seed) -> 
 
     loaded = load_study(study, overrides, drive)
     try:
-        result = allocate(loaded, rule, compare=compare, seed=seed, engine=engine)
+        result = allocate(
+            loaded, rule, compare=compare, seed=seed, engine=engine, progress=lambda rules: progress(rules, "rules")
+        )
     except Infeasible as error:
         answer = {
             "study": loaded.name,

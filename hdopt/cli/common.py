@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -40,6 +41,26 @@ def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterab
     from tqdm import tqdm
 
     return tqdm(items, desc=label, total=total, file=sys.stderr, disable=not sys.stderr.isatty(), leave=False)
+
+
+def watched(engine, label: str):
+    """An engine by its name, with a progress bar over what it maps where standard error is a terminal."""
+    from hdopt.engine import engine_from
+
+    chosen = engine_from(engine)
+    return Watched(chosen, label) if sys.stderr.isatty() else chosen
+
+
+@dataclass(frozen=True)
+class Watched:
+    """An engine whose results pass a progress bar."""
+
+    engine: Any
+    label: str
+
+    def map(self, function, items):
+        items = list(items)
+        return progress(self.engine.map(function, items), self.label, len(items))
 
 
 def progress_bar(label: str, total: int) -> Callable[[int], None]:

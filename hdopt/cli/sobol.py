@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from hdopt.cli.common import drive_option, emit, json_option, seed_option, set_option, study_argument
+from hdopt.cli.common import drive_option, emit, json_option, seed_option, set_option, study_argument, watched
 
 
 @click.command()
@@ -31,7 +31,7 @@ def command(study, drive, overrides, n, no_second_order, shapley, engine, json_f
         second_order=not no_second_order,
         shapley=shapley,
         seed=seed,
-        engine=engine,
+        engine=watched(engine, "scramblings"),
     )
     emit(result.to_dict(), json_file, _lines(result))
 

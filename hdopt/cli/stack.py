@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from hdopt.cli.common import drive_option, emit, json_option, seed_option, set_option, study_argument
+from hdopt.cli.common import drive_option, emit, json_option, seed_option, set_option, study_argument, watched
 
 
 @click.command()
@@ -41,7 +41,7 @@ def command(study, drive, overrides, n, tail, worst_case, quantiles, sampling, e
         sampling=sampling,
         quantiles=quantiles,
         seed=seed,
-        engine=engine,
+        engine=watched(engine, "samples"),
     )
     emit(result.to_dict(), json_file, _lines(result))
 

@@ -107,9 +107,21 @@ class DriveResponse:
             return None
         return self.homogenization * peak_to_peak_bound_arcmin(self.drive, widest_errors(self, lower, upper))
 
-    def __call__(self, inputs: Array) -> Array:
-        from hdopt.kinematics import peak_to_peak_arcmin
+    def matrix(self, inputs: Array) -> Array:
+        """The same as rows of `DriveErrors.to_matrix`, without making twelve columns of what does not vary."""
+        varying: dict[str, Array] = {}
+        for feed in self.feeds:
+            feed.fill(inputs, varying)
+        matrix = np.empty((len(inputs), len(ERROR_NAMES)))
+        for column, name in enumerate(ERROR_NAMES):
+            matrix[:, column] = varying.get(name, getattr(self.held, name))
+        return matrix
 
+    def __call__(self, inputs: Array) -> Array:
+        from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin, peak_to_peak_arcmin
+
+        if self.drive.wave_generator.profile.tip_is_smooth:
+            return self.homogenization * matrix_peak_to_peak_arcmin(self.drive, self.matrix(inputs))
         return self.homogenization * peak_to_peak_arcmin(self.drive, self.errors(inputs))
 
 

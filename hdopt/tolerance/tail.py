@@ -136,6 +136,10 @@ def _subset_simulation(
     simulation.setBlockSize(block)
     simulation.setMaximumOuterSampling(level_size // block)
     simulation.setMinimumProbability(LEVEL_PROBABILITY**MAX_LEVELS)
-    simulation.run()
-    result = simulation.getResult()
-    return float(result.getProbabilityEstimate()), int(function.getEvaluationCallsNumber())
+    try:
+        simulation.run()
+    except RuntimeError as error:
+        if "too small" not in str(error):
+            raise
+        return 0.0, int(function.getEvaluationCallsNumber())  # below the smallest probability that is told from zero
+    return float(simulation.getResult().getProbabilityEstimate()), int(function.getEvaluationCallsNumber())
