@@ -1,4 +1,4 @@
-"""Which inputs matter: Sobol' indices with SALib's estimators, and Shapley effects where inputs are correlated.
+"""Which inputs matter: Sobol' indices by SALib's estimators, and Shapley effects where inputs are correlated.
 
 Intervals come from independent scramblings of the same design: each scrambling gives every index once, and Student's t
 over them needs no resampling.
@@ -227,28 +227,32 @@ def run_sobol_replicate(task: SobolTask) -> SobolReplicate:
         raise HdoptError(f"the response is {mean:g} for every sample; there is no variance to attribute")
     y_a, y_b, ab = (y_a - mean) / std, (y_b - mean) / std, (ab - mean) / std
     prefixes = _prefixes(task.n)
-    first, total = _first_and_total(y_a, y_b, ab, prefixes)
-    second = _second_order(y_a, y_b, ab[:d], (np.array(ba) - mean) / std) if task.second_order else np.zeros(0)
+    first, total = np.swapaxes([first_and_total(y_a[:m], y_b[:m], ab[:, :m]) for m in prefixes], 0, 1)
+    second = second_order_indices(y_a, y_b, ab[:d], (np.array(ba) - mean) / std) if task.second_order else np.zeros(0)
     return SobolReplicate(first, total, second, mean, std * std)
 
 
-def _first_and_total(y_a: Array, y_b: Array, ab: Array, prefixes: Sequence[int]) -> tuple[Array, Array]:
-    from SALib.analyze import sobol as salib
+def first_and_total(y_a: Array, y_b: Array, y_ab: Array) -> tuple[Array, Array]:
+    """First-order and total indices (Saltelli et al. 2010) as SALib estimates them, for all blocks at once.
 
-    first, total = (np.empty((len(prefixes), len(ab))) for _ in range(2))
-    for row, m in enumerate(prefixes):
-        for column, y_ab in enumerate(ab):
-            first[row, column] = salib.first_order(y_a[:m], y_ab[:m], y_b[:m])
-            total[row, column] = salib.total_order(y_a[:m], y_ab[:m], y_b[:m])
+    `y_a`, `y_b` of shape (n,); `y_ab` of shape (blocks, n): responses at A with each block's columns from B.
+    """
+    variance = np.var(np.concatenate([y_a, y_b]))
+    first = (y_ab - y_a) @ y_b / len(y_a) / variance
+    total = np.square(y_ab - y_a).mean(axis=1) / 2 / variance
     return first, total
 
 
-def _second_order(y_a: Array, y_b: Array, ab: Array, ba: Array) -> Array:
-    from SALib.analyze import sobol as salib
+def second_order_indices(y_a: Array, y_b: Array, y_ab: Array, y_ba: Array) -> Array:
+    """Second-order indices (Saltelli 2002) of all pairs as SALib estimates them, in the order of `combinations`.
 
-    return np.array(
-        [float(salib.second_order(y_a, ab[j], ab[k], ba[j], y_b)) for j, k in combinations(range(len(ab)), 2)]
-    )
+    `y_ab`, `y_ba` of shape (d, n): responses at A with one column from B, and at B with one column from A.
+    """
+    variance, n = np.var(np.concatenate([y_a, y_b])), len(y_a)
+    first = first_and_total(y_a, y_b, y_ab)[0]
+    closed = (y_ba @ y_ab.T / n - y_a @ y_b / n) / variance
+    pairs = np.triu_indices(len(y_ab), 1)
+    return (closed - first[:, None] - first)[pairs]
 
 
 @dataclass(frozen=True)

@@ -44,13 +44,13 @@ from hdopt.tolerance.space import InputSpace, Tolerance
 from hdopt.tolerance.sampling import PlainMonteCarlo
 from hdopt.tolerance.stack import run_stack
 space = InputSpace({"x": Tolerance(Uniform(lower=0.0, upper=1.0))})
-run_stack(lambda x: x[:, 0], space, limit=0.9, n={n}, seed=0, engine="process", sampling=PlainMonteCarlo())
+run_stack(lambda x: x[:, 0], space, limit=0.9, n=COUNT, seed=0, engine="process", sampling=PlainMonteCarlo())
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
 
 def peak_kib(n):
-    done = subprocess.run([sys.executable, "-c", STREAMED.format(n=n)], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", STREAMED.replace("COUNT", str(n))], capture_output=True, text=True, check=True)
     return int(done.stdout)
 
 

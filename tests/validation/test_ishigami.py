@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hdopt.sensitivity import run_sobol
+from hdopt.sensitivity import first_and_total, run_sobol, second_order_indices
 from hdopt.tolerance.distributions import Uniform
 from hdopt.tolerance.space import InputSpace, Tolerance
 
@@ -52,3 +52,16 @@ def test_intervals_cover_the_truth_as_often_as_they_say(space):
     assert 0.90 <= coverage.mean() <= 0.98, coverage
     # one index alone: 160 trials at 95 % lie within 3.5 standard deviations of it in all but 1 of 2000 cases
     assert coverage.min() > 0.95 - 3.5 * np.sqrt(0.95 * 0.05 / 160), coverage
+
+
+def test_estimators_are_salibs():
+    """Number for number, on one sample of any responses."""
+    from SALib.analyze import sobol as salib
+
+    y_a, y_b, *others = np.random.default_rng(0).standard_normal((8, 100))
+    y_ab, y_ba = np.array(others[:3]), np.array(others[3:])
+    first, total = first_and_total(y_a, y_b, y_ab)
+    assert first == pytest.approx([float(salib.first_order(y_a, y, y_b)) for y in y_ab], abs=1e-12)
+    assert total == pytest.approx([float(salib.total_order(y_a, y, y_b)) for y in y_ab], abs=1e-12)
+    theirs = [float(salib.second_order(y_a, y_ab[j], y_ab[k], y_ba[j], y_b)) for j, k in ((0, 1), (0, 2), (1, 2))]
+    assert second_order_indices(y_a, y_b, y_ab, y_ba) == pytest.approx(theirs, abs=1e-12)
