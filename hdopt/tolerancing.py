@@ -434,7 +434,7 @@ def _allocate_drive(
             found[name] = _outcome(name, chosen)
         else:
             found[name] = _attempt(name, by_rule[name])
-    outcomes = [found[name] for name in by_rule if name in found] if compare else []
+    outcomes = [_present(problem, seed), *(found[name] for name in by_rule)] if compare else []
     fresh = verification_seed(seed)
     verified = methods.verify(problem, chosen.tolerances, fresh, verify_n).conforming
     status = "verified" if verified.low >= stated.required_yield else "not verified"
@@ -460,9 +460,7 @@ def _allocate_drive(
         optimality_gap_reason="the peak-to-peak's quantile is not proven convex in the tolerances, so no lower bound "
         f"of the cost is proven; the last convex model closed its own gap to {solution.optimality_gap:.1g}",
         marginal_cost=chosen.marginal_cost,
-        marginal_cost_reason="dual of the last convex model, cost per arcmin of the limit"
-        if chosen.marginal_cost is not None
-        else "a choice among grades has no slope",
+        marginal_cost_reason=_marginal_reason("last convex model", stated.unit, chosen.marginal_cost, chosen.grades),
         slack=stated.limit - chosen.modelled,
         verified_yield=verified,
         verify_n=verify_n,
@@ -473,6 +471,12 @@ def _allocate_drive(
     )
 
 
+def _marginal_reason(of_what: str, unit: str, value: float | None, grades: dict[str, str]) -> str:
+    if value is None:
+        return "a choice among grades alone has no slope"
+    return f"dual of the {of_what}, cost per {unit} of the limit" + (", grades held" if grades else "")
+
+
 def _attempt(name: str, run) -> RuleOutcome:
     from hdopt.tolerance.allocate import Infeasible
 
@@ -481,6 +485,16 @@ def _attempt(name: str, run) -> RuleOutcome:
     except Infeasible as error:
         nothing = Estimate(float("nan"), float("nan"), float("nan"))
         return RuleOutcome(name, float("nan"), {}, nothing, float("nan"), error.best_reachable, f"infeasible: {error}")
+
+
+def _present(problem, seed: int) -> RuleOutcome:
+    """The tolerances as they are, judged like every rule's."""
+    from hdopt.tolerance.allocate_response import COMPARE_POINTS, verify
+
+    tolerances = problem.by_name(problem.current)
+    judged = verify(problem, tolerances, seed + 1, COMPARE_POINTS)
+    cost = _present_cost(problem.items, tolerances)
+    return RuleOutcome("present", cost, tolerances, judged.conforming, judged.required_quantile.value, None)
 
 
 def _outcome(name: str, allocation: Allocation) -> RuleOutcome:
@@ -600,12 +614,10 @@ def _allocate_linear(
         present_cost=_present_cost(items, present),
         optimality_gap=solution.optimality_gap,
         optimality_gap_reason="against the Lagrangian lower bound"
-        if solution.marginal_cost is not None
+        if not any(item.cost.discrete for item in items)
         else "against the mixed-integer problem's lower bound",
         marginal_cost=solution.marginal_cost,
-        marginal_cost_reason=f"dual of the requirement, cost per {section.unit}"
-        if solution.marginal_cost is not None
-        else "a choice among grades has no slope",
+        marginal_cost_reason=_marginal_reason("requirement", section.unit, solution.marginal_cost, solution.grades),
         slack=solution.slack,
         verified_yield=verified,
         verify_n=verify_n,

@@ -106,7 +106,7 @@ def rss_rule(sensitivities: Sequence[float], limit: float, fixed: Sequence[float
 class Solution:
     """Least-cost tolerances with what was verified after solving.
 
-    `marginal_cost` is the fall of cost per unit of the limit (None for choices among grades, which have no slope);
+    `marginal_cost` is the fall of cost per unit of the limit, grades held (None where there are only grades);
     `lower_bound` the proven least cost; `slack` the requirement's limit less its value, computed anew.
     """
 
@@ -290,7 +290,7 @@ def _solve_with_choices(items: Sequence[Item], requirement: Requirement) -> Solu
             curved.append(i)
             constraints += [_cost_tangent(items[i], t[i], cost[i], x) for x in _first_tangents(low[i], high[i])]
     constraints.append(_requirement_tangent(requirement, scale, unit, t, np.clip(np.ones(len(items)), low, high)))
-    best: tuple[float, Array] | None = None
+    best: tuple[float, Array, float | None] | None = None
     bound, tried = -math.inf, set()
     for _ in range(ROUNDS):
         problem = cp.Problem(cp.Minimize(cp.sum(cost)), constraints)
@@ -306,10 +306,10 @@ def _solve_with_choices(items: Sequence[Item], requirement: Requirement) -> Solu
             tightest = [c if isinstance(c, float) else x for c, x in zip(choice, low * scale, strict=True)]
             at = np.array(tightest)
         else:
-            at = solved
+            at, multiplier = solved
             total = sum(float(item.cost.cost(x)) for item, x in zip(items, at, strict=True))
             if best is None or total < best[0]:
-                best = total, at
+                best = total, at, multiplier
         closed = best is not None and best[0] - bound <= GAP * abs(best[0])
         if closed or choice in tried:
             break
@@ -324,7 +324,12 @@ def _solve_with_choices(items: Sequence[Item], requirement: Requirement) -> Solu
             reachable,
         )
     return _finish(
-        items, requirement, best[1], lower_bound=min(bound, best[0]), marginal_cost=None, solver="HiGHS and Clarabel"
+        items,
+        requirement,
+        best[1],
+        lower_bound=min(bound, best[0]),
+        marginal_cost=best[2],
+        solver="HiGHS and Clarabel",
     )
 
 
@@ -338,12 +343,13 @@ def _choice(item: Item, tolerance: float) -> float | tuple[tuple[float, float], 
     return None
 
 
-def _solve_choice(items: Sequence[Item], requirement: Requirement, choice: tuple) -> Array | None:
-    """Least-cost tolerances once all choices are made, None where they leave no room."""
+def _solve_choice(items: Sequence[Item], requirement: Requirement, choice: tuple) -> tuple[Array, float | None] | None:
+    """Least-cost tolerances once all choices are made, with the marginal cost of what is left to choose; None where
+    they leave no room."""
     chosen = np.array([c if isinstance(c, float) else 0.0 for c in choice])
     free = [i for i, c in enumerate(choice) if not isinstance(c, float)]
     if not free:
-        return chosen if requirement.value(chosen) <= requirement.limit * (1 + FEASIBLE) else None
+        return (chosen, None) if requirement.value(chosen) <= requirement.limit * (1 + FEASIBLE) else None
     remaining = Requirement(
         requirement.limit,
         requirement.linear[free],
@@ -357,8 +363,9 @@ def _solve_choice(items: Sequence[Item], requirement: Requirement, choice: tuple
         check_feasible(convex, remaining)
     except Infeasible:
         return None
-    chosen[free] = list(_solve_convex(convex, remaining).tolerances.values())
-    return chosen
+    solution = _solve_convex(convex, remaining)
+    chosen[free] = list(solution.tolerances.values())
+    return chosen, solution.marginal_cost
 
 
 def _first_tangents(low: float, high: float) -> Array:

@@ -50,7 +50,8 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 
 def peak_kib(n):
-    done = subprocess.run([sys.executable, "-c", STREAMED.replace("COUNT", str(n))], capture_output=True, text=True, check=True)
+    code = STREAMED.replace("COUNT", str(n))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return int(done.stdout)
 
 
