@@ -14,7 +14,7 @@ test:
 	rm -rf $(TEST_VENV)
 	$(MAKE) $(TEST_VENV)/ready VENV=$(TEST_VENV)
 	$(TEST_VENV)/bin/ruff check .
-	$(TEST_VENV)/bin/python -m pytest --benchmark-disable $(PYTEST_ARGS)
+	$(TEST_VENV)/bin/python -m pytest -n 2 --benchmark-disable $(PYTEST_ARGS)
 
 check: $(VENV)/ready lint
 	$(VENV)/bin/python -m pytest -q -m "not slow and not browser" --benchmark-disable -x -n 2 $(PYTEST_ARGS)

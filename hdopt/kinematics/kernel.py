@@ -30,14 +30,14 @@ compiled = njit(**OPTIONS)
 rigid_motion = inlined(closed_form.rigid_motion)
 rim_depth = inlined(closed_form.rim_depth)
 
-NARROW = 0.25
-"""How far, in rad, a refined extreme may move from its first-order place."""
-SETTLED = 0.2
-"""How far, in units of the second-order terms, a once-refined minimum may still sink."""
-FINAL_REACH = 0.02
+REACH = 0.12
+"""How far, in rad, an extreme may lie from its first-order place."""
+SETTLED = 0.1
+"""How far, in units of the second-order terms, a minimum may still sink when it is refined."""
+FINAL_REACH = 0.05
 """How far it may still move in the last step, where parabolas stand for the branches."""
-SCRATCH = (32, 8)
-"""Work space: first-order minima (bound, cos, sin), then refined ones (value, cos, sin, cos and sin of FS phase)."""
+SCRATCH = (64, 10)
+"""Work space: first-order minima (bound, cos, sin); screened ones (value, cos, sin, FS phase as cos, sin, step, x)."""
 
 
 @inlined
@@ -109,33 +109,6 @@ def _rim(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin, s, k):
 
 
 @inlined
-def _lowest_between(low, high, v1, g1, b1, v2, g2, b2):
-    """Lowest point (x, value) of the higher of two parabolas v + g x + b x^2/2 on the interval [low, high]."""
-    x_best, best = low, max(v1 + low * (g1 + low * b1 / 2), v2 + low * (g2 + low * b2 / 2))
-    value = max(v1 + high * (g1 + high * b1 / 2), v2 + high * (g2 + high * b2 / 2))
-    if value < best:
-        x_best, best = high, value
-    gap, rate, turn = v1 - v2, g1 - g2, b1 - b2
-    x = -gap / rate
-    x -= (gap + x * (rate + turn * x / 2)) / (rate + turn * x)
-    if low <= x <= high:
-        value = max(v1 + x * (g1 + x * b1 / 2), v2 + x * (g2 + x * b2 / 2))
-        if value < best:
-            x_best, best = x, value
-    if (g1 + low * b1) < 0.0 < (g1 + high * b1):
-        x = -g1 / b1
-        value = max(v1 + x * g1 / 2, v2 + x * (g2 + x * b2 / 2))
-        if value < best:
-            x_best, best = x, value
-    if (g2 + low * b2) < 0.0 < (g2 + high * b2):
-        x = -g2 / b2
-        value = max(v2 + x * g2 / 2, v1 + x * (g1 + x * b1 / 2))
-        if value < best:
-            x_best, best = x, value
-    return x_best, best
-
-
-@inlined
 def _rotate(cos, sin, x):
     """(cos, sin) turned by a small angle x (series to x^5; |x| <= 0.25 keeps 3e-7)."""
     x2 = x * x
@@ -149,13 +122,6 @@ def _switch(upper, lower):
     """Where, seen from here, the deepest rim changes; infinite where it does not."""
     rate = upper.depth_slope - lower.depth_slope
     return (lower.depth - upper.depth) / rate if rate != 0.0 else math.inf
-
-
-@inlined
-def _with_fs(rim, s, a_fs, advance, fs_cos, fs_sin):
-    """Value, slope and curvature of one branch of tau, its FS term included."""
-    cos, sin = _rotate(fs_cos, fs_sin, s * rim.offset_fs)
-    return rim.value + s * a_fs * sin, rim.slope + s * a_fs * advance * cos, rim.bend - s * a_fs * sin
 
 
 @inlined
@@ -175,28 +141,84 @@ def _four_rims(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin):
     return (a, b, c, d), min(first, second), max(first, second)
 
 
-@inlined
-def _lowest_nearby(rims, first, second, reach, a_fs, advance, fs_cos, fs_sin):
-    """(x, value): least driving deviation within `reach` of the angle of `rims`, where the FS phase is as given.
+class Piece(NamedTuple):
+    """A stretch [low, high] of angles on which each zone has one deepest rim, seen from the angle x = 0.
 
-    Between the angles where either zone's deepest rim changes, tau_1 and tau_2 are smooth: each piece is searched with
-    its ends, since tau steps there and the infimum is a one-sided limit.
+    The driving deviation is mean + |half the gap|; each is given by value, slope and curvature, without FS terms. `h`
+    and `d` are half the sum and half the difference of the FS offsets of both zones.
     """
+
+    low: float
+    high: float
+    mean: float
+    mean_slope: float
+    mean_bend: float
+    gap: float
+    gap_slope: float
+    gap_bend: float
+    h: float
+    d: float
+
+
+@inlined
+def _piece(rims, low, high):
+    middle = (low + high) / 2
+    one = rims[0] if _deeper(rims[0], rims[1], middle) else rims[1]
+    two = rims[2] if _deeper(rims[2], rims[3], middle) else rims[3]
+    return Piece(
+        low,
+        high,
+        (one.value + two.value) / 2,
+        (one.slope + two.slope) / 2,
+        (one.bend + two.bend) / 2,
+        (one.value - two.value) / 2,
+        (one.slope - two.slope) / 2,
+        (one.bend - two.bend) / 2,
+        (one.offset_fs + two.offset_fs) / 2,
+        (one.offset_fs - two.offset_fs) / 2,
+    )
+
+
+@inlined
+def _lowest_of_piece(piece, a_fs, advance, cos, sin, off):
+    """(x, value) of the lowest point of one piece, where the FS phase is `off` past that of (cos, sin) at x = 0.
+
+    Free of branches: it runs for every phase near every candidate, and only the few that come lowest are refined.
+    """
+    mean = piece.mean + a_fs * cos * piece.h
+    gap = piece.gap + a_fs * (sin + cos * (off + piece.d))
+    slope = piece.gap_slope + a_fs * advance * cos
+    bend = piece.gap_bend - a_fs * sin
+    # A line plus the size of another is lowest where the steeper one vanishes, or else at an end.
+    at_end = piece.low if piece.mean_slope > 0.0 else piece.high
+    x = -gap / slope if abs(slope) > abs(piece.mean_slope) else at_end
+    x = min(piece.high, max(piece.low, x))
+    value = mean + x * (piece.mean_slope + x * piece.mean_bend / 2) + abs(gap + x * (slope + x * bend / 2))
+    # Where one zone drives alone, its own parabola may be lower.
+    side = 1.0 if gap > 0.0 else -1.0
+    one_bend = piece.mean_bend + side * bend
+    y = -(piece.mean_slope + side * slope) / one_bend if one_bend > 0.0 else 0.0
+    y = min(piece.high, max(piece.low, y))
+    alone = mean + y * (piece.mean_slope + y * piece.mean_bend / 2) + abs(gap + y * (slope + y * bend / 2))
+    x, value = (y, alone) if alone < value else (x, value)
+    return x, value if piece.high >= piece.low else math.inf
+
+
+@inlined
+def _pieces(rims, first, second, reach):
+    """The three stretches within `reach`, between the two angles where a deepest rim changes."""
     first, second = min(reach, max(-reach, first)), min(reach, max(-reach, second))
-    x_best, best = 0.0, math.inf
-    for piece in range(3):
-        low = -reach if piece == 0 else first if piece == 1 else second
-        high = first if piece == 0 else second if piece == 1 else reach
-        if high > low:
-            middle = (low + high) / 2
-            one = rims[0] if _deeper(rims[0], rims[1], middle) else rims[1]
-            two = rims[2] if _deeper(rims[2], rims[3], middle) else rims[3]
-            v1, g1, b1 = _with_fs(one, 1.0, a_fs, advance, fs_cos, fs_sin)
-            v2, g2, b2 = _with_fs(two, -1.0, a_fs, advance, fs_cos, fs_sin)
-            x, value = _lowest_between(low, high, v1, g1, b1, v2, g2, b2)
-            if value < best:
-                x_best, best = x, value
-    return x_best, best
+    return _piece(rims, -reach, first), _piece(rims, first, second), _piece(rims, second, reach)
+
+
+@inlined
+def _lowest(pieces, a_fs, advance, cos, sin, off):
+    """(x, value) of the lowest point of all three pieces."""
+    x, value = _lowest_of_piece(pieces[0], a_fs, advance, cos, sin, off)
+    x_next, value_next = _lowest_of_piece(pieces[1], a_fs, advance, cos, sin, off)
+    x, value = (x_next, value_next) if value_next < value else (x, value)
+    x_next, value_next = _lowest_of_piece(pieces[2], a_fs, advance, cos, sin, off)
+    return (x_next, value_next) if value_next < value else (x, value)
 
 
 @compiled
@@ -250,33 +272,35 @@ def _least(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phas
             continue
         cos, sin = scratch[i, 1], scratch[i, 2]
         rims, first, second = _four_rims(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin)
+        pieces = _pieces(rims, first, second, REACH)
         phase = advance * _angle(sin, cos) + fs_phase
         # FS phase at which both zones drive equally, or the trough of the zone that drives alone.
         wanted = -(d_cos * cos + d_sin * sin + d_0) / a_fs if a_fs > 0.0 else 0.0
         wanted = min(1.0, max(-1.0, wanted))
         other = math.sqrt(1.0 - wanted * wanted)
         target = _angle(wanted, other)
-        for crossing in range(2 if other > 0.0 else 1):
+        for crossing in range(2):
             if crossing == 1:
                 target, other = math.pi - target, -other
             off = (phase - target) / spacing
             off = (off - math.floor(off)) * spacing
             for neighbour in range(2):
-                fs_cos, fs_sin = _rotate(other, wanted, off - neighbour * spacing)
-                x, value = _lowest_nearby(rims, first, second, NARROW, a_fs, advance, fs_cos, fs_sin)
+                step = off - neighbour * spacing
+                x, value = _lowest(pieces, a_fs, advance, other, wanted, step)
                 least = min(least, value)
-                if value <= least + settled and found < SCRATCH[0]:
-                    turned = _rotate(cos, sin, x)
-                    turned_fs = _rotate(fs_cos, fs_sin, advance * x)
-                    scratch[found, 3], scratch[found, 4], scratch[found, 5] = value, turned[0], turned[1]
-                    scratch[found, 6], scratch[found, 7] = turned_fs[0], turned_fs[1]
-                    found += 1
+                row = scratch[found]
+                row[3], row[4], row[5], row[6], row[7], row[8], row[9] = value, cos, sin, other, wanted, step, x
+                found += 1
 
     polished = math.inf
     for i in range(found):
-        if scratch[i, 3] <= least + settled:
-            rims, first, second = _four_rims(tip, motion, cs_cos, cs_sin, tan_alpha, scratch[i, 4], scratch[i, 5])
-            _, value = _lowest_nearby(rims, first, second, FINAL_REACH, a_fs, advance, scratch[i, 6], scratch[i, 7])
+        row = scratch[i]
+        if row[3] <= least + settled:
+            x = row[9]
+            cos, sin = _rotate(row[4], row[5], x)
+            fs_cos, fs_sin = _rotate(row[6], row[7], row[8] + advance * x)
+            rims, first, second = _four_rims(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin)
+            _, value = _lowest(_pieces(rims, first, second, FINAL_REACH), a_fs, advance, fs_cos, fs_sin, 0.0)
             polished = min(polished, value)
     return polished
 

@@ -22,9 +22,9 @@ def peak_to_peak_arcmin(drive: Drive, errors: DriveErrors, workers: int | None =
     """Converged peak-to-peak kinematic error (supremum less infimum over one full relative turn), arcmin, k_e = 1.
 
     `errors` may hold arrays; the result has their common shape. Within 1e-3 arcmin of the exact geometry for 99 % of
-    drives of the shipped tolerances (`tests/benchmarks/test_peak_to_peak.py` measures it). A measured profile, whose
-    two tips may differ, takes the exact geometry drive by drive, some thousand times slower. `workers` threads, all
-    cores if None; the result does not depend on it.
+    drives of the shipped tolerances (measured by `tests/benchmarks/test_peak_to_peak_speed.py`). A measured profile,
+    whose two tips may differ, takes the exact geometry drive by drive, some thousand times slower. `workers` threads,
+    all cores if None; the result does not depend on it.
     """
     if not drive.wave_generator.profile.tip_is_smooth:
         from hdopt.kinematics.extremes import peak_to_peak_by_search_arcmin
