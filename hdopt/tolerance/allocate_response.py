@@ -360,7 +360,8 @@ def _corrected(
         excess = value - problem.limit
         if excess <= 0 and (best is None or solution.total_cost < best.total_cost):
             best = solution
-        if -CLOSE * problem.limit <= excess <= 0 or len(solution.grades) == len(items):
+        moving = [item for item in items if item.name not in (*solution.grades, *solution.binding)]
+        if -CLOSE * problem.limit <= excess <= 0 or (excess <= 0 and not moving):
             break
         limit -= excess + CLOSE / 2 * problem.limit
     if best is None:

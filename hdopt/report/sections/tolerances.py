@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdopt.report import Figure, KeyFigures, Section, Table, Text
-from hdopt.report.sections.words import listed
+from hdopt.report.sections.words import in_sentence, listed
 from hdopt.report.theme import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, faded, figure
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
         }
     ).sort_values("share", ascending=False, ignore_index=True)
     verdict = "keep" if conforming.low >= stack.required_yield else "do not keep"
-    most = [readable(name).lower().replace("wg", "WG") for name in shares["input"][:2]]
+    most = [in_sentence(readable(name)) for name in shares["input"][:2]]
     return Section(
         key,
         "What the tolerances give",
@@ -196,7 +196,7 @@ def sobol_section(result: SobolResult, key: str = "sobol") -> Section:
         key,
         "Which tolerances matter",
         (*items, *(Text(note) for note in result.notes)),
-        f"The spread comes most from {listed([readable(name) for name in most])}.",
+        f"The spread comes most from {listed([in_sentence(readable(name)) for name in most])}.",
     )
 
 
@@ -249,6 +249,7 @@ def _convergence(sobol: Sobol) -> go.Figure:
             y=np.concatenate([value - half, (value + half)[::-1]]),
             fill="toself",
             fillcolor=faded(colour, 0.15),
+            mode="lines",
             line={"width": 0},
             hoverinfo="skip",
             showlegend=False,

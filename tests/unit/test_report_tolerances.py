@@ -1,0 +1,59 @@
+"""The tolerance sections' numbers: what they show is what the results hold."""
+
+import pytest
+
+from hdopt.report import Figure, KeyFigures, Report, Table
+from hdopt.report.html import write_report
+from hdopt.report.sections.tolerances import allocate_section, readable, sobol_section, stack_section
+from hdopt.tolerancing import allocate, sobol, stack
+
+
+def of_kind(section, kind):
+    return {getattr(item, "key", ""): item for item in section.items if isinstance(item, kind)}
+
+
+@pytest.fixture(scope="module")
+def sections():
+    return {
+        "stack": stack_section(stack(n=2**13, worst_case=True, tail=2.0)),
+        "sobol": sobol_section(sobol(n=2**9, shapley="groups")),
+        "allocate": allocate_section(allocate("chase-shaft-housing", curve=(0.9, 1.0, 1.2))),
+    }
+
+
+def test_names_in_words():
+    assert readable("wg_tilt_major_deg") == "WG tilt major"
+    assert readable("bore") == "Bore"
+
+
+def test_stack_shows_its_yield_and_every_contribution(sections):
+    result = stack(n=2**13, worst_case=True, tail=2.0)
+    values = of_kind(sections["stack"], KeyFigures)[""].values
+    assert values["Yield"].startswith(f"{100 * result.stack.conforming.value:.3f} %")
+    assert values["P(above 2 arcmin)"].startswith("0 (0 to 0)")
+    shares = of_kind(sections["stack"], Table)["stack-contributions-table"].frame
+    assert shares["share"].sum() == pytest.approx(1)
+    assert "do not keep" in sections["stack"].summary
+    bars = of_kind(sections["stack"], Figure)["stack-distribution"].figure.data[0]
+    assert sum(bars.y * bars.width) == pytest.approx(1)
+
+
+def test_sobol_shows_indices_pairs_and_shapley(sections):
+    assert set(of_kind(sections["sobol"], Figure)) == {
+        "sobol-indices",
+        "sobol-convergence",
+        "sobol-pairs",
+        "sobol-shapley",
+    }
+
+
+def test_allocation_shows_the_rules(sections):
+    rules = of_kind(sections["allocate"], Table)["allocate-rules"].frame
+    assert rules["rule"].tolist() == ["present", "worst_case", "rss"]
+    assert rules["cost"].tolist() == pytest.approx([9.3359, 11.07783, 8.053611], abs=5e-5)
+
+
+def test_the_page_is_written(sections, tmp_path):
+    page = write_report(Report("Tolerances", "", tuple(sections.values())), tmp_path)
+    assert page.is_file()
+    assert (tmp_path / "allocate-rules.csv").is_file()
