@@ -1,6 +1,35 @@
-"""Makes `tests/cases.py` importable from every test folder."""
+"""Makes `tests/cases.py` importable from every test folder, and lets no test be skipped unseen.
 
+Skips are listed at the end of every run; where CI is set, one that is not on the short list below fails the run.
+"""
+
+from __future__ import annotations
+
+import os
 import sys
 from pathlib import Path
 
+import pytest
+
 sys.path.insert(0, str(Path(__file__).parent))
+
+ALLOWED_SKIPS = ("no recordings",)
+"""What a skip's reason may start with in CI: the recordings belong to others and are not part of the project."""
+
+_skipped: list[tuple[str, str]] = []
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    if report.skipped and not hasattr(report, "wasxfail"):
+        reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
+        _skipped.append((report.nodeid, reason.removeprefix("Skipped: ")))
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    refused = [skip for skip in _skipped if not skip[1].startswith(ALLOWED_SKIPS)]
+    on_a_worker = hasattr(session.config, "workerinput")
+    if refused and os.environ.get("CI") and not on_a_worker:
+        for test, reason in refused:
+            print(f"\nskipped, which CI does not allow: {test}: {reason}")
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
