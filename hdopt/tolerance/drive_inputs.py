@@ -77,7 +77,8 @@ class VectorSum:
     def widest(self, largest: Array, errors: dict[str, float]) -> None:
         length = sum(factor * largest[value] for value, _, factor in self.terms)
         kind, first, second = VECTORS[self.vector]
-        errors[first], errors[second] = length, length if kind == TILT else 0.0
+        # the wave generator turns under an axis tilt, so only that tilt's length counts; its own tilt turns with it
+        errors[first], errors[second] = length, length if kind == TILT and self.vector == "wg_tilt" else 0.0
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ def test_probability(response, limit, probability):
 )
 def test_intervals_cover_the_truth(response, limit, probability):
     """24 seeds at 95 %: fewer than 20 hits come up once in 200 trials of an honest interval."""
-    results = [tail_probability(response, STANDARD, limit, seed=seed, level_size=5000) for seed in range(24)]
+    results = [tail_probability(response, STANDARD, limit, seed=seed, level_size=4000) for seed in range(24)]
     assert sum(result.low <= probability <= result.high for result in results) >= 20
 
 
