@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from hdopt.drive import Drive, Structure
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.geometry.context import context_parts
 from hdopt.geometry.contour import Circle, Contour, ParallelCurve
-from hdopt.geometry.din6885 import key_for_bore
+from hdopt.geometry.din6885 import SMALLEST_BORE, key_for_bore
 from hdopt.geometry.features import BoltCircle, Bore, BrokenEdge, DBore, KeywayBore, PlainBore, Slot
 from hdopt.geometry.part import SHARP, Colour, Part, Prism, Tongue
 from hdopt.profiles import TwoDisk, tip_radius_of_curvature
@@ -113,14 +114,20 @@ class _Carrier:
         self.drive, self.take, self.options = drive, choices.take, choices.options
         self.width = generator.width
         self.bearing_thickness = generator.bearing_thickness
-        self.wall = self.take("minimum_wall_mm")
+
+    @cached_property
+    def wall(self) -> float:
+        """Least wall left anywhere, mm."""
+        return self.take("minimum_wall_mm", lambda: round(min(2.0, 0.08 * self.room), 2))
+
+    def chamfer(self) -> BrokenEdge:
+        return BrokenEdge.chamfer(self.take("chamfer_mm", lambda: round(min(0.3, 0.04 * self.width), 2)))
 
     def outer_edges(self) -> tuple[BrokenEdge, BrokenEdge]:
         """Chamfer at the input end, lead-in for the bearing at the other."""
-        chamfer = BrokenEdge.chamfer(self.take("chamfer_mm"))
-        length = self.take("lead_in_length_mm")
+        length = self.take("lead_in_length_mm", lambda: round(min(1.0, 0.12 * self.width), 2))
         lead_in = BrokenEdge.lead_in(length, math.radians(self.take("lead_in_angle_deg"))) if length else SHARP
-        return chamfer, lead_in
+        return self.chamfer(), lead_in
 
     def require_room_for_edges(self, height: float) -> None:
         chamfer, lead_in = self.outer_edges()
@@ -139,7 +146,7 @@ class _Carrier:
                 f"export.bore_mm is {diameter:g} mm; the bore is larger than the {inside} allows: it may have at most "
                 f"{2 * (room - self.wall):.4g} mm, with a wall of {self.wall:g} mm (export.minimum_wall_mm)"
             )
-        mount = self.take("mount")
+        mount = self.take("mount", lambda: "keyway" if diameter >= SMALLEST_BORE else "d_bore")
         if mount == "plain":
             return PlainBore(radius)
         if mount == "d_bore":
@@ -172,7 +179,7 @@ class _Carrier:
         raise NotImplementedError
 
     def countersink(self) -> float:
-        return self.take("bore_chamfer_mm")
+        return self.take("bore_chamfer_mm", lambda: round(min(0.5, 0.05 * self.shaft_diameter()), 2))
 
     def clearance_bore(self) -> PlainBore:
         """The hole in parts that slide: past the shaft's end with the slide's travel all round."""
@@ -207,16 +214,16 @@ class _Cam(_Carrier):
     def integral_parts(self) -> tuple[Part, ...]:
         # The keyway lies on the major axis, where the wall is thickest, and so marks that axis.
         bore = self.shaft_bore(MAJOR, self.room, "cam")
-        if not self.take("hub"):
+        if not self.take("hub", lambda: self._hub_fits(self._seat_for(bore))):
             return self.parts(bore, self._bolts(bore.reach, THREADS[self._thread()][0], 0))
-        seat = self.take("hub_seat_mm", lambda: 2.0 * math.ceil(bore.reach + self.wall)) / 2
+        seat = self.take("hub_seat_mm", lambda: 2 * self._seat_for(bore)) / 2
         bore = self.shaft_bore(MAJOR, seat, "hub")
         clearance, tap = THREADS[self._thread()]
         self._require_hub_room(seat)
         bolts = self._bolts(seat, clearance, 6)
         flange = seat + self.wall if bolts is None else bolts.radius + bolts.hole / 2 + self.wall
         thickness = self.take("hub_flange_thickness_mm", lambda: max(1.0, round(0.8 * self.width) / 2))
-        half, edge = self.width / 2, BrokenEdge.chamfer(self.take("chamfer_mm"))
+        half, edge = self.width / 2, self.chamfer()
         body = (
             Prism(Circle(flange), -half - thickness, -half, bottom_edge=edge),
             Prism(Circle(seat), -half, half, top_edge=edge),
@@ -225,6 +232,15 @@ class _Cam(_Carrier):
         faces = ((-half - thickness, -1), (half, 1))
         hub = Part("hub", DARK_STEEL, body, bore, self.countersink(), faces, bolts=tapped)
         return (hub, *self.parts(PlainBore(seat), bolts))
+
+    def _seat_for(self, bore: Bore) -> float:
+        """Radius of the hub's seat that leaves a wall around the bore, a whole number of mm."""
+        return float(math.ceil(bore.reach + self.wall))
+
+    def _hub_fits(self, seat: float) -> bool:
+        """Whether there is room between seat and rim for the usual circle of bolts."""
+        hole = THREADS[self._thread()][0]
+        return seat + 1.7 * hole + self.wall <= self.room
 
     def _require_hub_room(self, seat: float) -> None:
         if seat + self.wall > self.room:
@@ -297,7 +313,7 @@ class _TwoDiscs(_Carrier):
 
     def parts(self, bore: Bore, shoulder: float, thickness: float, slot: Slot | None = None) -> tuple[Part, ...]:
         journal = self._journal(bore)
-        half, chamfer = self.width / 2, BrokenEdge.chamfer(self.take("chamfer_mm"))
+        half, chamfer = self.width / 2, self.chamfer()
         step = -half - self.gap
         body = (
             Prism(Circle(max(shoulder, journal + self.offset)), step - thickness, step, bottom_edge=chamfer),
@@ -387,7 +403,7 @@ class _CrossSlide:
         self.carrier, self.structure = carrier, structure
         self.clearance, self.radius = clearances.cross_slide, clearances.disc_radius
         self.widths = {n: getattr(clearances, f"slot_{n}_width") for n in structure.slots}
-        self.depth = take("slot_depth_mm", lambda: max(1.0, round(2 * carrier.width / 3) / 2))
+        self.depth = take("slot_depth_mm", lambda: max(round(2 * carrier.width / 3) / 2, round(carrier.width / 3, 1)))
         self.gap = take("axial_gap_mm")
         self.travel = take("cross_slide_travel_mm")
         self.thickness = take("disc_thickness_mm", lambda: self.depth + 2 * carrier.wall)
@@ -450,7 +466,7 @@ class _CrossSlide:
         direction = self._direction(number)
         bore = self.carrier.shaft_bore(direction + math.pi / 2, self.radius, "input disc")
         top = back - self.gap
-        edge = BrokenEdge.chamfer(self.carrier.take("chamfer_mm"))
+        edge = self.carrier.chamfer()
         body = (
             Prism(Circle(self.radius), top - self.thickness, top, bottom_edge=edge),
             Tongue(self.radius, self.widths[number] - self.clearance, direction, top, top + self.depth),

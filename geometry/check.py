@@ -133,7 +133,7 @@ def _check_part(found: StepPart, part: Part) -> tuple[list[str], PartCheck | Non
     if found.colour is None or not np.allclose(found.colour, part.colour, atol=0.005):
         failures.append(f"{name} has the colour {found.colour}, not {part.colour}")
 
-    volume, allowed = solid.Volume(), BUILD_TOLERANCE * solid.Area() + 1e-9 * part.volume
+    volume, allowed = volume_of(solid), BUILD_TOLERANCE * solid.Area() + 1e-9 * part.volume
     if not abs(volume - part.volume) <= allowed:
         failures.append(f"{name} has a volume of {volume:.6f} mm^3; {part.volume:.6f} is right to {allowed:.1g}")
     box = solid.BoundingBox(tolerance=0.0)
@@ -145,6 +145,16 @@ def _check_part(found: StepPart, part: Part) -> tuple[list[str], PartCheck | Non
     failures += wrong
     size = (extent[3] - extent[0], extent[4] - extent[1], extent[5] - extent[2])
     return failures, PartCheck(name, volume, part.volume, size, part.size, deviation, part.context)
+
+
+def volume_of(solid: cq.Solid) -> float:
+    """mm^3, integrated until it is sure: the usual quick rule is 6e-7 off on smoothed profiles."""
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(solid.wrapped, properties, 1e-8)
+    return properties.Mass()
 
 
 def _check_walls(solid: cq.Solid, part: Part) -> tuple[list[str], float | None]:

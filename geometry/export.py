@@ -115,6 +115,8 @@ def export_drive(
     if len({path.resolve() for path in targets.values()}) < len(targets):
         raise HdoptError("two files of the export have the same name; give each its own")
     job = make_job(drive, options, name, bounds, contributors)
+    if any(FORMATS[kind].needs_solids for kind in targets):
+        require_cadquery()
     checks = {}
     with staged(targets) as passing:
         for kind, path in passing.items():
@@ -137,6 +139,14 @@ def make_job(
     width, zone = drive.wave_generator.width, options.profile_tolerance_mm
     table = key_dimensions(model.structure, model.parts, width, zone, bounds or {}, contributors)
     return Job(drive, model, options, table, identity)
+
+
+def require_cadquery() -> None:
+    """`HdoptError` that says what to install, where CadQuery's libraries do not load."""
+    try:
+        import cadquery  # noqa: F401
+    except ImportError as error:
+        raise HdoptError(f"CadQuery cannot be loaded ({error}); on Debian install libgl1, then try again") from error
 
 
 def fingerprint(drive: Drive, options: ExportSection) -> str:

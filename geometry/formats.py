@@ -15,6 +15,10 @@ class Format(Protocol):
     @property
     def description(self) -> str: ...
 
+    @property
+    def needs_solids(self) -> bool:
+        """Whether writing it takes CadQuery."""
+
     def write(self, path: Path, job: Job) -> None: ...
 
     def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
@@ -23,6 +27,7 @@ class Format(Protocol):
 
 class Step:
     description = "STEP assembly of all parts (AP214 or AP242)"
+    needs_solids = True
 
     def write(self, path: Path, job: Job) -> None:
         from hdopt.geometry.step import write_step
@@ -38,6 +43,7 @@ class Step:
 
 class Dxf:
     description = "DXF of the profile for wire cutting, with bore and tolerance zone"
+    needs_solids = False
 
     def write(self, path: Path, job: Job) -> None:
         from hdopt.geometry.dxf import write_dxf
@@ -52,6 +58,7 @@ class Dxf:
 
 class Stl:
     description = "STL mesh of all parts in their places, for printing"
+    needs_solids = True
 
     def write(self, path: Path, job: Job) -> None:
         from hdopt.geometry.mesh import write_stl
@@ -66,6 +73,7 @@ class Stl:
 
 class ThreeMf:
     description = "3MF mesh with named, coloured parts, for printing"
+    needs_solids = True
 
     def write(self, path: Path, job: Job) -> None:
         from hdopt.geometry.mesh import write_3mf
@@ -80,6 +88,7 @@ class ThreeMf:
 
 class Svg:
     description = "SVG drawing: front view with dimensions, section, key dimensions"
+    needs_solids = True
 
     def write(self, path: Path, job: Job) -> None:
         from hdopt.geometry.drawing import draw
@@ -94,6 +103,7 @@ class Svg:
 
 class Png:
     description = "PNG picture of the parts, pulled apart"
+    needs_solids = True
 
     def write(self, path: Path, job: Job) -> None:
         from hdopt.geometry.picture import write_png

@@ -19,9 +19,14 @@ class ExportSection(Section):
     """[export]"""
 
     bore_mm: _Length = Field(None, gt=0, description="preferred size next to a quarter of the cam's minor diameter")
-    mount: Literal["keyway", "d_bore", "plain"] = Field("keyway", description="keyway of DIN 6885-1")
+    mount: Literal["keyway", "d_bore", "plain"] | None = Field(
+        None, description="keyway of DIN 6885-1, which begins at 6 mm; a D-bore below"
+    )
     d_flat_mm: _Length = Field(None, gt=0, description="flat 0.8 bore radii from the axis")
-    hub: bool = Field(True, description="integral type: the cam is screwed to a flanged hub that takes the shaft")
+    hub: bool | None = Field(
+        None,
+        description="integral type: the cam is screwed to a flanged hub on the shaft, where there is room",
+    )
     hub_seat_mm: _Length = Field(None, gt=0, description="bore or keyway plus twice the least wall, next even number")
     hub_flange_thickness_mm: _Length = Field(None, gt=0, description="0.4 of the width, to 0.5 mm")
     bolt_count: int | None = Field(None, ge=0, le=48, description="six with a hub, none without")
@@ -29,11 +34,13 @@ class ExportSection(Section):
         None, description="by the size of the cam; holes ISO 273 medium, tap drills ISO 2306"
     )
     bolt_circle_mm: _Length = Field(None, gt=0, description="diameter that leaves 1.2 holes beside the seat or bore")
-    chamfer_mm: float = Field(0.3, ge=0, description="45 degree chamfer of outer edges")
-    bore_chamfer_mm: float = Field(0.5, ge=0, description="45 degree countersink of the bore")
-    lead_in_length_mm: float = Field(1.0, ge=0, description="taper to press the bearing on, at the end away from input")
+    chamfer_mm: _Length = Field(None, ge=0, description="45 degree chamfer of outer edges; 0.3 mm, at most 0.04 widths")
+    bore_chamfer_mm: _Length = Field(None, ge=0, description="45 degree countersink; 0.5 mm, at most 0.05 bores")
+    lead_in_length_mm: _Length = Field(
+        None, ge=0, description="taper to press the bearing on, at the end away from input; 1 mm, at most 0.12 widths"
+    )
     lead_in_angle_deg: float = Field(15.0, gt=0, le=45, description="angle of that taper to the axis")
-    minimum_wall_mm: float = Field(2.0, gt=0, description="least wall left anywhere")
+    minimum_wall_mm: _Length = Field(None, gt=0, description="least wall left anywhere; 2 mm, in small cams 0.08 radii")
     slot_depth_mm: _Length = Field(None, gt=0, description="a third of the width, to 0.5 mm")
     disc_thickness_mm: _Length = Field(None, gt=0, description="slot depth and twice the least wall")
     axial_gap_mm: float = Field(0.1, ge=0, description="axial play between parts that slide on each other")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from click.testing import CliRunner
+from wave_generators import drive
 
 from hdopt.cli import main
 
@@ -19,7 +20,7 @@ CASES = {
         "bore is larger than the input disc allows: it may have at most 26 mm",
     ),
     "no room for the hub": (
-        ("--set", "bore_mm=40"),
+        ("--set", "bore_mm=40", "--set", "hub=true"),
         r"the hub's seat of 54 mm is larger than the cam allows: 50\.64 mm, .* export.hub = false",
     ),
     "keyway through the wall": (
@@ -30,14 +31,14 @@ CASES = {
         ("--set", "hub_seat_mm=19"),
         r"keyway .* goes through the wall of the hub: it reaches 9\.\d+ mm .* smaller export.bore_mm",
     ),
-    "bore without a key": (("--set", "bore_mm=5"), "no keyway in DIN 6885-1"),
+    "bore without a key": (("--set", "bore_mm=5", "--set", "mount=keyway"), "no keyway in DIN 6885-1"),
     "bearing too thick": (
         ("--set", "bearing_thickness_mm=29.7"),
         "crosses itself: .* 29.61 mm; give a thinner bearing",
     ),
     "bearing leaves no room": (
         ("--set", "bearing_thickness_mm=27", "--set", "bore_mm=6"),
-        "larger than the cam allows",
+        "goes through the wall of the cam: it reaches 4.123 mm",
     ),
     "clearance closes a slot": (
         (*SLIDING, "--set", "cross_slide_clearance_mm=5.5"),
@@ -104,8 +105,6 @@ def test_target_that_is_a_folder_or_named_twice(tmp_path, capsys):
 def test_missing_numbers_are_named():
     from dataclasses import replace
 
-    from wave_generators import drive
-
     from hdopt.drive import Clearances, Structure
     from hdopt.errors import MissingValue
     from hdopt.geometry.export import export_drive
@@ -117,6 +116,19 @@ def test_missing_numbers_are_named():
         MissingValue, match=r"clearances\.cross_slide_clearance_mm and .*disc_radius_mm and .*slot_2_wid"
     ):
         export_drive(bare, {})
+
+
+def test_machine_without_the_libraries_of_cadquery(monkeypatch, tmp_path):
+    import sys
+
+    from hdopt.errors import HdoptError
+    from hdopt.geometry.export import export_drive
+
+    monkeypatch.setitem(sys.modules, "cadquery", None)
+    with pytest.raises(HdoptError, match="CadQuery cannot be loaded .* on Debian install libgl1"):
+        export_drive(drive(), {"step": tmp_path / "wave.step"})
+    assert list(tmp_path.iterdir()) == []
+    export_drive(drive(), {"dxf": tmp_path / "wave.dxf"})
 
 
 def test_help_names_every_format():

@@ -77,7 +77,7 @@ def test_outlines_of_features_enclose_their_areas():
 
 def test_stl_and_3mf_hold_the_made_parts(tmp_path):
     files = {"stl": tmp_path / "wave.stl", "3mf": tmp_path / "wave.3mf"}
-    result = export_drive(drive(structure=Structure.AUTOMATIC), files, ExportSection(context=True))
+    result = export_drive(drive(structure=Structure.AUTOMATIC), files)
     made = [part for part in result.model.parts if not part.context]
     content = files["stl"].read_bytes()
     assert not content.startswith(b"solid")

@@ -84,6 +84,7 @@ def render(tmp_path, **options):
         pytest.skip(str(reason))
 
 
+@pytest.mark.slow
 def test_picture_shows_the_cam_in_its_colour_and_a_blank_one_fails(tmp_path, monkeypatch):
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOImage import vtkPNGReader
@@ -131,6 +132,7 @@ def test_report_section_shows_drawing_parts_and_tolerances(tmp_path):
     assert "coaxiality diameter 0.015" in set(tables["geometry-dimensions"]["tolerance"])
 
 
+@pytest.mark.slow
 def test_step_of_a_run_writes_files_and_a_section(tmp_path):
     from hdopt.steps import Context, find_step
     from hdopt.study import load_study

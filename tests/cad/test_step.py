@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from wave_generators import drive
 
-from hdopt.drive import Structure
+from hdopt.drive import Clearances, Structure
 from hdopt.geometry.assembly import wave_generator_model
 from hdopt.geometry.check import PROFILE_TOLERANCE, interferences
+from hdopt.geometry.export import export_drive
 from hdopt.geometry.step import read_step
+from hdopt.profiles import Ellipse, Resal, TwoDisk
 from hdopt.study.export import ExportSection
 
 QUICK = {
@@ -49,6 +51,24 @@ def test_every_profile_and_structure_passes_its_check(exported, profile, structu
     assert names == expected
     assert 0 < result.to_dict()["max_profile_deviation_um"] <= PROFILE_TOLERANCE * 1e3 or profile == "two_disk"
     assert list(result.files["step"].parent.iterdir()) == [result.files["step"]]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("radius", "seed"), [(9.0, 1), (17.0, 2), (55.0, 3), (120.0, 4)])
+def test_rules_make_a_wave_generator_of_every_size(radius, seed, tmp_path):
+    """Without a word in [export]: from finger to dinner-plate size, all profiles, all structures in turn."""
+    rng = np.random.default_rng(seed)
+    deflection, thickness = radius * rng.uniform(0.006, 0.03), radius * rng.uniform(0.05, 0.18)
+    profiles = (
+        Ellipse.of_equal_perimeter(radius, radius + deflection),
+        Resal(radius, deflection),
+        TwoDisk(radius, deflection, np.radians(rng.uniform(10, 75))),
+    )
+    for profile, structure in zip(profiles, rng.permutation(np.array(Structure, dtype=object)), strict=False):
+        one = drive(structure=structure, profile=profile, width=0.3 * radius, bearing_thickness=thickness)
+        clearances = Clearances(0.01, 0.02, 0.2 * radius, 0.2 * radius, 0.5 * radius)
+        result = export_drive(replace(one, clearances=clearances), {"step": tmp_path / "wave.step"})
+        assert result.profile_deviation_um <= PROFILE_TOLERANCE * 1e3
 
 
 def test_file_names_the_study_and_colours_its_parts(exported):
