@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 TEST_VENV := build/test-environment
 OUT ?= out
-SHIPPED := csf-25-80 paper-reproduction
+SHIPPED := csf-25-80 paper-reproduction csf-25-80-design-trade
 
 .PHONY: study test check lint lock benchmark clean
 

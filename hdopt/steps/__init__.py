@@ -67,6 +67,7 @@ STEPS: dict[str, StepPlace] = {
     "sobol": StepPlace("hdopt.steps.tolerances:sobol", MANY_DRIVES),
     "allocate": StepPlace("hdopt.steps.tolerances:allocate", ("allocate",)),
     "geometry": StepPlace("hdopt.steps.geometry:geometry", ("drive", "export")),
+    "search": StepPlace("hdopt.steps.search:search", ("search",)),
     "paper_reproduction": StepPlace("hdopt.studies.paper_reproduction:paper_reproduction"),
 }
 """Every step, in the order of a report; a step is imported only when a study asks for it."""

@@ -107,7 +107,7 @@ class SearchSection(Section):
     robust: bool = False
     """Whether the front under the tolerances is made as well."""
     quantile: float = Field(default=0.9973, gt=0.5, lt=1)
-    samples: int = Field(default=1024, ge=128, le=1 << 20)
+    samples: int = Field(default=2048, ge=128, le=1 << 20)
     front_points: int = Field(default=30, ge=2, le=1000)
     perturbation: float = Field(default=0.2, gt=0, lt=1)
     global_algorithm: str | None = None

@@ -25,11 +25,14 @@ from hdopt.deviations import DriveErrors
 from hdopt.drive import Drive
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
 from hdopt.kinematics.kernel import rigid_motion
+from hdopt.trade.halves import in_parts
 
 Array = NDArray[np.float64]
 
 HIGHS, LOWS = 4, 8
-SCAN = 240
+SCAN = 144
+KEPT_RANGE = 0.25
+"""Local minima within this share of the range of l above its lowest scanned value are refined."""
 NEWTON = 12
 GOLDEN = 45
 BESIDE = 1e-7
@@ -279,9 +282,12 @@ def _minima(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, work, values, slopes):
         upper[i, 0], upper[i, 1] = gaps[0] >= 0, gaps[1] >= 0
         _lowest(work, a_fs, out)
         level[i] = out[VALUE]
+    highest_kept = level.min() + KEPT_RANGE * (level.max() - level.min())
     values[:] = math.inf
     ends = np.empty(2, np.int64)
     for i in range(SCAN):
+        if min(level[i], level[i + 1]) > highest_kept:
+            continue
         before = level[i - 1] if i > 0 else level[SCAN - 1]
         after = level[i + 2] if i < SCAN - 1 else level[1]
         change0 = change1 = math.nan
@@ -371,5 +377,5 @@ def extremes_of(tip: TipGeometry, tan_alpha: float, rows: Array) -> Extremes:
     rows = np.ascontiguousarray(rows, float)
     n = len(rows)
     found = Extremes(np.empty((n, HIGHS)), np.empty((n, HIGHS, 4)), np.empty((n, LOWS)), np.empty((n, LOWS, 4)))
-    _extremes(tip, tan_alpha, rows, *found)
+    in_parts(n, lambda part: _extremes(tip, tan_alpha, rows[part], *(array[part] for array in found)))
     return found

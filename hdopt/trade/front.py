@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -19,22 +20,35 @@ KEPT_EQUAL = 1e-9
 """Relative difference below which two values count as equal."""
 
 
-def front(problem: DesignProblem, second: str, points: int, method: Method, best: Solution) -> list[Solution]:
-    """Feasible designs between the least objective (`best`) and the best of the quantity `second`.
+def front_ends(
+    problem: DesignProblem, second: str, method: Method, start: dict[str, float]
+) -> tuple[tuple[Solution, Solution] | None, int]:
+    """The ends of a front, the best of the objective and the best of `second`, searched from the values `start`;
+    None where either cannot be had. And the evaluations spent."""
+    best = solve(problem, method, [start])
+    extreme = solve(_with_objective(problem, second), method, [start])
+    spent = best.evaluations + extreme.evaluations
+    return ((best, extreme) if best.feasible and extreme.feasible else None), spent
+
+
+def front(
+    problem: DesignProblem, second: str, points: int, method: Method, best: Solution, extreme: Solution
+) -> list[Solution]:
+    """Feasible designs between the least objective (`best`) and the best of the quantity `second` (`extreme`).
 
     Epsilon-constraint: the second quantity's limit is moved in even steps from what the best design has to the best it
     can be, and each search starts from its neighbour's design. Not yet freed of dominated points.
     """
     quantity = find_quantity(second)
-    other = _with_objective(problem, second)
-    extreme = solve(other, method, [best.values]) if quantity.small_is_good else None
-    if extreme is None or not extreme.feasible:
-        return [best]
-    design = problem.space.design(problem.combination, best.values)
-    high, low = quantity.value(problem.trade, design), extreme.objective
+    ends = [
+        quantity.value(problem.trade, problem.space.design(problem.combination, solution.values))
+        for solution in (best, extreme)
+    ]
+    slack = abs(ends[1]) * KEPT_EQUAL * (1 if quantity.small_is_good else -1)
     found = [best]
-    for bound in np.linspace(high, low, points)[1:]:
-        limited = problem.with_limits(Limit(second, float(bound) + abs(low) * KEPT_EQUAL))
+    for bound in np.linspace(*ends, points)[1:]:
+        limit = Limit(second, float(bound) + slack, at_least=not quantity.small_is_good)
+        limited = problem.with_limits(limit)
         solution = solve(limited, method, [found[-1].values])
         if not solution.feasible:
             solution = solve(limited, method, [extreme.values])
@@ -46,31 +60,31 @@ def front(problem: DesignProblem, second: str, points: int, method: Method, best
 
 
 def _with_objective(problem: DesignProblem, objective: str) -> DesignProblem:
-    from dataclasses import replace
-
     limits = tuple(limit for limit in problem.limits if limit.quantity != objective)
     return replace(problem, objective=objective, limits=limits)
 
 
-def non_dominated(points: ArrayLike) -> Array:
+def non_dominated(points: ArrayLike, slack: float = 0.0) -> Array:
     """Which rows of `points` (n, d), small is good, no other row beats in everything: boolean (n,).
 
-    Of rows that are equal the first stays.
+    Of rows that are equal the first stays. With `slack`, a share of each value, a row is beaten by one that is better
+    by more than it in one coordinate and worse by no more than it in the others: what only rounding tells apart.
     """
     points = np.asarray(points, float)
     kept = np.ones(len(points), bool)
     for i, point in enumerate(points):
-        no_worse = (points <= point).all(axis=1)
-        better = no_worse & (points < point).any(axis=1)
+        margin = slack * np.abs(point)
+        no_worse = (points <= point + margin).all(axis=1)
+        better = no_worse & (points < point - margin).any(axis=1)
         equal_before = no_worse & (points == point).all(axis=1) & (np.arange(len(points)) < i)
         kept[i] = not (better.any() or equal_before.any())
     return kept
 
 
-def pareto(items: Iterable[T], points: Sequence[Sequence[float]]) -> list[T]:
+def pareto(items: Iterable[T], points: Sequence[Sequence[float]], slack: float = 0.0) -> list[T]:
     """The non-dominated of `items`, sorted by the first coordinate of their `points`."""
     items, points = list(items), np.asarray(points, float).reshape(-1, 2)
-    chosen = np.flatnonzero(non_dominated(points))
+    chosen = np.flatnonzero(non_dominated(points, slack))
     return [items[i] for i in chosen[np.argsort(points[chosen, 0])]]
 
 

@@ -27,7 +27,7 @@ FIRST_STEP = 0.1
 def minimise(problem: Problem, start: Array, algorithm: str = LOCAL, effort: Effort | None = None) -> Outcome:
     """Local minimum of the largest piece under the constraints, from `start` in the unit cube."""
     effort = effort or Effort()
-    guard = Guard(problem)
+    guard = Guard(problem, slopes=algorithm.startswith("LD_"))
     start = np.clip(np.asarray(start, float), 0.0, 1.0)
     first = guard(start)
     if problem.n == 0:
@@ -87,7 +87,7 @@ def explore(problem: Problem, algorithm: str = GLOBAL, effort: Effort | None = N
     import nlopt
 
     effort = effort or Effort()
-    guard = Guard(problem)
+    guard = Guard(problem, slopes=False)
     centre = np.full(problem.n, 0.5)
     first = guard(centre)
     if problem.n == 0 or guard.failure is not None:

@@ -71,8 +71,11 @@ class Problem(Protocol):
     pieces: int
     constraints: int
 
-    def evaluate(self, u: Array) -> Evaluation:
-        """Raises `HdoptError` where `u` is no possible design: such a point is avoided, not an end."""
+    def evaluate(self, u: Array, slopes: bool = True) -> Evaluation:
+        """Raises `HdoptError` where `u` is no possible design: such a point is avoided, not an end.
+
+        Without `slopes` those of the evaluation are zeros.
+        """
 
 
 @dataclass(frozen=True)
@@ -107,8 +110,9 @@ def rank(evaluation: Evaluation) -> tuple[float, float]:
 class Guard:
     """Evaluates a problem for NLopt: copies, counts, remembers the best, and answers with finite numbers only."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, slopes: bool = True) -> None:
         self.problem = problem
+        self.slopes = slopes
         self.evaluations = self.impossible = 0
         self.best: tuple[Array, Evaluation] | None = None
         self.failure: BaseException | None = None
@@ -136,7 +140,7 @@ class Guard:
         try:
             if not np.isfinite(u).all():
                 raise HdoptError("the algorithm asked for a point that is not finite")
-            found = self.problem.evaluate(u)
+            found = self.problem.evaluate(u, self.slopes)
         except HdoptError:
             self.impossible += 1
             return None
@@ -162,7 +166,7 @@ class Effort:
     """When to stop, and the seed of what is random."""
 
     evaluations: int = 200
-    tolerance: float = 1e-7
+    tolerance: float = 1e-6
     seed: int = 1
 
 
@@ -188,13 +192,20 @@ def run(optimizer, guard: Guard, start: Array, name: str) -> Outcome:
         code = -4
     except nlopt.ForcedStop:
         code = -5
-    except (RuntimeError, ValueError, MemoryError) as error:
-        code = {ValueError: -2, MemoryError: -3}.get(type(error), -1)
     except KeyboardInterrupt as error:
         guard.failure, code = error, -5
+    except Exception as error:
+        if not _is_nlopts(error):
+            raise
+        code = -2 if "argument" in type(error).__name__ or isinstance(error, ValueError) else -1
     interrupted = isinstance(guard.failure, KeyboardInterrupt)
     if guard.failure is not None and not interrupted:
         raise guard.failure
     u, best = guard.best if guard.best is not None else (np.array(start[: guard.problem.n]), None)
     reason = INTERRUPTED if interrupted else REASONS.get(code, f"NLopt's result code {code}")
     return Outcome(u, best, guard.evaluations, guard.impossible, name, reason, interrupted)
+
+
+def _is_nlopts(error: Exception) -> bool:
+    """Whether NLopt itself gave up: its failures are classes of its own in some releases, plain ones in others."""
+    return type(error).__module__.partition(".")[0] == "nlopt" or str(error).startswith("nlopt")

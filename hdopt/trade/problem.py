@@ -93,20 +93,22 @@ class DesignProblem:
         given = np.array([values[v.name] for v in self.variables]).reshape(-1)
         return np.clip((given - lower) / spread, 0.0, 1.0)
 
-    def point(self, values: Mapping[str, float]) -> Point:
-        steps = tuple((v.name, STEP * (v.upper - v.lower)) for v in self.variables)
+    def point(self, values: Mapping[str, float], slopes: bool = True) -> Point:
+        steps = tuple((v.name, STEP * (v.upper - v.lower)) for v in self.variables) if slopes else ()
         return Point(self.space, self.trade, self.combination, dict(values), steps)
 
-    def evaluate(self, u: Array) -> Evaluation:
-        point, spread = self.point(self.values(u)), self._ranges[1]
+    def evaluate(self, u: Array, slopes: bool = True) -> Evaluation:
+        point, spread = self.point(self.values(u), slopes), self._ranges[1]
         found = {key: find_quantity(key).pieces(point) for key in {self.objective, *(x.quantity for x in self.limits)}}
-        values, slopes = found[self.objective]
-        bounded, bounded_slopes = [np.empty(0)], [np.empty((0, self.n))]
+        if not slopes:
+            found = {key: (values, np.zeros((len(values), self.n))) for key, (values, _) in found.items()}
+        values, rates = found[self.objective]
+        bounded, bounded_rates = [np.empty(0)], [np.empty((0, self.n))]
         for limit in self.limits:
-            pieces, piece_slopes = found[limit.quantity]
+            pieces, piece_rates = found[limit.quantity]
             bounded.append(limit.excess(pieces))
-            bounded_slopes.append((-1 if limit.at_least else 1) * piece_slopes * spread / limit.scale)
-        return Evaluation(values, slopes * spread, np.concatenate(bounded), np.concatenate(bounded_slopes))
+            bounded_rates.append((-1 if limit.at_least else 1) * piece_rates * spread / limit.scale)
+        return Evaluation(values, rates * spread, np.concatenate(bounded), np.concatenate(bounded_rates))
 
     def with_fixed(self, **values: float) -> DesignProblem:
         return replace(self, fixed={**self.fixed, **values})

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from hdopt.bending import bending_stress, curvature_change
+from hdopt.bending import bending_stress
 from hdopt.contact import homogenization_coefficient
 from hdopt.deviations import DriveErrors
 from hdopt.drive import Drive
@@ -25,15 +25,17 @@ from hdopt.kinematics.kernel import peak_to_peak_block
 from hdopt.kinematics.lag import cross_slide_lag_arcmin
 from hdopt.trade.bearing import BearingConstants, axial_force, bearing_life_h, bearing_load, radial_force, ring_force
 from hdopt.trade.envelope import extremes_of
+from hdopt.trade.halves import in_parts
 from hdopt.trade.space import Combination, Design, DesignSpace
 
 Array = NDArray[np.float64]
+
+NOMINAL, ROBUST = "peak_to_peak_arcmin", "peak_to_peak_quantile_arcmin"
 
 STEP = 1e-5
 """Step of central differences as a share of a variable's range."""
 LOWEST_USED = 4
 """How many of the lowest local minima of the kinematic error count as pieces."""
-RING = np.linspace(0.0, math.pi / 2, 181)
 TURN = np.linspace(0.0, 2 * math.pi, 361)
 
 
@@ -115,6 +117,8 @@ class Point:
 
     def slopes(self, function: Callable[[Design], Array | float]) -> Array:
         """Central differences of `function` over the free variables: shape (n,) or, for vectors, (n, k)."""
+        if not self.free:
+            return np.empty((0, *np.shape(function(self.design))))
         return np.array(
             [
                 (np.asarray(function(above)) - np.asarray(function(below))) / (2 * step)
@@ -202,7 +206,11 @@ class PeakToPeakQuantile:
         out = np.empty(len(trade.sample))
         advance = gear.circular_spline_teeth / gear.flexspline_teeth
         tan_alpha, phases = math.tan(gear.pressure_angle), gear.flexspline_teeth / 2
-        peak_to_peak_block(tip, tan_alpha, advance, float(phases), trade.sample, out)
+        rows = trade.sample
+        in_parts(
+            len(rows),
+            lambda part: peak_to_peak_block(tip, tan_alpha, advance, float(phases), rows[part], out[part]),
+        )
         return out * gear.arcmin_per_mm
 
     def value(self, trade: Trade, design: Design) -> float:
@@ -214,6 +222,8 @@ class PeakToPeakQuantile:
         weights = trade.weights
         values = self._sample(trade, point.design)
         order = np.argsort(values)
+        if not point.free:
+            return np.array([float(weights @ values[order])]), np.empty((1, 0))
         counts = weights > 2e-3 * weights.max()
         chosen, share = order[counts], weights[counts]
         found, features = _envelope(point.design, trade.sample[chosen]), point.slopes(tip_features)
@@ -265,15 +275,10 @@ def carrying_teeth(trade: Trade, design: Design) -> float:
     return design.drive.geometry.circular_spline_teeth * carrying_angle(trade, design) / (2 * math.pi)
 
 
-def largest_curvature_change(trade: Trade, design: Design) -> float:
-    change = np.abs(curvature_change(design.mesh.geometry, design.mesh.profile, RING))
-    return float(change.max())
-
-
 def largest_bending_stress(trade: Trade, design: Design) -> float:
     if design.drive.material is None:
         raise MissingValue("bending stress", "material.modulus_mpa", "material.poisson")
-    change = largest_curvature_change(trade, design)
+    change = design.mesh.largest_curvature_change
     return float(bending_stress(design.drive.material, design.drive.geometry.flexspline_wall, change))
 
 
@@ -327,13 +332,13 @@ def _diameter(trade: Trade, design: Design) -> float:
 
 
 QUANTITIES: dict[str, Quantity] = {
-    "peak_to_peak_arcmin": PeakToPeak(),
-    "peak_to_peak_quantile_arcmin": PeakToPeakQuantile(),
+    NOMINAL: PeakToPeak(),
+    ROBUST: PeakToPeakQuantile(),
     "evened_out_arcmin": Scalar("Peak-to-peak times k_e", "arcmin", evened_out),
     "lag_arcmin": LargestLag(),
     "flank_pressure_mpa": Scalar("Mean flank pressure", "MPa", flank_pressure),
     "bending_stress_mpa": Scalar("Bending stress", "MPa", largest_bending_stress),
-    "curvature_change_per_mm": Scalar("Curvature change", "1/mm", largest_curvature_change),
+    "curvature_change_per_mm": Scalar("Curvature change", "1/mm", lambda t, d: d.mesh.largest_curvature_change),
     "bending_safety": Scalar("Safety against bending fatigue", "", bending_safety, False),
     "contact_angle_deg": Scalar("Contact angle", "deg", lambda t, d: math.degrees(d.mesh.contact_angle), False),
     "carrying_angle_deg": Scalar("Carrying angle", "deg", lambda t, d: math.degrees(carrying_angle(t, d)), False),

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from hdopt.errors import MissingValue
 from hdopt.study import Study
-from hdopt.trade.front import front, hypervolume, pareto
+from hdopt.trade.front import front, front_ends, hypervolume, pareto
 from hdopt.trade.minimax import GLOBAL, LOCAL
 from hdopt.trade.nlopt_guard import INTERRUPTED, Effort, find_algorithm
 from hdopt.trade.prices import prices
-from hdopt.trade.quantities import QUANTITIES, find_quantity
+from hdopt.trade.problem import DesignProblem
+from hdopt.trade.quantities import NOMINAL, QUANTITIES, ROBUST, find_quantity
 from hdopt.trade.setup import Setup, setup_of
 from hdopt.trade.solve import Method, Solution, solve
 from hdopt.trade.space import Combination, Design
 
-ROBUST = "peak_to_peak_quantile_arcmin"
-NOMINAL = "peak_to_peak_arcmin"
+EQUAL = 1e-3
+"""Share by which two designs of different searches may differ and still count as equal."""
+COARSE = 6
+"""Points of the first, coarse front of every combination; those that win nowhere are not traced further."""
 Progress = Callable[[str], None]
 
 
@@ -79,6 +82,11 @@ class SearchResult:
     interrupted: bool
     setup: Setup
     solutions: tuple[Solution, ...]
+
+    @property
+    def chosen(self) -> Solution:
+        """The solution behind `best`."""
+        return choose(self.solutions)
 
     @property
     def front(self) -> tuple[DesignRecord, ...]:
@@ -151,7 +159,7 @@ def search(study: Study, seed: int = 1, progress: Progress = lambda stage: None,
         interrupted = True
         if not solved:
             raise
-    best = min(solved, key=_order)
+    best = choose(solved)
     held, residual = prices(best.problem, best.values)
     return SearchResult(
         study=study.name,
@@ -184,8 +192,9 @@ def method_of(setup: Setup, seed: int) -> Method:
     return Method(*names, local=Effort(seed=seed))
 
 
-def _order(solution: Solution) -> tuple[float, float]:
-    return (0.0, solution.objective) if solution.feasible else (solution.violation, solution.objective)
+def choose(solutions: Sequence[Solution]) -> Solution:
+    """The least objective of the feasible ones; where none is, the one nearest to the limits."""
+    return min(solutions, key=lambda s: (0.0 if s.feasible else s.violation, s.objective))
 
 
 def _front_objectives(setup: Setup) -> list[str]:
@@ -198,27 +207,53 @@ def _front_objectives(setup: Setup) -> list[str]:
 def _front(
     setup: Setup, method: Method, objective: str, solved: list[Solution], progress: Progress
 ) -> tuple[Front, int]:
-    second = setup.section.second_objective
+    second, points = setup.section.second_objective, setup.section.front_points
     spent = 0
-    by_combination: dict[str, tuple[DesignRecord, ...]] = {}
+    coarse: dict[Combination, list[DesignRecord]] = {}
+    ends: dict[Combination, tuple[DesignProblem, Solution, Solution]] = {}
     for solution in solved:
-        progress(f"front of {solution.combination}")
-        problem = replace(setup.problem(solution.combination, objective))
+        progress(f"front of {solution.combination}, {objective}")
+        problem = setup.problem(solution.combination, objective)
         problem = replace(problem, limits=tuple(x for x in problem.limits if x.quantity != second))
-        start = solve(problem, method, [solution.values])
-        spent += start.evaluations
-        if not start.feasible:
+        span, cost = front_ends(problem, second, method, solution.values)
+        spent += cost
+        if span is None:
             continue
-        found = front(problem, second, setup.section.front_points, method, start)
+        found = front(problem, second, min(COARSE, points), method, *span)
         spent += sum(item.evaluations for item in found)
-        records = [record_of(setup, item) for item in found]
-        by_combination[str(solution.combination)] = tuple(pareto(records, _coordinates(records, objective, second)))
+        ends[solution.combination] = (problem, *span)
+        coarse[solution.combination] = [record_of(setup, item) for item in found]
+    by_combination: dict[str, tuple[DesignRecord, ...]] = {}
+    for combination, records in coarse.items():
+        if points > COARSE and _wins_somewhere(combination, coarse, objective, second):
+            progress(f"fine front of {combination}, {objective}")
+            problem, start, extreme = ends[combination]
+            found = front(problem, second, points, method, start, extreme)
+            spent += sum(item.evaluations for item in found)
+            records = [record_of(setup, item) for item in found]
+        by_combination[str(combination)] = tuple(pareto(records, _coordinates(records, objective, second)))
     everything = [design for designs in by_combination.values() for design in designs]
-    points = _coordinates(everything, objective, second)
-    reference = tuple(1.01 * max(column) for column in zip(*points, strict=True)) if points else (0.0, 0.0)
-    designs = tuple(pareto(everything, points)) if points else ()
+    places = _coordinates(everything, objective, second)
+    reference = tuple(1.01 * max(column) for column in zip(*places, strict=True)) if places else (0.0, 0.0)
+    designs = tuple(pareto(everything, places, EQUAL)) if places else ()
     area = hypervolume(_coordinates(designs, objective, second), reference) if designs else 0.0
     return Front(objective, second, designs, by_combination, area, reference), spent
+
+
+def _wins_somewhere(combination, coarse, objective: str, second: str) -> bool:
+    """Whether any point of a combination's coarse front lies below every other's, taken as steps (above their true
+    fronts, so that no combination is dropped that a finer front would bring back). Ends that are equal but for the
+    searches' own accuracy do not count as won."""
+    others = [
+        place
+        for other, records in coarse.items()
+        if other != combination
+        for place in _coordinates(records, objective, second)
+    ]
+    return any(
+        not any(y <= own_y + EQUAL * abs(own_y) and x < own_x - EQUAL * abs(own_x) for x, y in others)
+        for own_x, own_y in _coordinates(coarse[combination], objective, second)
+    )
 
 
 def _coordinates(records, objective: str, second: str) -> list[tuple[float, float]]:

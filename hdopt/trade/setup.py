@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hdopt.drive import Structure
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.study import Study
@@ -138,17 +141,23 @@ def _trade(study: Study, section: SearchSection, seed: int) -> Trade:
     )
 
 
-def sample_rows(study: Study, n: int, seed: int):
+def tolerance_problem(study: Study):
+    """The study's tolerances as (rows of inputs -> errors, random inputs)."""
+    from hdopt.tolerancing import study_problem
+
+    problem = study_problem(study)
+    return problem.response, problem.space
+
+
+def sample_rows(study: Study, n: int, seed: int) -> NDArray[np.float64]:
     """`n` drives of the study's tolerances as rows of `DriveErrors.to_matrix`: one scrambling of Sobol' points."""
     from hdopt.tolerance.sampling import ScrambledSobol
-    from hdopt.trade.tolerances import drive_space
 
-    response, space = drive_space(study)
-    import numpy as np
-
+    response, space = tolerance_problem(study)
     points = np.concatenate(list(ScrambledSobol(1).blocks(seed, 0, n, space.dimension)))
     return response.errors(space.sample(points)).to_matrix()
 
 
 def with_trade(setup: Setup, **changes) -> Setup:
+    """The same search judged under another trade."""
     return replace(setup, trade=replace(setup.trade, **changes))

@@ -67,3 +67,10 @@ def design_words(design: DesignRecord) -> str:
         f"{VARIABLES[name][0].lower()} {number(value, VARIABLES[name][1])}" for name, value in design.variables.items()
     ]
     return f"{design.name}: {', '.join(parts)}"
+
+
+def chosen_words(result: SearchResult) -> str:
+    """The choice with what it gains: 'two-disk, automatic: pressure angle 7 deg, ...; 0.74 arcmin instead of 1.1'."""
+    after, before = (d.quantities[result.objective] for d in (result.best, result.baseline))
+    unit = QUANTITIES[result.objective].unit
+    return f"{design_words(result.best)}; {number(after, unit)} instead of {number(before, unit)}"

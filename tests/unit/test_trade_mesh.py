@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from cases import CSF_25_80, PROFILES, drive
 
+from hdopt.bending import max_curvature_change
 from hdopt.contact import contact_angle, mean_flank_pressure
 from hdopt.drive import Load
 from hdopt.trade.mesh import Mesh
@@ -89,3 +90,10 @@ def test_contact_and_pressure_agree_with_the_physics_where_all_overlapped_teeth_
     assert mesh.flank_pressure(63_000.0, 15.0, mesh.contact_angle) == pytest.approx(mean_flank_pressure(loaded))
     assert mesh.carrying_angle(math.radians(12), 0.01) < mesh.contact_angle
     assert mesh.carrying_angle(math.radians(44), 0.5) == mesh.contact_angle
+
+
+@pytest.mark.parametrize("profile", SMOOTH)
+def test_bending_agrees_with_the_physics(profile):
+    mesh = Mesh(CSF_25_80, PROFILES[profile])
+    # The physics takes the largest of 0.025 deg steps, the mesh of 1 deg steps with a parabola between.
+    assert mesh.largest_curvature_change == pytest.approx(max_curvature_change(CSF_25_80, PROFILES[profile]), rel=1e-5)

@@ -28,7 +28,7 @@ class Bowl:
         self.constraints = 0 if at_least is None else 1
         self.calls = 0
 
-    def evaluate(self, u):
+    def evaluate(self, u, slopes=True):
         self.calls += 1
         off = u - CENTRE
         if self.at_least is None:
@@ -45,8 +45,8 @@ class Spoilt(Bowl):
         super().__init__()
         self.spoil, self.after = spoil, after
 
-    def evaluate(self, u):
-        found = super().evaluate(u)
+    def evaluate(self, u, slopes=True):
+        found = super().evaluate(u, slopes)
         return self.spoil(u, found) if self.calls > self.after else found
 
 
@@ -196,7 +196,7 @@ def test_nothing_to_choose_is_an_answer():
     class Fixed(Bowl):
         n = 0
 
-        def evaluate(self, u):
+        def evaluate(self, u, slopes=True):
             return Evaluation(np.array([2.0]), np.empty((1, 0)), np.empty(0), np.empty((0, 0)))
 
     assert minimise(Fixed(), np.empty(0)).evaluation.objective == 2.0

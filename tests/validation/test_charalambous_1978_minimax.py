@@ -20,7 +20,7 @@ class CharalambousConn:
     def __init__(self, first: int, second: int) -> None:
         self.powers = np.array([first, second])
 
-    def evaluate(self, u):
+    def evaluate(self, u, slopes=True):
         x = LOW + SPREAD * u
         tail = 2 * np.exp(x[1] - x[0])
         values = np.array([(x**self.powers).sum(), ((2 - x) ** 2).sum(), tail])

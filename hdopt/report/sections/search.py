@@ -1,0 +1,458 @@
+"""The trade report: the chosen wave generator, the fronts it was chosen from, its price, and how sure the choice is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from hdopt.report import Figure, KeyFigures, Section, Table, Text
+from hdopt.report.sections.design_map import Design, design_map
+from hdopt.report.sections.design_map import Limit as MapLimit
+from hdopt.report.sections.profiles import profiles_section
+from hdopt.report.sections.words import in_sentence, label, listed
+from hdopt.report.theme import GREY, INK, PALETTE, PAPER, VERMILLION, faded, figure
+from hdopt.trade.quantities import NOMINAL, QUANTITIES, ROBUST, find_quantity
+from hdopt.trade.space import VARIABLES
+from hdopt.trade.words import NOT_MODELLED, number
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+    from hdopt.trade.confidence import Perturbation, Verification
+    from hdopt.trade.run import DesignRecord, Front, SearchResult
+    from hdopt.trade.views import DesignMap, Rings, TradeViews
+
+DASHES = {"integral": "solid", "automatic": "solid", "one_way_major": "dash", "one_way_minor": "dot"}
+SYMBOLS = {"integral": "square", "automatic": "circle", "one_way_major": "triangle-up", "one_way_minor": "diamond"}
+AXES = ("pressure_angle_deg", "width_mm", "module_mm", "deflection_ratio", "wrap_angle_deg")
+PARALLEL = (
+    NOMINAL,
+    ROBUST,
+    "flank_pressure_mpa",
+    "bending_stress_mpa",
+    "carrying_teeth",
+    "bearing_life_h",
+    "lag_arcmin",
+)
+CHANGED = 5e-4
+"""A quantity that differs by less than this share is called unchanged."""
+
+
+def trade_sections(
+    result: SearchResult,
+    views: TradeViews,
+    checked: Verification,
+    perturbed: Sequence[Perturbation],
+    file: str,
+) -> tuple[Section, ...]:
+    """All sections of the trade report, in reading order. `file` is the chosen design's study file."""
+    return (
+        chosen_section(result, file),
+        *(front_section(result, front) for front in result.fronts),
+        designs_section(result),
+        map_section(result, views.design_map),
+        rings_section(result, views.rings),
+        confidence_section(result, checked, perturbed),
+    )
+
+
+def name_of(design: DesignRecord) -> str:
+    return f"{label(design.profile)}, {in_sentence(label(design.structure))}"
+
+
+def hover(design: DesignRecord) -> str:
+    """All of a design for a hover label."""
+    lines = [f"<b>{name_of(design)}</b>"]
+    lines += [f"{VARIABLES[k][0]} {number(v, VARIABLES[k][1])}" for k, v in design.variables.items()]
+    shown = [key for key in PARALLEL if key in design.quantities]
+    lines += [f"{QUANTITIES[k].title} {number(design.quantities[k], QUANTITIES[k].unit)}" for k in shown]
+    return "<br>".join(lines)
+
+
+def chosen_section(result: SearchResult, file: str, key: str = "trade-chosen") -> Section:
+    best, baseline = result.best, result.baseline
+    objective = find_quantity(result.objective)
+    after, before = best.quantities[result.objective], baseline.quantities[result.objective]
+    values = {objective.title: number(after, objective.unit), "Baseline": number(before, objective.unit)}
+    values |= {VARIABLES[k][0]: number(v, VARIABLES[k][1]) for k, v in best.variables.items() if k != "module_mm"}
+    held = [f"{p['title'][:1].lower()}{p['title'][1:]}" for p in result.active if "bound" not in p["kind"]]
+    at_bound = [in_sentence(p["title"]) for p in result.active if "bound" in p["kind"]]
+    others = sorted(
+        (d for d in result.combinations if d.feasible and d.name != best.name),
+        key=lambda d: d.quantities[result.objective],
+    )
+    why = f"{name_of(best)} has the least {in_sentence(objective.title)} of all designs that keep every limit"
+    if others:
+        next_best = others[0]
+        gap = next_best.quantities[result.objective] / after - 1
+        why += f"; the next combination, {in_sentence(name_of(next_best))}, comes within {100 * gap:.2g} %"
+    why += f". It is held by {listed(held)}. " if held else ". "
+    if at_bound:
+        why += f"At a bound of its range is {listed(at_bound)}: the table says what that costs."
+    else:
+        why += "No variable lies at a bound of its range: the limits set the optimum, not the search's own box."
+    return Section(
+        key,
+        "The chosen wave generator",
+        (
+            KeyFigures(values),
+            Text(why),
+            Table(f"{key}-against-baseline", "Chosen against baseline", _against_baseline(result)),
+            Table(
+                f"{key}-prices",
+                "What holds the design, and what giving way would be worth",
+                pd.DataFrame([_price_row(price) for price in result.active]),
+                "From the multipliers at the optimum: the fall of the objective for one unit more room.",
+            ),
+            Table(f"{key}-combinations", "Every profile and structure at its own best", _combinations(result)),
+            Text(f"Not modelled: {'; '.join(NOT_MODELLED)}. Weigh these beside the table."),
+        ),
+        f"{name_of(best)}: {number(after, objective.unit)} instead of {number(before, objective.unit)}. "
+        f"Its study file is {file}.",
+    )
+
+
+def _against_baseline(result: SearchResult) -> pd.DataFrame:
+    rows = []
+    best, baseline = result.best, result.baseline
+    rows.append(("Profile", label(baseline.profile), label(best.profile), "", ""))
+    rows.append(("Structure", label(baseline.structure), label(best.structure), "", ""))
+    for key, value in best.variables.items():
+        title, unit = VARIABLES[key]
+        before = baseline.variables.get(key)
+        rows.append((title, number(before, unit) if before is not None else "–", number(value, unit), "", ""))
+    for key, value in best.quantities.items():
+        quantity, before = QUANTITIES[key], baseline.quantities[key]
+        if key == "width_mm":
+            continue
+        share = value / before - 1 if before else 0.0
+        if abs(share) < CHANGED:
+            verdict = "unchanged"
+        elif key == "ratio":
+            verdict = ""
+        else:
+            verdict = "improved" if (share < 0) == quantity.small_is_good else "paid"
+        change = f"{100 * share:+.1f} %".replace("-", "−")
+        rows.append((quantity.title, number(before, quantity.unit), number(value, quantity.unit), change, verdict))
+    return pd.DataFrame(rows, columns=["what", "baseline", "chosen", "change", "verdict"])
+
+
+def _price_row(price: dict) -> dict[str, str]:
+    return {
+        "what": price["title"],
+        "kind": price["kind"],
+        "at": number(price["at"], price["unit"]),
+        "one unit is worth": f"{price['per_unit']:.3g} arcmin per {price['unit'] or 'unit'}",
+        "one per cent is worth": f"{0.01 * abs(price['at']) * price['per_unit']:.2g} arcmin",
+    }
+
+
+def _combinations(result: SearchResult) -> pd.DataFrame:
+    rows = []
+    order = sorted(result.combinations, key=lambda d: (not d.feasible, d.quantities[result.objective]))
+    for design in order:
+        row: dict[str, object] = {"profile": label(design.profile), "structure": label(design.structure)}
+        row |= {key: design.variables.get(key) for key in AXES}
+        row |= {key: design.quantities.get(key) for key in (NOMINAL, ROBUST) if key in design.quantities}
+        row["keeps all limits"] = "yes" if design.feasible else "; ".join(design.broken_limits)
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def front_section(result: SearchResult, front: Front) -> Section:
+    """One front: each combination's own, the designs no other beats, baseline and chosen design."""
+    key = f"trade-front-{'robust' if front.objective == ROBUST else 'nominal'}"
+    x_quantity, y_quantity = find_quantity(front.second), find_quantity(front.objective)
+    made = figure(_axis(x_quantity), _axis(y_quantity), height=520)
+    profiles = list(dict.fromkeys(d.profile for designs in front.by_combination.values() for d in designs))
+    for designs in front.by_combination.values():
+        first = designs[0]
+        colour = PALETTE[profiles.index(first.profile)]
+        made.add_scatter(
+            x=[d.quantities[front.second] for d in designs],
+            y=[d.quantities[front.objective] for d in designs],
+            mode="lines+markers",
+            name=name_of(first),
+            line={"color": colour, "width": 1, "dash": DASHES[first.structure]},
+            marker={"color": colour, "size": 6, "symbol": SYMBOLS[first.structure], "opacity": 0.75},
+            text=[hover(d) for d in designs],
+            hovertemplate="%{text}<extra></extra>",
+        )
+    made.add_scatter(
+        x=[d.quantities[front.second] for d in front.designs],
+        y=[d.quantities[front.objective] for d in front.designs],
+        mode="markers",
+        name="No design beats these",
+        marker={"size": 11, "color": "rgba(0,0,0,0)", "line": {"color": INK, "width": 1.5}},
+        text=[hover(d) for d in front.designs],
+        hovertemplate="%{text}<extra></extra>",
+    )
+    for name, design, symbol in (("Baseline", result.baseline, "x"), ("Chosen", result.best, "star")):
+        made.add_scatter(
+            x=[design.quantities[front.second]],
+            y=[design.quantities[front.objective]],
+            mode="markers",
+            name=name,
+            marker={"size": 15, "symbol": symbol, "color": VERMILLION, "line": {"color": PAPER, "width": 1.5}},
+            text=[hover(design)],
+            hovertemplate=f"{name}<br>%{{text}}<extra></extra>",
+        )
+    how = "under the tolerances" if front.objective == ROBUST else "for the errors of the study"
+    return Section(
+        key,
+        f"Front {how}",
+        (
+            Figure(
+                f"{key}-figure",
+                f"{y_quantity.title} against {in_sentence(x_quantity.title)}",
+                made,
+                "Down and to the left is better. Ringed designs are beaten by no other; hover for the whole design. "
+                f"The limit on {in_sentence(x_quantity.title)} is left out here, all others hold.",
+            ),
+        ),
+        f"{len(front.designs)} designs that no other beats; hypervolume {front.hypervolume:.4g} "
+        f"(arcmin {x_quantity.unit}) below ({front.reference[0]:.3g}, {front.reference[1]:.3g}).",
+    )
+
+
+def _axis(quantity) -> str:
+    return f"{quantity.title} [{quantity.unit}]"
+
+
+def designs_section(result: SearchResult, key: str = "trade-designs") -> Section:
+    """Parallel coordinates of all designs of the fronts, the baseline and the chosen one among them."""
+    designs = list(dict.fromkeys((d.name, tuple(d.variables.items())) for f in result.fronts for d in f.designs))
+    records = {(d.name, tuple(d.variables.items())): d for f in result.fronts for d in f.designs}
+    shown = [records[item] for item in designs]
+    every = [*shown, result.baseline, result.best]
+    axes = [(k, VARIABLES[k][0], VARIABLES[k][1], lambda d, k=k: d.variables.get(k)) for k in AXES]
+    axes += [
+        (k, QUANTITIES[k].title, QUANTITIES[k].unit, lambda d, k=k: d.quantities.get(k))
+        for k in PARALLEL
+        if all(k in d.quantities for d in every)
+    ]
+    made = _parallel(axes, shown, result)
+    return Section(
+        key,
+        "All designs",
+        (
+            Figure(
+                f"{key}-parallel",
+                "Every design of the fronts over its variables and what comes of them",
+                made,
+                "Each line is a design, each axis runs from its least to its largest value. A line without a wrap "
+                "angle passes below that axis. Hover for the whole design.",
+            ),
+        ),
+        f"{len(shown)} designs, the baseline and the chosen one.",
+    )
+
+
+def _parallel(axes, shown: list[DesignRecord], result: SearchResult) -> go.Figure:
+    every = [*shown, result.baseline, result.best]
+    ranges = []
+    for _, _, _, read in axes:
+        values = [v for d in every if (v := read(d)) is not None]
+        ranges.append((min(values), max(values)) if values else (0.0, 1.0))
+
+    def places(design: DesignRecord) -> list[float]:
+        found = []
+        for (_, _, _, read), (low, high) in zip(axes, ranges, strict=True):
+            value = read(design)
+            found.append(-0.08 if value is None else (value - low) / (high - low) if high > low else 0.5)
+        return found
+
+    made = figure("", "", height=460, hovermode="closest")
+    positions = list(range(len(axes)))
+    profiles = list(dict.fromkeys(d.profile for d in shown))
+    named: set[str] = set()
+    for design in shown:
+        colour = PALETTE[profiles.index(design.profile)]
+        made.add_scatter(
+            x=positions,
+            y=places(design),
+            mode="lines",
+            name=label(design.profile),
+            legendgroup=design.profile,
+            showlegend=design.profile not in named,
+            line={"color": faded(colour, 0.4), "width": 1.2},
+            text=[hover(design)] * len(axes),
+            hovertemplate="%{text}<extra></extra>",
+        )
+        named.add(design.profile)
+    for name, design, colour, dash in (
+        ("Baseline", result.baseline, GREY, "dash"),
+        ("Chosen", result.best, INK, "solid"),
+    ):
+        made.add_scatter(
+            x=positions,
+            y=places(design),
+            mode="lines+markers",
+            name=name,
+            line={"color": colour, "width": 3, "dash": dash},
+            text=[hover(design)] * len(axes),
+            hovertemplate=f"{name}<br>%{{text}}<extra></extra>",
+        )
+    made.update_xaxes(
+        tickvals=positions,
+        ticktext=[
+            f"{title}<br>{low:.3g}–{high:.3g} {unit}"
+            for (_, title, unit, _), (low, high) in zip(axes, ranges, strict=True)
+        ],
+        tickangle=-35,
+        showgrid=True,
+    )
+    made.update_yaxes(visible=False, range=[-0.12, 1.06])
+    return made
+
+
+def map_section(result: SearchResult, seen: DesignMap, key: str = "trade-map") -> Section:
+    """Peak-to-peak over pressure angle and width about the chosen design, with the lines of its limits."""
+    limits = [MapLimit(str(limit), grid, limit.bound) for limit, grid in seen.limits]
+    chosen, baseline = result.best.variables, result.baseline.variables
+    made = design_map(
+        seen.width_mm,
+        seen.pressure_angle_deg,
+        seen.peak_to_peak_arcmin,
+        ("WG width [mm]", "Pressure angle [deg]", "arcmin"),
+        [
+            Design("chosen", chosen["width_mm"], chosen["pressure_angle_deg"]),
+            Design("baseline's place", baseline["width_mm"], baseline["pressure_angle_deg"]),
+        ],
+        limits,
+    )
+    return Section(
+        key,
+        "Pressure angle and width, with what limits them",
+        (
+            Figure(
+                f"{key}-figure",
+                f"{seen.title} over pressure angle and width, all else as chosen",
+                made,
+                "The error falls toward the lower left; the lines are where a limit is just kept. The baseline stands "
+                "at its own pressure angle and width, but the map is of the chosen design.",
+            ),
+        ),
+        "Fewer degrees and less width always lower the error; the lines show what stops them.",
+    )
+
+
+def rings_section(result: SearchResult, rings: Rings) -> Section:
+    """Curvature change along the ring for each profile's own best design."""
+    best = {}
+    for design in result.combinations:
+        rank = (not design.feasible, design.quantities[result.objective])
+        if design.profile not in best or rank < best[design.profile][0]:
+            best[design.profile] = (rank, design)
+    keys = ("bending_stress_mpa", "bending_safety", "contact_angle_deg", "carrying_angle_deg", "flank_pressure_mpa")
+    rows = []
+    for profile, (_, design) in best.items():
+        row: dict[str, object] = {"profile": profile}
+        row |= {k: design.variables.get(k) for k in ("deflection_ratio", "wrap_angle_deg")}
+        row |= {k: design.quantities[k] for k in keys if k in design.quantities}
+        rows.append(row)
+    return profiles_section(
+        rings.phi,
+        rings.deflection_mm,
+        rings.curvature_change_per_mm,
+        rings.radius_mm,
+        pd.DataFrame(rows),
+        key="trade-profiles",
+    )
+
+
+def confidence_section(
+    result: SearchResult, checked: Verification, perturbed: Sequence[Perturbation], key: str = "trade-confidence"
+) -> Section:
+    """The choice checked by other means, and each constant of the trade changed."""
+    objective = find_quantity(result.objective)
+    share = round(100 * result.setup.section.perturbation)
+    other = [item for item in perturbed if item.feasible and not item.same_choice]
+    none = [item for item in perturbed if not item.feasible]
+    names = list(dict.fromkeys(item.constant for item in other))
+    verdict = f"Each constant was changed by {share} % to either side and the search repeated. " + (
+        f"The chosen profile and structure change with {listed(list(map(in_sentence, names)))}."
+        if names
+        else "The chosen profile and structure stay the same in every case that has a design at all."
+    )
+    if none:
+        missing = list(dict.fromkeys(f"{in_sentence(i.constant)} times {i.factor:g}" for i in none))
+        verdict += f" No design keeps all limits with {listed(missing)}."
+    values = {
+        "Exact geometry": f"{checked.exact_arcmin:.4f} arcmin",
+        "Compiled kernel": f"{checked.kernel_arcmin:.4f} arcmin",
+    }
+    if checked.quantile_arcmin is not None:
+        values |= {
+            f"{100 * checked.quantile:g} % quantile, fresh drives": f"{checked.quantile_arcmin:.4f} arcmin",
+            "its 95 % interval": f"{checked.low:.4f} to {checked.high:.4f}",
+            "in the search": f"{checked.searched_arcmin:.4f} arcmin",
+        }
+    frame = pd.DataFrame(
+        [
+            {
+                "constant": item.constant,
+                "value": number(item.value, item.unit),
+                "times": f"{item.factor:g}",
+                "best then": in_sentence(name_of(item.chosen)) if item.feasible else "none keeps all limits",
+                f"{in_sentence(objective.title)} then": number(item.objective, objective.unit)
+                if item.feasible
+                else "–",
+                "today's choice then": _regret(item),
+                "source": item.source,
+            }
+            for item in perturbed
+        ]
+    )
+    return Section(
+        key,
+        "How sure the choice is",
+        (
+            KeyFigures(values),
+            Text(verdict),
+            Figure(
+                f"{key}-figure",
+                f"The best {in_sentence(objective.title)} with each constant changed by {share} %",
+                _bars(result, perturbed, objective),
+                "A bar ends at the best value that can be had with the constant changed; vermillion where another "
+                "profile or structure is then the best.",
+            ),
+            Table(f"{key}-perturbed", "Every constant of the trade, its source, and what changing it does", frame),
+            Text(
+                f"First-order optimality holds to {result.optimality_residual:.1e} of the objective's slope. "
+                f"Algorithms: {result.algorithm}; {result.evaluations} designs evaluated, {result.impossible} of them "
+                f"impossible; stopped because: {result.stopped_because}."
+            ),
+        ),
+        verdict,
+    )
+
+
+def _regret(item: Perturbation) -> str:
+    if not item.feasible:
+        return "–"
+    return "breaks a limit" if item.regret is None else f"{100 * item.regret:.2g} % above the best"
+
+
+def _bars(result: SearchResult, perturbed: Sequence[Perturbation], objective) -> go.Figure:
+    base = result.chosen.objective
+    names = list(dict.fromkeys(item.constant for item in perturbed))
+    made = figure(_axis(objective), "", height=110 + 22 * len(names), barmode="overlay", showlegend=True)
+    for factor, colour in zip(sorted({item.factor for item in perturbed}), (PALETTE[0], PALETTE[5]), strict=False):
+        items = [item for item in perturbed if item.factor == factor and item.feasible]
+        made.add_bar(
+            y=[item.constant for item in items],
+            x=[item.objective - base for item in items],
+            base=base,
+            orientation="h",
+            name=f"times {factor:g}",
+            marker={"color": [colour if item.same_choice else VERMILLION for item in items]},
+            text=[f"{item.objective:.4f}: {in_sentence(name_of(item.chosen))}" for item in items],
+            textposition="none",
+            hovertemplate="%{y} times " + f"{factor:g}" + "<br>%{text}<extra></extra>",
+        )
+    made.add_vline(x=base, line={"color": INK, "width": 1})
+    made.update_yaxes(autorange="reversed")
+    return made
