@@ -230,3 +230,30 @@ def test_profile_with_a_measured_cam_has_no_proven_bound():
     problem = drive_problem(drive(PROFILES["measured"]), {"axis_eccentricity_mm": Rayleigh(scale=0.005, upper=0.01)})
     assert problem.response.upper_bound(*problem.space.box) is None
     assert drive(TABLE_1_ELLIPSE).wave_generator.profile.tip_is_smooth
+
+
+def test_another_distribution_takes_the_place_of_the_shipped_one(tmp_path):
+    """The shipped tolerance is a truncated Rayleigh; nothing of it is left in a measured sample or a uniform one."""
+    (tmp_path / "runout.csv").write_text("runout_mm\n0.002\n0.004\n0.001\n")
+    path = study_file(
+        tmp_path,
+        """
+[tolerances]
+axis_eccentricity_mm = { distribution = "measured", file = "runout.csv" }
+wg_eccentricity_mm = { distribution = "uniform", lower = 0.001, upper = 0.002 }
+""",
+    )
+    inputs = sample(problem := study_problem(path))
+    column = {name: inputs[:, problem.space.index(name)] for name in problem.space.names}
+    assert (column["axis_eccentricity_mm"].min(), column["axis_eccentricity_mm"].max()) == pytest.approx(
+        (0.001, 0.004), abs=1e-5
+    )
+    assert column["wg_eccentricity_mm"].min() > 0.001
+    narrower = study_problem(load_study(path, ["tolerances.wg_eccentricity_mm.upper=0.0015"]))
+    assert narrower.space.values["wg_eccentricity_mm"] == 0.0015
+
+
+def test_errors_without_a_tolerance_keep_their_value(tmp_path):
+    path = study_file(tmp_path, "")
+    held = study_problem(path).response.held
+    assert held.wg_tilt_major == pytest.approx(BASE_ERRORS.wg_tilt_major)
