@@ -7,6 +7,7 @@ from the left stands on the right. A3, lines of ISO 128, tolerance frames of ISO
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,6 +43,12 @@ TITLE_WIDTH, TITLE_HEIGHT = 178.0, 40.0
 FRONT_ROOM, SECTION_ROOM = 118.0, 62.0
 FRONT_CENTRE, SECTION_CENTRE_X = (98.0, 94.0), 226.0
 EXPLODED_CENTRE, EXPLODED_ROOM = (344.0, 76.0), (118.0, 112.0)
+
+VIEWS = (10.0, 14.0, 400.0, 168.0)
+"""Left, top, width and height of the part of the sheet that the views take, mm."""
+
+PAPERWORK = "paperwork"
+"""Name of the group that holds border, tables and title block."""
 
 FRONT: tuple[Vector, Vector] = ((0, 0, 1), (1, 0, 0))
 """Eye on +z, x to the right, y up."""
@@ -80,14 +87,24 @@ def draw(job: Job) -> str:
     middle = (boxes[:, 2].min() + boxes[:, 5].max()) / 2
     section = Placed((SECTION_CENTRE_X - scale * middle, FRONT_CENTRE[1]), scale)
 
-    _border(sheet)
+    with sheet.group(PAPERWORK):
+        _border(sheet)
+        _key_dimensions(sheet, job)
+        _assumed(sheet, job)
+        _title_block(sheet, job, scale)
     _front_view(sheet, front, made, job)
     _section(sheet, section, made, job)
     _exploded(sheet, made)
-    _key_dimensions(sheet, job)
-    _assumed(sheet, job)
-    _title_block(sheet, job, scale)
     return sheet.svg()
+
+
+def views_alone(svg: str) -> str:
+    """A drawing without border, tables and title block: for a page that shows those in its own way."""
+    svg = re.sub(rf'<g id="{PAPERWORK}">.*?</g>', "", svg, count=1, flags=re.DOTALL)
+    left, top, width, height = VIEWS
+    old = f'width="{WIDTH:g}mm" height="{HEIGHT:g}mm" viewBox="0 0 {WIDTH:g} {HEIGHT:g}"'
+    new = f'width="{width:g}mm" height="{height:g}mm" viewBox="{left:g} {top:g} {width:g} {height:g}"'
+    return svg.replace(old, new, 1).replace('<rect width="100%"', f'<rect x="{left:g}" y="{top:g}" width="100%"', 1)
 
 
 def check_drawing(path: Path, job: Job, name: str) -> dict[str, Any]:

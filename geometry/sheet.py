@@ -6,7 +6,8 @@ Sheet coordinates are mm, x to the right and y DOWN, as SVG has them.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from html import escape
 
 import numpy as np
@@ -39,6 +40,13 @@ class Sheet:
         self.width, self.height, self.title, self.description = width, height, title, description
         self._definitions: list[str] = []
         self._elements: list[str] = []
+
+    @contextmanager
+    def group(self, name: str) -> Iterator[None]:
+        """What is drawn meanwhile can be told from the rest by its name."""
+        self._elements.append(f'<g id="{name}">')
+        yield
+        self._elements.append("</g>")
 
     def polyline(self, points: Array | Sequence[Point], kind: str = "visible", closed: bool = False) -> None:
         path = "M" + " L".join(f"{x:.3f} {y:.3f}" for x, y in np.asarray(points).tolist()) + ("Z" if closed else "")

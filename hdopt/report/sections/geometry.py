@@ -16,6 +16,8 @@ def geometry_section(
     result: ExportResult, drawing_svg: str, picture_png: bytes | None = None, *, key: str = "geometry"
 ) -> Section:
     """The section of an export: `drawing_svg` and `picture_png` as the export wrote them."""
+    from hdopt.geometry.drawing import views_alone
+
     values = result.to_dict()
     made = [part for part in values["parts"] if not part["context"]]
     figures = {"parts": str(len(made)), "fingerprint": result.identity.fingerprint}
@@ -26,7 +28,7 @@ def geometry_section(
         Picture(
             f"{key}-drawing",
             "Wave generator",
-            drawing_svg,
+            views_alone(drawing_svg),
             "Front view, section through the major axis, parts pulled apart. Lengths in mm.",
         )
     )
