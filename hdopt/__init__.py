@@ -15,7 +15,7 @@ _EXPORTS: dict[str, str] = {
     "profile": "hdopt.analysis",
     "stack": "hdopt.tolerancing",
     "sobol": "hdopt.tolerancing",
-    "allocate": "hdopt.tolerancing",
+    "allocate": "hdopt.allocation",
     "run_study": "hdopt.run",
     "diagnose": "hdopt.diagnosis",
     "read_recording": "hdopt.recording",

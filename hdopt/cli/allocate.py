@@ -23,9 +23,9 @@ def command(study, drive, overrides, rule, compare, engine, json_file, seed) -> 
 
     STUDY is a study file or a shipped study with costs. Exit status 1: the requirement cannot be met.
     """
+    from hdopt.allocation import allocate
     from hdopt.study import load_study
     from hdopt.tolerance.allocate import Infeasible
-    from hdopt.tolerancing import allocate
 
     loaded = load_study(study, overrides, drive)
     try:

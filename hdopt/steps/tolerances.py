@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hdopt import tolerancing
+from hdopt import allocation, tolerancing
 from hdopt.report import Section, Text
 from hdopt.report.sections.tolerances import allocate_section, sobol_section, stack_section
 from hdopt.steps import Context, StepResult
@@ -25,7 +25,7 @@ def sobol(study: Study, context: Context) -> StepResult:
 def allocate(study: Study, context: Context) -> StepResult:
     """Least-cost tolerances by the study's rule, beside the other rules."""
     try:
-        result = tolerancing.allocate(study, seed=context.seed)
+        result = allocation.allocate(study, seed=context.seed)
     except Infeasible as error:
         section = Section("allocate", "What the tolerances should be", (Text(str(error)),), "No tolerances are enough.")
         return StepResult((section,), {"status": "infeasible", "reason": str(error)}, answer=False)

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from hdopt.allocation import allocate
 from hdopt.tolerance.allocate import Infeasible, Item
 from hdopt.tolerance.allocate_response import (
     Problem,
@@ -14,7 +15,7 @@ from hdopt.tolerance.allocate_response import (
     yield_margin,
 )
 from hdopt.tolerance.cost import Power
-from hdopt.tolerancing import allocate, study_problem
+from hdopt.tolerancing import study_problem
 
 
 def problem(limit=1.0, reach=(0.1, 3.0)):

@@ -14,7 +14,7 @@ LAYERS = [
     {"spectrum"},
     {"engine", "tolerance", "sensitivity", "recording", "recording_checks", "recording_sync", "diagnosis"},
     {"study"},
-    {"analysis", "tolerancing", "trade", "diagnosis.write_back"},
+    {"analysis", "tolerancing", "allocation", "trade", "diagnosis.write_back"},
     {"geometry", "report"},
     {"steps", "studies"},
     {"run"},

@@ -13,9 +13,10 @@ from hdopt.report.theme import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, fad
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
+    from hdopt.allocation import AllocateResult
     from hdopt.sensitivity import Sobol
     from hdopt.tolerance.stack import Stack
-    from hdopt.tolerancing import AllocateResult, SobolResult, StackResult
+    from hdopt.tolerancing import SobolResult, StackResult
 
 SMALLEST_SHARE = 0.0005
 """Contributions below this are left out of the figure, not of the table."""
