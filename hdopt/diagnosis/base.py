@@ -20,7 +20,7 @@ from hdopt.diagnosis.waveform import PARAMETERS
 
 Array = NDArray[np.float64]
 
-STARTS = 24
+STARTS = 16
 ROWS_FOR_STARTS = 2500
 
 

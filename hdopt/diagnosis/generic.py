@@ -116,7 +116,7 @@ def _groups(domains: list[str]) -> list[list[int]]:
 def strongest_orders(probe: FitProbe, count: int, lowest: float = 0.2, highest: float | None = None) -> list[float]:
     """The residual's strongest separate orders, cycles per input turn."""
     span = probe.samples.span_turns
-    highest = highest or 0.45 * min(probe.samples.rows_per_turn, 1e4)
+    highest = highest or min(0.45 * probe.samples.rows_per_turn, probe.order_range[1])
     grid = np.arange(max(lowest, 1.0 / span), highest, 0.25 / span)
     if len(grid) < 8:
         return []

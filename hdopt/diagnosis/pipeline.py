@@ -18,8 +18,8 @@ from hdopt.diagnosis.generic import generic_columns, strongest_orders, useful_co
 from hdopt.diagnosis.heldout import HeldOut, family_wise_p, held_out, paired_t, turn_folds
 from hdopt.diagnosis.noise import Noise
 from hdopt.diagnosis.probe import FitProbe
-from hdopt.diagnosis.samples import Samples, cells_for, gather
-from hdopt.diagnosis.select import Selection, price, search_terms, select
+from hdopt.diagnosis.samples import Samples, gather, neighbours_for
+from hdopt.diagnosis.select import Selection, highest_order, price, search_terms, select
 from hdopt.diagnosis.waveform import BaseModel
 from hdopt.recording import Recording
 
@@ -79,7 +79,7 @@ def gather_evidence(recordings: Sequence[Recording], base: BaseModel | None, see
     # Offsets of thousands of arcmin are zeros of encoders; without them the numbers keep their digits.
     middle = float(np.median(recordings[0].error_arcmin))
     recordings = [replace(r, error_arcmin=r.error_arcmin - middle) for r in recordings]
-    samples = gather(recordings, cells_for(recordings))
+    samples = gather(recordings, neighbours_for(recordings))
     problem = Problem(samples, base, offsets(samples), Noise.white(samples, 1.0))
     scale = float(np.std(samples.error - _mean_by_offset(problem)))
     problem = replace(problem, noise=Noise.white(samples, max(0.3 * scale, 1e-9)), prior_scale=max(1.0, scale / 0.3))
@@ -91,7 +91,7 @@ def gather_evidence(recordings: Sequence[Recording], base: BaseModel | None, see
     best = selection.best.fit
     # The noise again, now without what was found.
     noise_2, inflation_2 = measure_noise(best)
-    if selection.best.fit.terms and not (0.8 < noise_2.sigma / noise.sigma < 1.25):
+    if selection.best.fit.terms and not (0.7 < noise_2.sigma / noise.sigma < 1.4):
         problem_2 = problem.with_noise(noise_2)
         base_fit = refine(_rebase(base_fit, problem_2), iterations=8)
         selection = select(base_fit, inflation_2, rng, clean=_rebase(clean, problem_2) if clean is not None else None)
@@ -99,7 +99,7 @@ def gather_evidence(recordings: Sequence[Recording], base: BaseModel | None, see
     high = high_order_selection(recordings, selection.best.fit, rng)
     if high is not None and high.best.fit.terms:
         cleaned = subtract(recordings, high.best.fit)
-        samples = gather(cleaned, cells_for(cleaned))
+        samples = gather(cleaned, neighbours_for(cleaned))
         problem = replace(problem, samples=samples, noise=noise)
         base_fit = refine(_rebase(base_fit, problem), iterations=8)
         noise, inflation = measure_noise(
@@ -166,10 +166,11 @@ def measure_noise(fit: Fit) -> tuple[Noise, float]:
 
 def high_order_selection(recordings: Sequence[Recording], low: Fit, rng: np.random.Generator) -> Selection | None:
     """Effects of orders above what the averaged rows hold, looked for on the rows as recorded."""
-    cells = low.problem.samples.rows_per_turn
-    raw = gather(recordings, None)
-    if raw.locked or raw.rows_per_turn < 1.15 * cells:
+    averaged = low.problem.samples
+    if averaged.locked or averaged.averaged <= 1.15:
         return None
+    raw = gather(recordings)
+    lowest = highest_order(averaged)
     problem = Problem(raw, low.problem.base, _offsets_like(low, raw), Noise.white(raw, 1.0), low.problem.prior_scale)
     base_value = (
         low.problem.base.evaluate(raw.theta, low.errors)[0] if low.problem.base is not None else np.zeros(len(raw))
@@ -183,7 +184,7 @@ def high_order_selection(recordings: Sequence[Recording], low: Fit, rng: np.rand
     # A strong ripple must not be taken for noise: its strongest lines are taken out before the noise is measured.
     from hdopt.diagnosis.effect import sine_columns
 
-    lines = strongest_orders(FitProbe(bare), 6, lowest=0.43 * cells, highest=0.49 * raw.rows_per_turn)
+    lines = strongest_orders(FitProbe(bare), 6, lowest=lowest, highest=0.49 * raw.rows_per_turn)
     if lines:
         columns = sine_columns(raw.theta, lines)
         clean = bare.residual - columns @ np.linalg.lstsq(columns, bare.residual, rcond=None)[0]
@@ -191,7 +192,7 @@ def high_order_selection(recordings: Sequence[Recording], low: Fit, rng: np.rand
     bare = evaluate(problem.with_noise(noise), np.zeros(0), bare.offsets, (), ())
     low_effects = ["_sine_in_time", "_jump", "_changing_order", "_even_in_torque", "_even_in_speed"]
     low_effects += [e for e in EFFECTS if not getattr(EFFECTS[e], "high_order", False)]
-    return select(bare, 1.0, rng, skip=low_effects, rounds=2, order_range=(0.43 * cells, 0.49 * raw.rows_per_turn))
+    return select(bare, 1.0, rng, skip=low_effects, rounds=2, order_range=(lowest, 0.49 * raw.rows_per_turn))
 
 
 def _offsets_like(fit: Fit, samples: Samples) -> Array:

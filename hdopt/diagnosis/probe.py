@@ -22,12 +22,15 @@ class FitProbe:
     residual.
     """
 
-    def __init__(self, fit: Fit, keep: Sequence[int] | None = None, order_range: tuple[float, float] = (0.0, 1e9)):
+    def __init__(self, fit: Fit, keep: Sequence[int] | None = None, order_range: tuple[float, float] | None = None):
         keep = range(len(fit.terms)) if keep is None else keep
         self.fit = fit
         self.samples = fit.problem.samples
         self.base_value = fit.base_value
-        self.order_range = order_range
+        self.order_range = order_range or (
+            0.0,
+            self.samples.rows_per_turn * (0.45 if self.samples.averaged <= 1.15 else 0.35),
+        )
         self.noise = fit.problem.noise
         self.residual = fit.residual + sum(
             (fit.contribution(i) for i in range(len(fit.terms)) if i not in keep), np.zeros(len(self.samples))

@@ -1,8 +1,8 @@
 """Recordings of one drive, gathered into the rows that the diagnosis works on.
 
-Consecutive samples within one cell of input angle are averaged: 64 to 128 cells a turn hold every order up to about
-25, which is where all effects but tooth mesh and encoder interpolation live. Those two are looked for on the rows as
-recorded.
+Of long recordings a few neighbouring samples are averaged into a row, always equally many, so that a sine is dimmed
+evenly and not modulated. The rows hold every order up to a third of their number a turn, which is where all effects
+but tooth mesh and encoder interpolation live. Those two are looked for on the rows as recorded.
 """
 
 from __future__ import annotations
@@ -19,14 +19,15 @@ from hdopt.recording_sync import find_passes
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-CELLS_PER_TURN = 128
 MOST_ROWS = 14_000
+FEWEST_ROWS_PER_TURN = 64
 
 
-def cells_for(recordings: Sequence[Recording]) -> int:
-    """Cells a turn: 128, or fewer (down to 64) where the recordings are long."""
+def neighbours_for(recordings: Sequence[Recording]) -> int:
+    """How many neighbouring samples to average: as few as keep the rows at 14 000 or so, and 64 of them a turn."""
+    rows = sum(len(recording) for recording in recordings)
     turns = sum(float(np.abs(np.diff(recording.input_angle)).sum()) / TURN for recording in recordings)
-    return int(np.clip(MOST_ROWS / max(turns, 1.0), 64, CELLS_PER_TURN)) // 8 * 8
+    return max(1, min(round(rows / MOST_ROWS), int(rows / max(turns, 1.0) / FEWEST_ROWS_PER_TURN)))
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,8 @@ class Samples:
     temperature: Array | None
     locked: bool
     quantum: float
+    averaged: float = 1.0
+    """Samples as recorded behind a row, on average."""
 
     def __len__(self) -> int:
         return len(self.theta)
@@ -91,9 +94,9 @@ class Samples:
         return replace(self, **changes)
 
 
-def gather(recordings: Sequence[Recording], cells_per_turn: int | None) -> Samples:
-    """All recordings as one `Samples`; `cells_per_turn` None keeps every row as recorded."""
-    parts = [_one_record(recording, cells_per_turn) for recording in recordings]
+def gather(recordings: Sequence[Recording], neighbours: int = 1) -> Samples:
+    """All recordings as one `Samples`; the mean of so many `neighbours` makes a row."""
+    parts = [_one_record(recording, neighbours) for recording in recordings]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0] if name not in OPTIONAL}
     for name in OPTIONAL:
         complete = all(part[name] is not None for part in parts)
@@ -109,6 +112,7 @@ def gather(recordings: Sequence[Recording], cells_per_turn: int | None) -> Sampl
         block=block if not locked else np.minimum(np.arange(len(record)) * 40 // len(record), 39),
         locked=locked,
         quantum=max(recording.quantum_arcmin for recording in recordings),
+        averaged=sum(len(recording) for recording in recordings) / len(record),
         **columns,
     )
 
@@ -116,7 +120,7 @@ def gather(recordings: Sequence[Recording], cells_per_turn: int | None) -> Sampl
 OPTIONAL = ("time", "speed", "torque", "temperature")
 
 
-def _one_record(recording: Recording, cells_per_turn: int | None) -> dict[str, Array | None]:
+def _one_record(recording: Recording, neighbours: int) -> dict[str, Array | None]:
     n = len(recording)
     segment = recording.segment if recording.segment is not None else np.zeros(n, np.int64)
     if recording.input_locked:
@@ -126,7 +130,7 @@ def _one_record(recording: Recording, cells_per_turn: int | None) -> dict[str, A
         cell = np.arange(n) // max(1, n // 4000)
     else:
         passes = find_passes(recording.input_angle)
-        cell = np.arange(n) if cells_per_turn is None else np.floor(recording.input_angle / TURN * cells_per_turn)
+        cell = np.arange(n) // neighbours
     change = (np.diff(cell) != 0) | (np.diff(passes.index) != 0) | (np.diff(segment) != 0)
     starts = np.r_[0, np.flatnonzero(change) + 1]
     counts = np.diff(np.r_[starts, n]).astype(float)

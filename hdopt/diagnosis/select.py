@@ -27,11 +27,13 @@ Array = NDArray[np.float64]
 MOST_EFFECTS = 3
 EFFECT_COST = 4.0
 """Log prior odds against an effect being there: about 1 in 50."""
-DISCREPANCY = 0.03
+DISCREPANCY = 0.08
 """Share of the explained power that an effect must add beyond the others: no model's shapes are exact, and what a
 slightly wrong shape leaves must not be named as further physics.
 """
-LEADERS = 4
+CLEAR_WIN = 0.12
+"""Share of the explained power by which a description without physics must beat the catalogue."""
+LEADERS = 3
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,8 @@ def price(terms: Sequence[Term], rows: float, gain: float, inflation: float) -> 
     """What a set of terms has to pay in log evidence."""
     cost = 0.5 * sum(term.freedom for term in terms) * math.log(rows)
     cost += sum(math.log(max(term.trials, 1.0)) - term.odds for term in terms)
+    outside = sum(is_outside(term.effect) for term in terms)
+    cost += outside * 0.5 * CLEAR_WIN * gain / inflation
     return cost + len(terms) * EFFECT_COST + max(len(terms) - 1, 0) * 0.5 * DISCREPANCY * gain / inflation
 
 
@@ -182,12 +186,17 @@ def weigh(fit: Fit, base: Fit, inflation: float, top_gain: float | None = None) 
     return Candidate(fit, gain / inflation / 2 - price(fit.terms, rows, max(top, 0.0), inflation), gain)
 
 
+def highest_order(samples) -> float:
+    """Orders up to which averaged rows can be trusted: the mean of a few neighbours dims what lies higher."""
+    return samples.rows_per_turn * (0.45 if samples.averaged <= 1.15 else 0.35)
+
+
 def select(
     base: Fit,
     inflation: float,
     rng: np.random.Generator,
     skip: Sequence[str] = (),
-    rounds: int = 3,
+    rounds: int = 2,
     order_range: tuple[float, float] | None = None,
     clean: Fit | None = None,
 ) -> Selection:
@@ -197,13 +206,13 @@ def select(
     search also starts.
     """
     if order_range is None:
-        order_range = (0.0, 0.45 * base.problem.samples.rows_per_turn)
+        order_range = (0.0, highest_order(base.problem.samples))
     fits: dict[frozenset[str], Fit] = {}
 
     def explore(centre: Fit, pool: Sequence[Term], leaders: int) -> bool:
         """Joint fits of the best subsets and the best single effects about `centre`; whether any was new."""
         ranked = rank_subsets(FitProbe(centre, keep=(), order_range=order_range), pool, inflation, keep=30)
-        chosen = ranked[:leaders] + [entry for entry in ranked if len(entry[2]) == 1][:leaders]
+        chosen = ranked[:leaders] + [entry for entry in ranked if len(entry[2]) == 1][: leaders + 4]
         new = False
         for _, _, subset in chosen:
             names = frozenset(pool[i].effect for i in subset)

@@ -102,7 +102,9 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
     if high is not None and not _stands_out(high, evidence):
         high = None
     named = bool(best.fit.terms) and evidence.false_alarm_p <= SIGNIFICANCE and _worth_naming(evidence)
-    outside = (named and best.outside) or (high is not None and high.outside)
+    outside = (named and outside_share(best) > REMAINDER_SHARE) or (
+        high is not None and outside_share(high) > REMAINDER_SHARE
+    )
     unexplained = outside or clearly_unexplained(evidence)
     effects: list[Found] = []
     if outside:
@@ -181,6 +183,14 @@ def _worth_naming(evidence: Evidence) -> bool:
     return base - extended > SMALLEST_SHARE * extended
 
 
+def outside_share(candidate: Candidate) -> float:
+    """Share of what a set explains that its descriptions without physics carry."""
+    fit = candidate.fit
+    power = [float(np.var(fit.contribution(i))) for i in range(len(fit.terms))]
+    outside = sum(p for p, term in zip(power, fit.terms, strict=True) if is_outside(term.effect))
+    return outside / max(sum(power), 1e-300)
+
+
 def _stands_out(high: Candidate, evidence: Evidence) -> bool:
     """A ripple counts if it carries a share of the raw rows' power, and is more than what another shape may leave
     there.
@@ -221,13 +231,14 @@ def rivals(evidence: Evidence, high: Candidate | None) -> tuple[tuple[str, ...],
     """Other sets of effects, no larger, whose evidence is within a tie of the best."""
     best, *others = evidence.selection.candidates
     tail = [] if high is None else list(high.effects)
+    said = {name for name in (*best.effects, *tail) if not is_outside(name)}
     found = []
     for other in others:
-        if not other.fit.terms or other.outside or len(other.fit.terms) > len(best.fit.terms):
+        if not other.fit.terms or (other.outside and not best.outside) or len(other.fit.terms) > len(best.fit.terms):
             continue
         if best.evidence - other.evidence <= tie_width(evidence):
-            found.append((*other.effects, *tail))
-    return tuple(found[:3])
+            found.append(tuple(name for name in (*other.effects, *tail) if not is_outside(name)))
+    return tuple(names for names in dict.fromkeys(found) if names and set(names) != said)[:3]
 
 
 def tie_width(evidence: Evidence) -> float:
@@ -254,6 +265,8 @@ def describe(candidate: Candidate, evidence: Evidence, high: bool = False) -> li
     base_power = evidence.base_held_out.variance
     found = []
     for index, (term, estimate) in enumerate(zip(fit.terms, estimates, strict=True)):
+        if is_outside(term.effect):
+            continue
         effect = EFFECTS[term.effect]
         contribution = fit.contribution(index)
         rms = float(np.std(contribution))

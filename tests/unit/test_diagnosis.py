@@ -96,7 +96,7 @@ def test_jacobian_is_the_slope(drive):
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_base_recovers_the_waveform_and_what_is_identifiable(drive, study, seed):
     """To the noise: the fit of 12 numbers to 8000 samples leaves no more than the noise and a few parts of it."""
-    samples = gather(bench(study, turns=80, seed=seed, rate=60), None)
+    samples = gather(bench(study, turns=80, seed=seed, rate=60))
     problem = Problem(samples, BaseModel.of(drive), offsets(samples), Noise.white(samples, NOISE))
     fit = refine(fit_base(problem, np.random.default_rng(seed)))
     assert np.std(fit.residual) < 1.02 * NOISE
@@ -113,7 +113,7 @@ def test_errors_and_cartesian_are_inverse(study):
 
 
 def test_noise_model_finds_its_own_colour(study):
-    samples = gather(bench(study), None)
+    samples = gather(bench(study))
     rng = np.random.default_rng(0)
     white = rng.normal(size=len(samples))
     red = np.zeros(len(samples))

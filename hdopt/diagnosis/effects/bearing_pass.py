@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from hdopt.diagnosis.effect import Term, best_terms, sine_columns
+from hdopt.diagnosis.effects._zone_harmonics import zone_harmonics
 
 BALLS = np.arange(7, 41)
 RATIO_RANGE = (0.04, 0.35)
@@ -31,6 +32,12 @@ def bearing_orders(ball_ratio, balls, gear_ratio):
     )
 
 
+ZONE_HARMONICS = ((2,), (2, 4), (1, 2), (1, 2, 3, 4), (1, 2, 3, 4, 5, 6))
+"""Balls of unequal diameter or spacing: harmonics of the balls' place under the lobes, (1 + r)(1 + 1/N)/2, met by one
+lobe and, half a turn of the ring of balls on, by the other: even ones act directly, odd ones through the change of
+the driving zone.
+"""
+
 LINES = ((0, 1, 2, 3, 4), (0, 3), (0, 2), (0, 1, 2), (3, 4), (0, 3, 4), (0, 2, 3), (1, 2), (2, 3), (1, 2, 3))
 """Which of the five orders a variant shows."""
 
@@ -48,7 +55,7 @@ class BearingPass:
 
     def search(self, probe):
         samples = probe.samples
-        highest = 0.45 * min(samples.rows_per_turn, 128.0)
+        highest = min(0.45 * samples.rows_per_turn, probe.order_range[1])
         resolution = 1 / samples.span_turns
         ratios = np.arange(*RATIO_RANGE, min(0.2 * resolution / 20, 0.001))
         grid = np.arange(0.25, highest, 0.25 * resolution)
@@ -79,8 +86,9 @@ class BearingPass:
             4,
         )
         terms = [term for term in terms if self.every_line_shows(probe, term)]
+        unequal = self._unequal_balls(probe, ratios, power, grid, trials)
         steps = np.linspace(-0.6, 0.6, 7) * resolution
-        return [
+        found = [
             best_terms(
                 probe,
                 [
@@ -94,6 +102,40 @@ class BearingPass:
             )[0]
             for term in terms
         ]
+        return [*found, *unequal]
+
+    def _unequal_balls(self, probe, ratios, power, grid, trials):
+        """Terms of unequal balls, where the base's zones are there to meet them."""
+        if probe.fit.problem.base is None:
+            return []
+        half = (1 + ratios) * (1 + 1 / probe.samples.ratio) / 2
+        lines = [2 * half, 4 * half, 1 + half, np.abs(1 - half), 1 + 3 * half, np.abs(3 * half - 1)]
+        lines = [np.interp(line, grid, power, left=0.0, right=0.0) for line in lines]
+        score = sum(lines)
+        tops = []
+        for weight in (score, lines[0]):
+            weight = weight.copy()
+            for _ in range(2):
+                at = int(np.argmax(weight))
+                tops.append(float(ratios[at]))
+                weight[np.abs(ratios - ratios[at]) < 1 / probe.samples.span_turns] = 0
+        shapes = [
+            {"ball_to_pitch_ratio": r + d / probe.samples.span_turns, "balls": 0.0, "zones": float(v)}
+            for r in tops
+            for d in (-0.4, -0.2, 0.0, 0.2, 0.4)
+            for v in (1, 3)
+        ]
+        best = best_terms(probe, [self.term(probe.samples, s, trials=trials) for s in shapes])[0].shape
+        fine = [
+            {
+                **best,
+                "ball_to_pitch_ratio": best["ball_to_pitch_ratio"] + d / probe.samples.span_turns,
+                "zones": float(v),
+            }
+            for d in (-0.1, -0.05, 0.0, 0.05, 0.1)
+            for v in range(len(ZONE_HARMONICS))
+        ]
+        return best_terms(probe, [self.term(probe.samples, s, trials=trials) for s in fine])
 
     @staticmethod
     def every_line_shows(probe, term):
@@ -107,6 +149,15 @@ class BearingPass:
         return np.interp(orders, grid, power, left=0.0, right=0.0)
 
     def term(self, samples, shape, base_value=None, trials=1e4):
+        if "zones" in shape:
+            phase = (1 + shape["ball_to_pitch_ratio"]) * (1 + 1 / samples.ratio) / 2 * samples.theta
+            return Term(
+                self.id,
+                dict(shape),
+                zones=zone_harmonics(phase, ZONE_HARMONICS[int(shape["zones"])]),
+                steps={"ball_to_pitch_ratio": 1e-3 / samples.span_turns},
+                trials=trials / len(BALLS) * len(ZONE_HARMONICS),
+            )
         orders = bearing_orders(shape["ball_to_pitch_ratio"], shape["balls"], samples.ratio)
         orders = orders[list(LINES[int(shape["lines"])])]
         return Term(
@@ -118,12 +169,24 @@ class BearingPass:
         )
 
     def orders(self, term, ratio):
+        if "zones" in term.shape:
+            half = (1 + term.shape["ball_to_pitch_ratio"]) * (1 + 1 / ratio) / 2
+            return [
+                o
+                for h in ZONE_HARMONICS[int(term.shape["zones"])]
+                for o in ([h * half] if h % 2 == 0 else [1 + h * half])
+            ]
         orders = bearing_orders(term.shape["ball_to_pitch_ratio"], term.shape["balls"], ratio)
         return [float(orders[i]) for i in LINES[int(term.shape["lines"])]]
 
     def parameters(self, term, estimate):
         from hdopt.diagnosis.effect import Parameter
 
+        if "zones" in term.shape:
+            return {
+                "ball_to_pitch_ratio": estimate.parameter(term.width, "1"),
+                "unequal_um": estimate.derived(lambda v: 1e3 * float(np.hypot(v[0], v[1])), "um"),
+            }
         n = term.shape["balls"]
         found = {"ball_to_pitch_ratio": estimate.parameter(term.width, "1")}
         if any(i >= 3 for i in LINES[int(term.shape["lines"])]):

@@ -13,7 +13,7 @@ import numpy as np
 from hdopt.diagnosis.effect import Term, best_terms
 from hdopt.diagnosis.effects._zone_harmonics import zone_harmonics
 
-SETS = ((2,), (3,), (2, 3), (2, 3, 4), (2, 3, 4, 5))
+SETS = ((2,), (3,), (2, 3), (2, 3, 4), (2, 3, 4, 5), tuple(range(2, 9)), tuple(range(2, 15)))
 
 
 class CircularSplineToothHarmonics:

@@ -30,7 +30,7 @@ class Hysteresis:
         samples = probe.samples
         longest = float(np.max(samples.travel))
         shortest = max(3 * float(np.median(np.abs(np.diff(samples.travel)))), 1e-4 * longest)
-        lengths = np.geomspace(shortest, 0.6 * longest, 14)
+        lengths = np.geomspace(shortest, 0.2 * longest, 14)
         kinds = {}
         for kind in (0.0, 1.0):
             terms = [self.term(samples, {"transition_deg": d * (1 + 2 * kind), "maxwell": kind}) for d in lengths]
@@ -40,7 +40,7 @@ class Hysteresis:
     def term(self, samples, shape, base_value=None):
         # A crossing faster than a few rows cannot be told from play.
         longest, row = float(np.max(samples.travel)), float(np.median(np.abs(np.diff(samples.travel))))
-        delta = min(max(shape["transition_deg"], 2 * row), 2 * longest)
+        delta = min(max(shape["transition_deg"], 2 * row), 0.25 * longest)
         state = friction_state(samples, delta, bool(shape["maxwell"]))
         columns = [state]
         if samples.first.any():

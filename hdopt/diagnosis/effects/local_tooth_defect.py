@@ -17,7 +17,7 @@ import numpy as np
 from hdopt.diagnosis.effect import Parameter, Term, best_terms
 from hdopt.recording import TURN
 
-WIDTHS_DEG = (1.2, 2.5, 5.0, 10.0, 18.0)
+WIDTHS_DEG = (1.2, 2.5, 5.0, 10.0)
 COORDINATES = ("cs", "fs", "cs_once", "fs_once", "output")
 """CS or FS tooth met by both zones; CS or FS tooth seen once a turn whichever zone drives; fixed output angle."""
 
@@ -84,7 +84,7 @@ class LocalToothDefect:
     def term(self, samples, shape, base_value=None):
         name = COORDINATES[int(shape["on"])]
         coordinate, period = self.coordinate(samples, name)
-        shape = {**shape, "width_deg": min(max(shape["width_deg"], 0.5), 25.0)}
+        shape = {**shape, "width_deg": min(max(shape["width_deg"], 0.5), 14.0)}
         sigma = math.radians(shape["width_deg"])
 
         def pulse(shift):

@@ -37,7 +37,7 @@ class Resonance:
     def search(self, probe):
         samples = probe.samples
         low, high = np.quantile(np.abs(samples.speed), [0.1, 0.95]) / TURN
-        frequencies = np.geomspace(max(0.8 * low, 0.05 * high), 16 * high, 44)
+        frequencies = np.geomspace(max(0.8 * low, 0.05 * high), 16 * high, 36)
         coarse = [
             self.term(samples, {"frequency_hz": f, "damping_ratio": z}, probe.base_value)
             for f in frequencies

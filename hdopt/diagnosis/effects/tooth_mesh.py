@@ -13,7 +13,7 @@ import numpy as np
 
 from hdopt.diagnosis.effect import Term, best_terms, sine_columns
 
-SIDEBANDS = ((0,), (0, -2, 2), (0, -1, 1, -2, 2))
+SIDEBANDS = ((0,), (0, -2, 2), (0, -1, 1, -2, 2), (0, -2, 2, -4, 4), (0, -1, 1, -2, 2, -3, 3, -4, 4))
 
 
 class ToothMesh:
