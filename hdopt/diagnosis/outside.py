@@ -195,7 +195,11 @@ class EvenSpeed:
     needs_base = False
 
     def lacks(self, samples):
-        if samples.speed is None or np.std(np.abs(samples.speed)) < 0.05 * np.max(np.abs(samples.speed)):
+        if (
+            samples.locked
+            or samples.speed is None
+            or np.std(np.abs(samples.speed)) < 0.05 * np.max(np.abs(samples.speed))
+        ):
             return "speed that varies"
         return None
 

@@ -27,6 +27,7 @@ SECTIONS: dict[str, str] = {
     "linear_stack": "hdopt.study.tolerances:LinearStackSection",
     "allocate": "hdopt.study.costs:AllocateSection",
     "export": "hdopt.study.export:ExportSection",
+    "concealed": "hdopt.study.concealed:ConcealedSection",
     "search": "hdopt.study.search:SearchSection",
 }
 """Section -> where its model is; a model is imported only when a study has the section."""

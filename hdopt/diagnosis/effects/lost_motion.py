@@ -23,8 +23,11 @@ class LostMotion:
         return None if samples.reverses else "a reversal"
 
     def search(self, probe):
-        plain = self.term(probe.samples, {"ramp_arcmin": 0.5})
-        varying = [self.term(probe.samples, {"ramp_arcmin": 0.5, "order": k}) for k in (1.0, 2.0, 4.0)]
+        # The crossing is as long as the play itself, which a first estimate gives.
+        _, size = probe.solve(self.term(probe.samples, {"ramp_arcmin": 0.5}))
+        ramp = min(max(abs(float(size[0])), 0.05), 60.0)
+        plain = self.term(probe.samples, {"ramp_arcmin": ramp})
+        varying = [self.term(probe.samples, {"ramp_arcmin": ramp, "order": k}) for k in (1.0, 2.0, 4.0)]
         return [plain, *best_terms(probe, varying)]
 
     def term(self, samples, shape, base_value=None):

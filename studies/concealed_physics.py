@@ -1,0 +1,62 @@
+"""Answer blind cases with the diagnosis, then open the keys and show the score as it is."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from hdopt.errors import HdoptError
+from hdopt.report import KeyFigures, Section, Table, Text
+from hdopt.steps import Context, StepResult
+from hdopt.study import Study
+
+
+def concealed_physics(study: Study, context: Context) -> StepResult:
+    """Score of a blind proof: false alarms, exact sets, unknowns, intervals, confidences, every failed case.
+
+    The answer to the study is "no" where a criterion of the frozen gate (`tests/blind/thresholds.py`) is missed.
+    """
+    if Path("tests/blind").is_dir() and str(Path.cwd()) not in sys.path:
+        sys.path.insert(0, str(Path.cwd()))
+    try:
+        from tests.blind.proof import prove
+    except ImportError as error:
+        raise HdoptError(
+            "concealed-physics needs the simulated bench in tests/blind; run it in the folder of a checkout of hdopt"
+        ) from error
+    import pandas as pd
+
+    from hdopt.diagnosis import diagnose
+    from hdopt.recording import recording_from_table
+
+    size = study.section("concealed", "concealed-physics")
+    drive = study.drive
+    ratio = drive.geometry.ratio
+
+    def answer(tables):
+        records = [recording_from_table(table, ratio, name=f"recording {i + 1}") for i, table in enumerate(tables)]
+        return diagnose(records, drive, seed=context.seed).to_dict()
+
+    scores = prove(answer, size.seed, share=size.share, families=tuple(size.families))
+    gate = pd.DataFrame([vars(criterion) for criterion in scores.gate()])
+    failed = pd.DataFrame(
+        [vars(case) | {"truth": ", ".join(case.truth), "said": ", ".join(case.said)} for case in scores.failed]
+    )
+    section = Section(
+        "concealed-physics",
+        "What a bench concealed, and what was found",
+        (
+            KeyFigures({c.name: f"{c.value:.3g} (limit {c.limit:.3g})" for c in scores.gate()}),
+            Table("concealed-gate", "The gate, frozen before the first full run", gate),
+            Table(
+                "concealed-reliability",
+                "Stated confidence against how often it was right",
+                scores.reliability_frame().reset_index(),
+            ),
+            *((Table("concealed-failed", "Every case that failed", failed),) if len(failed) else ()),
+            Text(f"Seed {size.seed}, {size.share:.0%} of the full proof, {len(scores.cases)} cases."),
+        ),
+    )
+    results = {"seed": size.seed, "share": size.share, "cases": len(scores.cases), "passed": bool(scores.passed)}
+    results["gate"] = gate.to_dict("records")
+    return StepResult((section,), results, says=tuple(scores.summary().splitlines()), answer=bool(scores.passed))
