@@ -160,7 +160,7 @@ def _front_view(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], 
     _bore_callout(sheet, place, parts, high_x, low_y)
     _bolt_callout(sheet, place, parts, low_x, high_y)
     if isinstance(carrier.contour, Circle):
-        _disc_callout(sheet, place, carrier.contour, low_x, high_y)
+        _disc_callout(sheet, place, carrier.contour)
 
 
 def _extent(parts: Sequence[Part]) -> tuple[float, float, float, float]:
@@ -237,11 +237,11 @@ def _bolt_callout(sheet: Sheet, place: Placed, parts: Sequence[Part], left: floa
     )
 
 
-def _disc_callout(sheet: Sheet, place: Placed, circle: Circle, left: float, top: float) -> None:
-    tip = polar(circle.radius, math.radians(-40))
-    knee = place.point(left, top)
-    lines = [f"2 discs ⌀{2 * circle.radius:.3f}", f"axes {circle.offset:.4f} off centre"]
-    sheet.leader(place.point(tip[0], tip[1] + circle.offset), (knee[0] + 20, knee[1] - 12), lines)
+def _disc_callout(sheet: Sheet, place: Placed, circle: Circle) -> None:
+    tip = polar(circle.radius, math.radians(100))
+    x, y = place.point(tip[0], tip[1] + circle.offset)
+    lines = [f"2 × ⌀{2 * circle.radius:.3f}", f"e = {circle.offset:.4f}"]
+    sheet.leader((x, y), (x + 6, y + 16), lines)
 
 
 def _section(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], job: Job) -> None:

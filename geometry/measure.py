@@ -12,7 +12,8 @@ from hdopt.geometry.step import StepFile
 from hdopt.geometry.surface import walls
 from hdopt.profiles import MeasuredProfile, TwoDisk
 
-MEASURED_POINTS = 720
+SHARES = tuple((k + 0.5) / 8 for k in range(8))
+"""Where each span of the wall is measured: close enough to follow a tip whose curvature has a corner (Resal)."""
 
 
 def measured_profile(file: StepFile, bearing_thickness: float, wrap: TwoDisk | None = None) -> MeasuredProfile:
@@ -50,7 +51,7 @@ def _offset_wall(file: StepFile, name: str, distance: float) -> NDArray[np.float
     from scipy.interpolate import CubicSpline
 
     part = next(part for part in file.parts if part.name == name)
-    points = walls(part.solids[0])[0].points
+    points = walls(part.solids[0], SHARES)[0].points
     level = points[np.abs(points[:, 2] - points[:, 2].min()) < 1e-6][:, :2]
     centre = (level.max(0) + level.min(0)) / 2
     angle = np.arctan2(*(level - centre).T)

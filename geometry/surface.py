@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -36,10 +37,10 @@ class Wall:
         return float(np.diff(np.append(angles, angles[0] + 2 * math.pi)).max())
 
 
-def walls(solid: cq.Solid) -> list[Wall]:
-    """The rings of upright faces that are joined to each other, as points between spline knots; the widest first."""
+def walls(solid: cq.Solid, shares: Sequence[float] = BETWEEN) -> list[Wall]:
+    """The rings of upright faces joined to each other, as points at these shares of spline spans; widest first."""
     upright = [face for face in (face.wrapped for face in solid.Faces()) if _is_upright(face)]
-    rings = [Wall(np.concatenate([_wall_points(face) for face in ring])) for ring in _rings(upright)]
+    rings = [Wall(np.concatenate([_wall_points(face, shares) for face in ring])) for ring in _rings(upright)]
     return sorted(rings, key=lambda wall: -np.ptp(wall.points[:, 1]))
 
 
@@ -109,17 +110,17 @@ def _rings(faces: list[TopoDS_Face]) -> list[list[TopoDS_Face]]:
     return list(rings.values())
 
 
-def _wall_points(face: TopoDS_Face) -> NDArray[np.float64]:
+def _wall_points(face: TopoDS_Face, shares: Sequence[float]) -> NDArray[np.float64]:
     from OCP.BRepAdaptor import BRepAdaptor_Surface
 
     surface = BRepAdaptor_Surface(face)
     u0, u1, v0, v1 = _bounds(face)
-    values = (_samples(surface, "U", u0, u1), _samples(surface, "V", v0, v1))
+    values = (_samples(surface, "U", u0, u1, shares), _samples(surface, "V", v0, v1, shares))
     points = [surface.Value(u, v) for u in values[0] for v in values[1]]
     return np.array([(p.X(), p.Y(), p.Z()) for p in points])
 
 
-def _samples(surface, axis: str, low: float, high: float) -> list[float]:
+def _samples(surface, axis: str, low: float, high: float, shares: Sequence[float]) -> list[float]:
     """Parameters between the knots of a spline surface; evenly spread on any other."""
     from OCP.GeomAbs import GeomAbs_SurfaceType
 
@@ -130,7 +131,7 @@ def _samples(surface, axis: str, low: float, high: float) -> list[float]:
     else:
         knots = np.linspace(low, high, SPANS_OF_A_CYLINDER + 1 if axis == "U" else 2)
     knots = np.unique(np.clip(knots, low, high))
-    return (knots[:-1, None] + np.diff(knots)[:, None] * np.array(BETWEEN)).ravel().tolist()
+    return (knots[:-1, None] + np.diff(knots)[:, None] * np.array(shares)).ravel().tolist()
 
 
 def _bounds(face: TopoDS_Face) -> tuple[float, float, float, float]:
