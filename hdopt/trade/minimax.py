@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 LOCAL = "LD_SLSQP"
 """Fewest evaluations of all tried on the trade study, and none missed: `tests/benchmarks/test_search_methods.py`."""
 GLOBAL = "GN_DIRECT_L"
-"""Deterministic, and the start nearest the optimum for the same evaluations (same comparison)."""
+"""Deterministic, and of all tried the nearest or second nearest to the optimum for one effort (same comparison)."""
 PENALTY = 10.0
 """What a violation of 1 costs in a global search, in units of the objective's own size: exact for multipliers below."""
 SMALL = 1e-12

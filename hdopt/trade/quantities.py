@@ -197,7 +197,7 @@ class PeakToPeakQuantile:
     the drives' own.
     """
 
-    title: str = "Peak-to-peak, quantile"
+    title: str = "Peak-to-peak quantile"
     unit: str = "arcmin"
     small_is_good: bool = True
 
@@ -342,7 +342,7 @@ QUANTITIES: dict[str, Quantity] = {
     "bending_safety": Scalar("Safety against bending fatigue", "", bending_safety, False),
     "contact_angle_deg": Scalar("Contact angle", "deg", lambda t, d: math.degrees(d.mesh.contact_angle), False),
     "carrying_angle_deg": Scalar("Carrying angle", "deg", lambda t, d: math.degrees(carrying_angle(t, d)), False),
-    "carrying_teeth": Scalar("Carrying teeth, one zone", "", carrying_teeth, False),
+    "carrying_teeth": Scalar("Carrying teeth of one zone", "", carrying_teeth, False),
     "trailing_flank_room_mm": Scalar("Room of the trailing flank", "mm", trailing_flank_room, False),
     "radial_force_n": Scalar("Radial force", "N", largest_radial_force),
     "axial_force_n": Scalar("Axial force", "N", largest_axial_force),

@@ -12,7 +12,7 @@ NOT_MODELLED = (
     "tooth separation under load",
     "the stiffness and efficiency that an automatic or one-way wave generator loses in its cross-slide",
     "ratcheting and buckling torque and torsional stiffness K1 to K3, which are catalogue values without a formula",
-    "the load that the flexspline's own stiffness puts on the wave generator's bearing",
+    "the stiffness of the flexspline's cup, which loads the wave generator's bearing more than the toothed ring alone",
 )
 """What stands beside every choice, because no formula of the trade knows it."""
 

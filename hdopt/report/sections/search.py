@@ -77,7 +77,7 @@ def chosen_section(result: SearchResult, file: str, key: str = "trade-chosen") -
     after, before = best.quantities[result.objective], baseline.quantities[result.objective]
     values = {objective.title: number(after, objective.unit), "Baseline": number(before, objective.unit)}
     values |= {VARIABLES[k][0]: number(v, VARIABLES[k][1]) for k, v in best.variables.items() if k != "module_mm"}
-    held = [f"{p['title'][:1].lower()}{p['title'][1:]}" for p in result.active if "bound" not in p["kind"]]
+    held = [in_sentence(p["title"]) for p in result.active if "bound" not in p["kind"]]
     at_bound = [in_sentence(p["title"]) for p in result.active if "bound" in p["kind"]]
     others = sorted(
         (d for d in result.combinations if d.feasible and d.name != best.name),
@@ -87,7 +87,7 @@ def chosen_section(result: SearchResult, file: str, key: str = "trade-chosen") -
     if others:
         next_best = others[0]
         gap = next_best.quantities[result.objective] / after - 1
-        why += f"; the next combination, {in_sentence(name_of(next_best))}, comes within {100 * gap:.2g} %"
+        why += f"; the next combination, {in_sentence(name_of(next_best))}, is {100 * gap:.2g} % above it"
     why += f". It is held by {listed(held)}. " if held else ". "
     if at_bound:
         why += f"At a bound of its range is {listed(at_bound)}: the table says what that costs."
@@ -134,7 +134,7 @@ def _against_baseline(result: SearchResult) -> pd.DataFrame:
             verdict = ""
         else:
             verdict = "improved" if (share < 0) == quantity.small_is_good else "paid"
-        change = f"{100 * share:+.1f} %".replace("-", "−")
+        change = "" if verdict == "unchanged" else f"{100 * share:+.1f} %".replace("-", "−")
         rows.append((quantity.title, number(before, quantity.unit), number(value, quantity.unit), change, verdict))
     return pd.DataFrame(rows, columns=["what", "baseline", "chosen", "change", "verdict"])
 

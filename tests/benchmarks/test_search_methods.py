@@ -1,0 +1,67 @@
+"""Why SLSQP, and why DIRECT-L starts it: all methods on the trade study's own problems.
+
+`python -m pytest tests/benchmarks/test_search_methods.py -s` prints the tables.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from hdopt.drive import Structure
+from hdopt.study import load_study
+from hdopt.trade.minimax import GLOBAL, LOCAL, PENALTY, explore, minimise
+from hdopt.trade.nlopt_guard import Effort
+from hdopt.trade.setup import setup_of
+from hdopt.trade.space import Combination
+
+PROFILES = ("ellipse", "resal", "two_disk")
+LOCALS = ("LD_SLSQP", "LD_MMA", "LD_CCSAQ", "LN_COBYLA")
+GLOBALS = ("GN_DIRECT_L", "GN_CRS2_LM", "GN_ISRES", "GN_ESCH")
+STARTS = 3
+REACHED = 1e-4
+"""Within this share of the best value any method found."""
+
+
+@cache
+def problem(profile: str):
+    setup = setup_of(load_study("csf-25-80-design-trade", ("search.robust=false",)), seed=1)
+    return setup.problem(Combination(profile, Structure.AUTOMATIC), "peak_to_peak_arcmin")
+
+
+@pytest.mark.slow
+def test_the_local_method_misses_nothing_and_needs_the_fewest_evaluations():
+    table = {}
+    for algorithm in LOCALS:
+        evaluations, missed = [], 0
+        for profile in PROFILES:
+            at = problem(profile)
+            best = minimise(at, at.place(at.space.baseline_values)).evaluation.objective
+            for start in np.random.default_rng(1).random((STARTS, at.n)):
+                outcome = minimise(at, start, algorithm, Effort(evaluations=400))
+                evaluations.append(outcome.evaluations)
+                missed += not (outcome.feasible and outcome.evaluation.objective <= best * (1 + REACHED))
+        table[algorithm] = (float(np.median(evaluations)), missed)
+    print()
+    for algorithm, (median, missed) in table.items():
+        print(f"{algorithm:10s} median {median:5.0f} evaluations, missed {missed} of {STARTS * len(PROFILES)}")
+    assert table[LOCAL][1] == 0
+    assert table[LOCAL][0] == min(median for median, _ in table.values())
+
+
+@pytest.mark.slow
+def test_the_global_method_gives_starts_that_are_no_worse_than_the_others_median():
+    print()
+    for profile in PROFILES:
+        at = problem(profile)
+        merit = {}
+        for algorithm in GLOBALS:
+            found = explore(at, algorithm, Effort(evaluations=150))
+            best = minimise(at, found.u)
+            assert best.feasible
+            merit[algorithm] = found.evaluation.objective / best.evaluation.objective
+            merit[algorithm] += PENALTY * found.evaluation.violation
+            print(f"{profile:10s} {algorithm:12s} start at {merit[algorithm]:.3f} of the optimum")
+        assert merit[GLOBAL] <= np.median(list(merit.values()))

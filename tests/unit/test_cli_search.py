@@ -1,0 +1,54 @@
+"""`hdopt search` from the outside: JSON keys, exit statuses, words."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from hdopt.cli import main
+
+SMALL = ("--set", 'search.profiles=["ellipse"]', "--set", 'search.structures=["automatic"]')
+
+
+def run(capsys, *arguments: str) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main(["search", *arguments])
+    written = capsys.readouterr()
+    return ended.value.code, written.out, written.err
+
+
+def test_json_has_the_keys_others_read_and_nothing_else_is_printed(capsys):
+    status, out, _ = run(capsys, "csf-25-80", *SMALL, "--set", "search.front_points=3", "--json", "-")
+    found = json.loads(out)
+    assert status == 0
+    assert {"best", "front", "evaluations", "algorithm", "stopped_because"} <= set(found)
+    assert len(found["front"]) >= 3
+    assert found["stopped_because"].startswith("converged")
+    assert found["best"]["quantities"]["peak_to_peak_arcmin"] < 1.0
+
+
+def test_a_person_reads_what_the_limits_cost(capsys):
+    status, out, _ = run(capsys, "csf-25-80", *SMALL, "--no-fronts")
+    assert status == 0
+    assert "held by" in out
+    assert "WG bearing life L10 at least 7000 h" in out
+    assert "not modelled: tooth separation" in out
+
+
+def test_no_design_is_status_1(capsys):
+    limits = "search.limits={peak_to_peak_arcmin={max=0.05}}"
+    status, out, _ = run(
+        capsys, "csf-25-80", *SMALL, "--no-fronts", "--set", limits, "--set", 'search.objective="width_mm"'
+    )
+    assert status == 1
+    assert "no design meets all limits" in out
+    assert "Peak-to-peak at most 0.05 arcmin" in out
+
+
+def test_unusable_input_is_status_2_with_the_place(capsys):
+    status, out, err = run(capsys, "csf-25-80", "--set", 'search.profiles=["elipse"]')
+    assert status == 2
+    assert out == ""
+    assert "search.profiles" in err
+    assert "Traceback" not in err
