@@ -167,7 +167,9 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
             "false_alarm_p": evidence.false_alarm_p,
         },
         below_detection={
-            name: limit for name, limit in evidence.below_detection.items() if name not in {f.id for f in effects}
+            name: limit
+            for name, limit in evidence.below_detection.items()
+            if not is_outside(name) and name not in {found.id for found in effects}
         },
         warnings=warnings
         + tuple(f"{name} cannot be seen here: it needs {need}" for name, need in evidence.lacking.items()),

@@ -129,6 +129,7 @@ def test_nothing_hidden_is_adequate(study, drive):
     diagnosis = diagnose(bench(study), drive)
     assert diagnosis.verdict == "adequate"
     assert diagnosis.effects == ()
+    assert set(diagnosis.below_detection) <= set(EFFECTS)
     assert max(diagnosis.below_detection.values()) < 0.5
     assert diagnosis.fit["heldout_rms_base_arcmin"] == pytest.approx(NOISE, rel=0.1)
 
