@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hdopt.drive import Drive
-from hdopt.errors import HdoptError, unknown_name
+from hdopt.errors import HdoptError, MissingLibrary, unknown_name
 from hdopt.geometry.assembly import WaveGeneratorModel, wave_generator_model
 from hdopt.geometry.dimensions import Dimension, key_dimensions, tolerance_bounds
 from hdopt.geometry.formats import FORMATS
@@ -146,7 +146,9 @@ def require_cadquery() -> None:
     try:
         import cadquery  # noqa: F401
     except ImportError as error:
-        raise HdoptError(f"CadQuery cannot be loaded ({error}); on Debian install libgl1, then try again") from error
+        raise MissingLibrary(
+            f"CadQuery cannot be loaded ({error}); on Debian install libgl1, then try again"
+        ) from error
 
 
 def fingerprint(drive: Drive, options: ExportSection) -> str:

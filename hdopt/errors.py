@@ -18,6 +18,10 @@ class MissingValue(HdoptError):
         super().__init__(f"{needed_by} needs {names}, which is not given; add it to the study file or with --set")
 
 
+class MissingLibrary(HdoptError):
+    """A library of the system is needed that this machine lacks. The message names its package."""
+
+
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     """'unknown KIND 'NAME'', with the nearest known one, or all of them where none is near."""
     import difflib

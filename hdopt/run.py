@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hdopt.errors import HdoptError, MissingValue
+from hdopt.errors import HdoptError, MissingLibrary, MissingValue
 from hdopt.files import make_folder
 from hdopt.report import Report, Section, Text
 from hdopt.steps import STEPS, Context, StepResult, find_step
@@ -42,7 +42,8 @@ def run_study(study: Study, folder: Path, seed: int = 1, progress: Progress = it
     """Do the steps that a study asks for and write report.html, results.json and the CSV files into `folder`.
 
     A study asks for the steps that [study] lists; where it lists none, for all that its sections ask for, and one
-    that then lacks a number is left out, with a word in the report. `progress` is told of each step as it begins.
+    that then lacks a number or a library is left out, with a word in the report. `progress` is told of each step as
+    it begins.
     """
     from hdopt.report.html import write_report
 
@@ -56,7 +57,7 @@ def run_study(study: Study, folder: Path, seed: int = 1, progress: Progress = it
     for name in progress(names):
         try:
             found[name] = todo[name](study, context)
-        except MissingValue as error:
+        except (MissingLibrary, MissingValue) as error:
             if listed:
                 raise
             found[name] = _left_out(name, error)
@@ -96,7 +97,7 @@ def description_of(study: Study) -> str:
     )
 
 
-def _left_out(name: str, error: MissingValue) -> StepResult:
+def _left_out(name: str, error: HdoptError) -> StepResult:
     title = name.replace("_", " ").capitalize()
     return StepResult(
         (Section(name.replace("_", "-"), title, (Text(f"Left out: {error}."),)),), {"left_out": str(error)}

@@ -10,7 +10,7 @@ import pytest
 from cases import drive
 
 from hdopt.drive import Structure
-from hdopt.errors import HdoptError
+from hdopt.errors import HdoptError, MissingLibrary
 from hdopt.kinematics import peak_to_peak_arcmin
 from hdopt.run import run_study, steps_of
 from hdopt.steps import Context, find_step
@@ -139,3 +139,13 @@ def test_a_listed_step_with_a_missing_number_is_refused(tmp_path):
     (tmp_path / "mine.toml").write_text(MINIMAL + '[study]\nsteps = ["lag"]\n')
     with pytest.raises(HdoptError, match=r"the lag needs clearances.backlash_mm"):
         run_study(load_study(tmp_path / "mine.toml"), tmp_path / "out")
+
+
+def test_a_step_nobody_listed_is_left_out_where_the_machine_lacks_a_library(minimal, tmp_path, monkeypatch):
+    def lacking(study, context):
+        raise MissingLibrary("CadQuery cannot be loaded; on Debian install libgl1")
+
+    monkeypatch.setattr("hdopt.steps.waveform.orders", lacking)
+    result = run_study(minimal, tmp_path / "out")
+    assert "install libgl1" in result.steps["orders"].results["left_out"]
+    assert result.answer
