@@ -10,7 +10,7 @@ import pytest
 
 from hdopt.errors import HdoptError
 from hdopt.trade.minimax import explore, minimise
-from hdopt.trade.nlopt_guard import INTERRUPTED, REASONS, Effort, Evaluation, Guard, find_algorithm, rank
+from hdopt.trade.nlopt_guard import INTERRUPTED, REASONS, Effort, Evaluation, Guard, find_algorithm, rank, run
 
 WITH_SLOPES = ("LD_SLSQP", "LD_MMA", "LD_CCSAQ")
 LOCAL = (*WITH_SLOPES, "LN_COBYLA")
@@ -213,3 +213,17 @@ def test_the_same_seed_gives_the_same_points(algorithm):
 def test_a_misspelt_algorithm_names_the_nearest():
     with pytest.raises(HdoptError, match="unknown NLopt algorithm 'LD_SLSPQ'; did you mean 'LD_SLSQP'"):
         find_algorithm("LD_SLSPQ")
+
+
+def test_nlopts_own_failures_are_outcomes_and_other_errors_are_not():
+    """They are classes of NLopt's own in some releases, RuntimeError and ValueError in others."""
+    optimizer = nlopt.opt(nlopt.LD_SLSQP, 2)
+    optimizer.set_min_objective(lambda x, grad: float(x @ x))
+    guard = Guard(Bowl())
+    guard(CENTRE)
+    outcome = run(optimizer, guard, np.zeros(3), "LD_SLSQP")  # three numbers for two variables
+    assert outcome.stopped_because == REASONS[-2]
+    assert np.array_equal(outcome.u, CENTRE)
+    optimizer.set_min_objective(lambda x, grad: {}["a mistake in the callback"])
+    with pytest.raises(KeyError, match="a mistake in the callback"):
+        run(optimizer, guard, np.zeros(2), "LD_SLSQP")
