@@ -44,6 +44,7 @@ def test_envelope(benchmark):
     assert found.finite
 
 
+@pytest.mark.slow
 @pytest.mark.benchmark(group="one design with slopes")
 def test_exact_geometry(benchmark):
     at = problem("peak_to_peak_arcmin")
