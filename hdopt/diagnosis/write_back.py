@@ -12,11 +12,10 @@ if TYPE_CHECKING:
 
 
 def write_study(diagnosis: Diagnosis, drive: str, path: Path) -> None:
-    """Write a study file that starts from `drive` and holds the fitted errors; play becomes the backlash at the pitch
-    line.
+    """Write a study file that starts from `drive` and holds the fitted errors of the kinematic-error model.
 
-    `ke`, `stack` and `search` then work on the drive as recorded. Effects that the kinematic-error model has no place
-    for are written as comments, so that nobody takes the study for the whole truth.
+    `ke`, `stack` and `search` then work on those errors. The effects found stand as comments with their parameters: the
+    commands do not compute them, and nobody should take the study for the whole truth.
     """
     from hdopt.files import write_text
     from hdopt.study import load_study, shipped_drives
