@@ -6,9 +6,10 @@ d = tan(alpha) E_a + the CS term, both c + R cos(theta - psi), the driving zone 
     |t| + |d| + a_FS  at most,        |t| + max(0, |d| - a_FS)  at least.
 
 The extremes of these two lie at known angles: peaks and troughs of |t| +- |d|, zeros of t, and where |d| = a_FS.
-The second-order terms of the closed form and the discrete FS phases move them a little. So the few first-order
-candidates that can still win are refined on the closed form with exact slopes: a smooth extreme by a Newton step,
-a V-shaped minimum (rims or zones switching) as the lowest point of the highest of the branches' tangents.
+The second-order terms of the closed form and the discrete FS phases move them a little. So around the few candidates
+that can still win, every branch is a parabola with the closed form's own value and slope: a peak is raised by a Newton
+step, and a minimum is the lowest point of the higher zone on each stretch between changes of the deepest rim, its ends
+included, for the FS phases next to where both zones drive equally.
 """
 
 from __future__ import annotations
@@ -32,12 +33,8 @@ rim_depth = inlined(closed_form.rim_depth)
 
 REACH = 0.12
 """How far, in rad, an extreme may lie from its first-order place."""
-SETTLED = 0.1
-"""How far, in units of the second-order terms, a minimum may still sink when it is refined."""
-FINAL_REACH = 0.05
-"""How far it may still move in the last step, where parabolas stand for the branches."""
-SCRATCH = (64, 10)
-"""Work space: first-order minima (bound, cos, sin); screened ones (value, cos, sin, FS phase as cos, sin, step, x)."""
+SCRATCH = (16, 3)
+"""Work space for the first-order minima: bound, cos, sin."""
 
 
 @inlined
@@ -180,13 +177,10 @@ def _piece(rims, low, high):
 
 
 @inlined
-def _lowest_of_piece(piece, a_fs, advance, cos, sin, off):
-    """(x, value) of the lowest point of one piece, where the FS phase is `off` past that of (cos, sin) at x = 0.
-
-    Free of branches: it runs for every phase near every candidate, and only the few that come lowest are refined.
-    """
+def _lowest_of_piece(piece, a_fs, advance, cos, sin):
+    """The lowest driving deviation on one piece, where (cos, sin) is the FS phase at x = 0. Free of branches."""
     mean = piece.mean + a_fs * cos * piece.h
-    gap = piece.gap + a_fs * (sin + cos * (off + piece.d))
+    gap = piece.gap + a_fs * (sin + cos * piece.d)
     slope = piece.gap_slope + a_fs * advance * cos
     bend = piece.gap_bend - a_fs * sin
     # A line plus the size of another is lowest where the steeper one vanishes, or else at an end.
@@ -200,8 +194,7 @@ def _lowest_of_piece(piece, a_fs, advance, cos, sin, off):
     y = -(piece.mean_slope + side * slope) / one_bend if one_bend > 0.0 else 0.0
     y = min(piece.high, max(piece.low, y))
     alone = mean + y * (piece.mean_slope + y * piece.mean_bend / 2) + abs(gap + y * (slope + y * bend / 2))
-    x, value = (y, alone) if alone < value else (x, value)
-    return x, value if piece.high >= piece.low else math.inf
+    return min(value, alone) if piece.high >= piece.low else math.inf
 
 
 @inlined
@@ -212,21 +205,21 @@ def _pieces(rims, first, second, reach):
 
 
 @inlined
-def _lowest(pieces, a_fs, advance, cos, sin, off):
-    """(x, value) of the lowest point of all three pieces."""
-    x, value = _lowest_of_piece(pieces[0], a_fs, advance, cos, sin, off)
-    x_next, value_next = _lowest_of_piece(pieces[1], a_fs, advance, cos, sin, off)
-    x, value = (x_next, value_next) if value_next < value else (x, value)
-    x_next, value_next = _lowest_of_piece(pieces[2], a_fs, advance, cos, sin, off)
-    return (x_next, value_next) if value_next < value else (x, value)
+def _lowest(pieces, a_fs, advance, cos, sin):
+    """The lowest driving deviation on all three pieces, where (cos, sin) is the FS phase at x = 0."""
+    return min(
+        _lowest_of_piece(pieces[0], a_fs, advance, cos, sin),
+        _lowest_of_piece(pieces[1], a_fs, advance, cos, sin),
+        _lowest_of_piece(pieces[2], a_fs, advance, cos, sin),
+    )
 
 
 @compiled
-def _least(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phases, t, d, margin, settled, scratch):
+def _least(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phases, t, d, second_order, scratch):
     """Infimum over one full relative turn, mm of arc. `t`, `d`: (cos, sin, constant) of the first-order parts."""
     t_cos, t_sin, t_0 = t
     d_cos, d_sin, d_0 = d
-    count = 0
+    count, first_place = 0, 0
     best = math.inf
 
     t_size = math.sqrt(t_cos * t_cos + t_sin * t_sin)
@@ -259,18 +252,19 @@ def _least(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phas
             cos, sin = ratio * c - along * s, ratio * s + along * c
             bound = abs(t_cos * cos + t_sin * sin + t_0)
             bound += max(0.0, abs(d_cos * cos + d_sin * sin + d_0) - a_fs)
-            best = min(best, bound)
-            if bound <= best + margin:
-                scratch[count, 0], scratch[count, 1], scratch[count, 2] = bound, cos, sin
-                count += 1
+            if bound < best:
+                best, first_place = bound, count
+            scratch[count, 0], scratch[count, 1], scratch[count, 2] = bound, cos, sin
+            count += 1
 
     spacing = 2 * math.pi / phases
     least = math.inf
-    found = 0
-    for i in range(count):
-        if scratch[i, 0] > best + margin:
+    for i in range(-1, count):
+        # The most promising first: then most of the others cannot sink below what is found already.
+        at = first_place if i < 0 else i
+        if i == first_place or scratch[at, 0] - second_order > least:
             continue
-        cos, sin = scratch[i, 1], scratch[i, 2]
+        cos, sin = scratch[at, 1], scratch[at, 2]
         rims, first, second = _four_rims(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin)
         pieces = _pieces(rims, first, second, REACH)
         phase = advance * _angle(sin, cos) + fs_phase
@@ -279,34 +273,19 @@ def _least(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phas
         wanted = min(1.0, max(-1.0, wanted))
         other = math.sqrt(1.0 - wanted * wanted)
         target = _angle(wanted, other)
-        for crossing in range(2):
+        for crossing in range(2 if other > 0.0 else 1):
             if crossing == 1:
                 target, other = math.pi - target, -other
             off = (phase - target) / spacing
             off = (off - math.floor(off)) * spacing
             for neighbour in range(2):
-                step = off - neighbour * spacing
-                x, value = _lowest(pieces, a_fs, advance, other, wanted, step)
-                least = min(least, value)
-                row = scratch[found]
-                row[3], row[4], row[5], row[6], row[7], row[8], row[9] = value, cos, sin, other, wanted, step, x
-                found += 1
-
-    polished = math.inf
-    for i in range(found):
-        row = scratch[i]
-        if row[3] <= least + settled:
-            x = row[9]
-            cos, sin = _rotate(row[4], row[5], x)
-            fs_cos, fs_sin = _rotate(row[6], row[7], row[8] + advance * x)
-            rims, first, second = _four_rims(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin)
-            _, value = _lowest(_pieces(rims, first, second, FINAL_REACH), a_fs, advance, fs_cos, fs_sin, 0.0)
-            polished = min(polished, value)
-    return polished
+                fs_cos, fs_sin = _rotate(other, wanted, off - neighbour * spacing)
+                least = min(least, _lowest(pieces, a_fs, advance, fs_cos, fs_sin))
+    return least
 
 
 @compiled
-def _greatest(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phases, t, d, margin):
+def _greatest(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phases, t, d, second_order):
     """Supremum over one full relative turn, mm of arc."""
     t_cos, t_sin, t_0 = t
     d_cos, d_sin, d_0 = d
@@ -321,7 +300,7 @@ def _greatest(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, p
         s, k = (1.0 if case < 2 else -1.0), (1.0 if case % 2 == 0 else -1.0)
         c, n = s * d_cos + k * t_cos, s * d_sin + k * t_sin
         size = math.sqrt(c * c + n * n)
-        if s * d_0 + k * t_0 + size < best - margin:
+        if s * d_0 + k * t_0 + size < best - 2 * second_order:
             continue
         cos, sin = (c / size, n / size) if size > 0.0 else (1.0, 0.0)
         rim = _rim(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin, s, k)
@@ -361,10 +340,8 @@ def _one(tip, tan_alpha, advance, phases, row, scratch):
     offset = l_max / (tip.semi_major - tip.tip_radius)
     second_order = tan_alpha * (tip.semi_major / 2 * (t_max / tip.half_width) ** 2 + l_max * offset / 2)
     second_order += (row[8] + a_fs) * offset
-    margin = 2 * second_order + a_fs * math.pi / phases
-    settled = SETTLED * second_order
-    low = _least(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, row[11], advance, phases, t, d, margin, settled, scratch)
-    high = _greatest(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, row[11], advance, phases, t, d, margin)
+    low = _least(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, row[11], advance, phases, t, d, second_order, scratch)
+    high = _greatest(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, row[11], advance, phases, t, d, second_order)
     return high - low
 
 
