@@ -99,12 +99,10 @@ ERROR_GROUPS = {
 }
 """Errors by where they come from: input axis, wave generator, teeth of either spline."""
 
-LENGTH_ERRORS = tuple(name for name in ERROR_NAMES if name in AMPLITUDE_NAMES)
-
 
 def study_key(name: str) -> str:
     """The study-file key of an error: its name with the unit it is written in (`_mm` or `_deg`)."""
-    return f"{name}_mm" if name in LENGTH_ERRORS else f"{name}_deg"
+    return f"{name}_mm" if name in AMPLITUDE_NAMES else f"{name}_deg"
 
 
 STUDY_KEYS: dict[str, str] = {study_key(name): name for name in ERROR_NAMES}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -61,11 +61,3 @@ class Watched:
     def map(self, function, items):
         items = list(items)
         return progress(self.engine.map(function, items), self.label, len(items))
-
-
-def progress_bar(label: str, total: int) -> Callable[[int], None]:
-    """A function to call with each number of steps done; shows a bar on standard error where that is a terminal."""
-    from tqdm import tqdm
-
-    bar = tqdm(desc=label, total=total, file=sys.stderr, disable=not sys.stderr.isatty(), leave=False)
-    return lambda steps: bar.update(steps)

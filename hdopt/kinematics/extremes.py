@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hdopt.deviations import DriveErrors
 from hdopt.drive import Drive
-from hdopt.kinematics.waveform import circular_spline_term, geometry_for
+from hdopt.kinematics.waveform import circular_spline_term, geometry_for, kinematic_error_arcmin
 
 Array = NDArray[np.float64]
 
@@ -101,8 +101,6 @@ def walked_peak_to_peak_arcmin(
 
     This is what Jia 2021 publishes (10 deg, 80 turns); it lies below the converged value.
     """
-    from hdopt.kinematics.waveform import kinematic_error_arcmin
-
     steps = round(turns * 2 * np.pi / sampling)
     theta = np.minimum(np.arange(steps + 1) * sampling, turns * 2 * np.pi)
     return float(np.ptp(kinematic_error_arcmin(drive, errors, theta, geometry)))

@@ -14,9 +14,3 @@ class Section(BaseModel):
     """A checked section: unknown keys, other types and numbers that are not finite are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-
-class OpenSection(Section):
-    """A section whose keys are not checked here."""
-
-    model_config = ConfigDict(extra="allow", frozen=True)
