@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hdopt.diagnosis import noise as noise_model
 from hdopt.diagnosis.base import fit_base
 from hdopt.diagnosis.catalogue import EXPLANATIONS
-from hdopt.diagnosis.effects import EFFECTS
+from hdopt.diagnosis.effects import EFFECTS, HIGH_ORDER
 from hdopt.diagnosis.fit import Fit, Problem, evaluate, refine
 from hdopt.diagnosis.generic import generic_columns, strongest_orders, useful_columns
 from hdopt.diagnosis.heldout import HeldOut, family_wise_p, held_out, paired_t, turn_folds
@@ -191,8 +191,13 @@ def high_order_selection(recordings: Sequence[Recording], low: Fit, rng: np.rand
         noise = noise_model.estimate(raw, clean)
     bare = evaluate(problem.with_noise(noise), np.zeros(0), bare.offsets, (), ())
     low_effects = ["_sine_in_time", "_jump", "_changing_order", "_even_in_torque", "_even_in_speed"]
-    low_effects += [e for e in EFFECTS if not getattr(EFFECTS[e], "high_order", False)]
-    return select(bare, 1.0, rng, skip=low_effects, rounds=2, order_range=(lowest, 0.49 * raw.rows_per_turn))
+    low_effects += [e for e in EFFECTS if e not in HIGH_ORDER]
+    return select(bare, 1.0, rng, skip=low_effects, rounds=2, order_range=ripple_orders(averaged, raw))
+
+
+def ripple_orders(averaged: Samples, raw: Samples) -> tuple[float, float]:
+    """Orders that the rows as recorded hold and their averages do not."""
+    return highest_order(averaged), 0.49 * raw.rows_per_turn
 
 
 def _offsets_like(fit: Fit, samples: Samples) -> Array:

@@ -54,12 +54,16 @@ class FitProbe:
         """Whitened columns with base, offsets and kept terms taken out."""
         return white - self.basis @ (self.basis.T @ white)
 
+    def white_columns(self, term: Term) -> Array:
+        """The term's columns, whitened."""
+        return self.noise.whiten(term_columns(term, self.fit.zone, self.fit.problem.base))
+
     def columns(self, term: Term) -> Array:
         """The term's columns, whitened and projected."""
-        return self.project(self.noise.whiten(term_columns(term, self.fit.zone, self.fit.problem.base)))
+        return self.project(self.white_columns(term))
 
     def solve(self, term: Term) -> tuple[float, Array]:
-        white = self.noise.whiten(term_columns(term, self.fit.zone, self.fit.problem.base))
+        white = self.white_columns(term)
         absorbed = self.basis.T @ white
         gram, moment = white.T @ white - absorbed.T @ absorbed, white.T @ self.white_residual
         scale = np.sqrt(np.maximum((white**2).sum(0), 1e-300))

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from hdopt.diagnosis.base import BaseEstimate, base_estimate
 from hdopt.diagnosis.catalogue import is_outside
+from hdopt.diagnosis.confounding import CONFOUNDED, Confounding, confounded_with
 from hdopt.diagnosis.effect import Parameter, Term
-from hdopt.diagnosis.effects import EFFECTS
+from hdopt.diagnosis.effects import EFFECTS, HIGH_ORDER
 from hdopt.diagnosis.fit import Fit
 from hdopt.diagnosis.locate import Location, locate
-from hdopt.diagnosis.pipeline import Evidence
+from hdopt.diagnosis.pipeline import Evidence, ripple_orders
 from hdopt.diagnosis.probe import FitProbe
 from hdopt.diagnosis.select import Candidate
 from hdopt.recording import TURN
@@ -70,6 +71,7 @@ class Diagnosis:
     says: str
     where: dict[str, object] | None = None
     located: tuple[Location, ...] = ()
+    confounded: tuple[Confounding, ...] = ()
     evidence: Evidence | None = field(default=None, repr=False)
 
     def to_dict(self) -> dict[str, object]:
@@ -80,6 +82,7 @@ class Diagnosis:
             "effects": [found.to_dict() for found in self.effects],
             "ambiguous_with": [list(ids) for ids in self.ambiguous_with],
             "separating_test": self.separating_test,
+            "confounded": [pair.to_dict() for pair in self.confounded],
             "base": {
                 "parameters": {name: p.to_dict() for name, p in self.base.parameters.items()},
                 "rms_arcmin": self.base.rms_arcmin,
@@ -115,6 +118,7 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
         effects += describe(high, evidence, high=True)
     effects.sort(key=lambda found: -float(found.where["rms_arcmin"]))
     ambiguous: tuple[tuple[str, ...], ...] = ()
+    confounded: tuple[Confounding, ...] = ()
     separating = None
     where = None
     if outside or (
@@ -133,12 +137,16 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
         )
     elif effects:
         ambiguous = rivals(evidence, high) if named else ()
+        pairs = confounded_pairs(evidence, named, high)
+        tied = tied_pairs(pairs, [found.id for found in effects], ambiguous)
+        confounded = tuple(pair for pair in pairs if pair in tied or pair.imitates >= CONFOUNDED)
         verdict = "ambiguous" if ambiguous else "named"
         says = " ".join(found.says for found in effects)
         if ambiguous:
             others = "; ".join(" and ".join(ids) for ids in ambiguous)
             says += f" This recording cannot tell it from: {others}."
-            separating = separating_measurement([found.id for found in effects], ambiguous)
+            says += "".join(f" {p.other} could imitate {100 * p.imitates:.3g} % of {p.effect}." for p in tied)
+            separating = separating_measurement([found.id for found in effects], ambiguous, tied)
     elif too_little(evidence):
         verdict, says = (
             "insufficient",
@@ -176,6 +184,7 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
         says=says,
         where=where,
         located=tuple(locate(FitProbe(evidence.selection.base), np.random.default_rng(0))),
+        confounded=confounded,
         evidence=evidence,
     )
 
@@ -241,6 +250,33 @@ def rivals(evidence: Evidence, high: Candidate | None) -> tuple[tuple[str, ...],
         if best.evidence - other.evidence <= tie_width(evidence):
             found.append(tuple(name for name in (*other.effects, *tail) if not is_outside(name)))
     return tuple(names for names in dict.fromkeys(found) if names and set(names) != said)[:3]
+
+
+def confounded_pairs(evidence: Evidence, named: bool, high: Candidate | None) -> tuple[Confounding, ...]:
+    """Each effect that is said against every other of the catalogue, the most confounded pair first."""
+    pairs: list[Confounding] = []
+    if named:
+        fit = evidence.selection.best.fit
+        for index, term in enumerate(fit.terms):
+            if not is_outside(term.effect):
+                pairs += confounded_with(fit, index, evidence.inflation)
+    if high is not None:
+        orders = ripple_orders(evidence.samples, high.fit.problem.samples)
+        for index, term in enumerate(high.fit.terms):
+            if not is_outside(term.effect):
+                pairs += confounded_with(high.fit, index, others=HIGH_ORDER, order_range=orders)
+    return tuple(sorted(pairs, key=lambda pair: -pair.imitates))
+
+
+def tied_pairs(
+    pairs: tuple[Confounding, ...], ids: list[str], ambiguous: tuple[tuple[str, ...], ...]
+) -> tuple[Confounding, ...]:
+    """Of the `pairs` those in which an explanation that ties differs from the one given."""
+    return tuple(
+        pair
+        for pair in pairs
+        if any(pair.effect not in other and pair.other in other and pair.other not in ids for other in ambiguous)
+    )
 
 
 def tie_width(evidence: Evidence) -> float:
@@ -370,8 +406,12 @@ def locate_remainder(evidence: Evidence) -> dict[str, object]:
     }
 
 
-def separating_measurement(ids: list[str], ambiguous: tuple[tuple[str, ...], ...]) -> str:
-    """The measurement that would tell the explanations apart: that of the first effect on which they differ."""
+def separating_measurement(
+    ids: list[str], ambiguous: tuple[tuple[str, ...], ...], tied: tuple[Confounding, ...]
+) -> str:
+    """The measurement that would tell the explanations apart: that of the most confounded pair in which they differ."""
+    if tied:
+        return tied[0].separating
     for other in ambiguous:
         for name in [*ids, *other]:
             if (name in ids) != (name in other):

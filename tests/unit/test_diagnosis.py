@@ -271,7 +271,11 @@ def test_command_writes_the_contract(study, tmp_path):
         "domain", "orders_per_input_turn", "direction", "share_of_residual", "rms_arcmin",
     }  # fmt: skip
     assert result["effects"][0]["where"]["orders_per_input_turn"] == [0.025]
+    pair = result["confounded"][0]
+    assert pair["pair"] == ["output_coupling", "encoder_output_eccentricity"]
+    assert pair["imitates"] > 0.99 and pair["angle_deg"] < 1 and "coupling" in pair["separating"]
     assert "twice a turn" in page.read_text()
+    assert "What could be mistaken for it" in page.read_text()
     assert load_study(fitted).errors.fs_tooth_amplitude == pytest.approx(study.errors.fs_tooth_amplitude, rel=0.1)
 
 

@@ -41,3 +41,6 @@ EFFECTS = {
     )
 }
 """Effect id -> effect; the ids are part of the interface."""
+
+HIGH_ORDER = tuple(effect.id for effect in EFFECTS.values() if getattr(effect, "high_order", False))
+"""Effects of so many waves a turn that they are looked for on the rows as recorded too."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hdopt.diagnosis.verdict import TIE
 from hdopt.recording import TURN
 from hdopt.recording_sync import synchronous_average
 from hdopt.report import Figure, KeyFigures, Report, Section, Table, Text
@@ -39,6 +40,32 @@ def verdict_section(diagnosis: Diagnosis) -> Section:
     formats = {"value": ".4g", "low": ".4g", "high": ".4g"}
     if rows:
         items.append(Table("diagnosis-parameters", "Parameters, with 95 % intervals", pd.DataFrame(rows), "", formats))
+    confounded = [
+        {
+            "found": pair.effect,
+            "could be": pair.other,
+            "imitates": pair.imitates,
+            "angle": pair.angle_deg,
+            "log evidence apart": pair.evidence_apart,
+            "what would separate them": pair.separating,
+        }
+        for pair in diagnosis.confounded
+    ]
+    if confounded:
+        caption = (
+            "Imitates: share of the found effect's power that the other could take over. "
+            f"Angle: smallest one between the two. Below a log evidence of {TIE:g} this recording does not tell them "
+            "apart by their shape."
+        )
+        items.append(
+            Table(
+                "diagnosis-confounded",
+                "What could be mistaken for it",
+                pd.DataFrame(confounded),
+                caption,
+                {"imitates": ".1%", "angle": ".1f", "log evidence apart": ".1f"},
+            )
+        )
     base = [
         {"error": name, "value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
         for name, p in diagnosis.base.parameters.items()

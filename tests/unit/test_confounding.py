@@ -1,0 +1,126 @@
+"""Confounded pairs, computed: what cannot be told apart on one record, and which second record parts it."""
+
+import numpy as np
+import pytest
+
+from hdopt.diagnosis.base import to_cartesian
+from hdopt.diagnosis.confounding import confounded_with, remaining_span, share_in_span, smallest_angle_deg
+from hdopt.diagnosis.effects import EFFECTS
+from hdopt.diagnosis.fit import Fit, Problem, evaluate, refine
+from hdopt.diagnosis.noise import Noise
+from hdopt.diagnosis.pipeline import gather, offsets
+from hdopt.diagnosis.select import joint_fit
+from hdopt.diagnosis.waveform import BaseModel
+from hdopt.study import load_study
+from tests.unit.test_diagnosis import HIDDEN, NOISE, bench
+
+SHAPES = {
+    "circular_spline_lobing": {"lobes": 6.0},
+    "output_coupling": {"variant": 0.0},
+    "channel_delay": {},
+    "lost_motion": {"ramp_arcmin": 0.3},
+    "hysteresis": {"transition_deg": 1.5, "maxwell": 0.0},
+    "thermal_drift": {"time_constant_s": 100.0},
+    "torsional_windup": {},
+}
+
+
+@pytest.fixture(scope="module")
+def study():
+    return load_study(drive="csf-25-80")
+
+
+def fitted(study, names: list[str], shapes=SHAPES, hidden=HIDDEN, **record) -> Fit:
+    """The base, from the errors it was made with, and the effects `names` fitted to a record that has them."""
+    samples = gather(bench(study, lambda state: sum(hidden[name](state) for name in names), turns=20, **record))
+    base = BaseModel.of(study.drive)
+    problem = Problem(samples, base, offsets(samples), Noise.white(samples, NOISE))
+    errors = to_cartesian(study.errors, float(base.constants[2]))
+    start = refine(evaluate(problem, errors, np.zeros(problem.nuisance.shape[1]), (), ()), iterations=3)
+    return joint_fit(start, [EFFECTS[name].term(samples, shapes[name], start.base_value) for name in names])
+
+
+def against(study, name: str, other: str, **record):
+    (pair,) = confounded_with(fitted(study, [name], **record), 0, others=[other])
+    return pair
+
+
+def test_spans_by_hand():
+    """In three dimensions: a line at 30 deg to a plane's own axis, and what an absorbed column leaves."""
+    plane = remaining_span(np.eye(3)[:, :2], np.eye(3)[:, :2])
+    line = np.array([[np.cos(np.pi / 6)], [0.0], [np.sin(np.pi / 6)]])
+    assert smallest_angle_deg(line, plane) == pytest.approx(30.0)
+    assert share_in_span(5 * line[:, 0], plane) == pytest.approx(np.cos(np.pi / 6) ** 2)
+    absorbed = remaining_span(np.eye(3)[:, :2], np.eye(3)[:, :2] * [1.0, 1e-9])
+    assert absorbed.shape == (3, 1)
+    nothing = remaining_span(np.eye(3)[:, :2], np.zeros((3, 2)))
+    assert smallest_angle_deg(line, nothing) == 90.0
+    assert share_in_span(line[:, 0], nothing) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "other", "imitates"),
+    [
+        ("circular_spline_lobing", "cs_tooth_harmonics", 0.999),
+        ("output_coupling", "encoder_output_eccentricity", 0.999),
+        ("channel_delay", "lost_motion", 0.99),
+        ("lost_motion", "channel_delay", 0.99),
+        ("lost_motion", "hysteresis", 0.99),
+    ],
+)
+def test_alike_on_one_record(study, name, other, imitates):
+    """The same columns, or at one speed a step as high in either direction: what is left is the crossing of a step."""
+    pair = against(study, name, other)
+    assert pair.imitates > imitates
+    assert pair.angle_deg < 5
+    assert pair.separating == EFFECTS[name].separating
+
+
+@pytest.mark.parametrize(("name", "other"), [("lost_motion", "channel_delay"), ("channel_delay", "lost_motion")])
+def test_two_speeds_part_a_delay_from_play(study, name, other):
+    """A step of +-1 at both speeds against steps of 1 and 3, as many rows at each, is at the angle whose cosine is
+    4/sqrt(2 * 10): 26.6 deg, and imitates 0.8 of it. At 1 and 9 the cosine is 10/sqrt(2 * 82), the share 0.61."""
+    one = against(study, name, other)
+    two = against(study, name, other, speeds=(1.0, 3.0))
+    far = against(study, name, other, speeds=(1.0, 9.0))
+    # Crossing the play takes some rows of a pass, which the closed form leaves out.
+    assert two.angle_deg == pytest.approx(np.degrees(np.arccos(4 / np.sqrt(20))), abs=0.5)
+    assert two.imitates == pytest.approx(0.8, abs=0.01)
+    assert far.imitates == pytest.approx(100 / 164, abs=0.01)
+    assert 20 * one.evidence_apart < two.evidence_apart < far.evidence_apart
+
+
+def test_a_steady_drift_is_three_quarters_a_step(study):
+    """There and back once, a ramp from -1 to 1 against a step halfway: <x sign x>^2/<x^2> = (1/2)^2/(1/3) = 3/4.
+
+    The time constant is ten records here, so the ramp is nearly straight."""
+    pair = against(
+        study,
+        "thermal_drift",
+        "lost_motion",
+        shapes={"thermal_drift": {"time_constant_s": 2500.0}},
+        hidden={"thermal_drift": lambda state: 2 * (1 - np.exp(-state["time"] / 2500.0))},
+    )
+    assert pair.imitates == pytest.approx(0.75, abs=0.01)
+    assert pair.angle_deg < np.degrees(np.arccos(np.sqrt(0.75))) + 0.5
+
+
+def test_what_does_not_look_alike_is_far_apart(study):
+    pair = against(study, "torsional_windup", "circular_spline_lobing")
+    assert pair.imitates < 0.05
+    assert pair.angle_deg > 60
+
+
+def test_effects_of_one_fit_stand_against_each_other(study):
+    """Both found: each is asked with the other's own column free again, not with it projected out."""
+    names = ["lost_motion", "channel_delay"]
+    fit = fitted(study, names, speeds=(1.0, 3.0))
+    for index, other in ((0, "channel_delay"), (1, "lost_motion")):
+        pair = next(p for p in confounded_with(fit, index, others=[other]) if p.other == other)
+        assert pair.effect == names[index]
+        assert pair.imitates == pytest.approx(0.8, abs=0.01)
+
+
+def test_what_the_recording_cannot_show_is_not_in_the_list(study):
+    fit = fitted(study, ["output_coupling"])
+    assert {pair.other for pair in confounded_with(fit, 0)} <= set(EFFECTS) - {"output_coupling", "tooth_mesh"}
