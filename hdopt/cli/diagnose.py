@@ -78,5 +78,10 @@ def _lines(diagnosis):
         f"generic {fit['heldout_rms_generic_arcmin']:.4f}, placebo {fit['heldout_rms_placebo_arcmin']:.4f} arcmin; "
         f"false alarm p {fit['false_alarm_p']:.3g}"
     )
+    if fit["heldout_conditions_rms_base_arcmin"] is not None:
+        yield (
+            f"  conditions left out: base {fit['heldout_conditions_rms_base_arcmin']:.4f}, extended "
+            f"{fit['heldout_conditions_rms_extended_arcmin']:.4f} arcmin"
+        )
     for warning in diagnosis.warnings:
         yield f"  note: {warning}"

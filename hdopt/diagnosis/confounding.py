@@ -78,7 +78,7 @@ def smallest_angle_deg(one: Array, other: Array) -> float:
 def share_in_span(contribution: Array, basis: Array) -> float:
     """Share of the power of `contribution` (n,) that lies in the span of an orthonormal `basis` (n, q)."""
     power = float(contribution @ contribution)
-    return float(np.sum((basis.T @ contribution) ** 2)) / power if power > 0 else 0.0
+    return min(float(np.sum((basis.T @ contribution) ** 2)) / power, 1.0) if power > 0 else 0.0
 
 
 def confounded_with(

@@ -1,4 +1,4 @@
-"""Held-out error: whole input turns, and whole recordings, that a fit did not see."""
+"""Held-out error: whole input turns that a fit did not see."""
 
 from __future__ import annotations
 
@@ -24,6 +24,11 @@ class HeldOut:
     plain: Array
     white: Array
     rows: Array
+
+    @classmethod
+    def of(cls, block: NDArray[np.int64], plain: Array, white: Array) -> HeldOut:
+        """From the errors of all rows, (n,) each, and the turn of each row."""
+        return cls(np.bincount(block, plain**2), np.bincount(block, white**2), np.bincount(block).astype(float))
 
     @property
     def rms(self) -> float:
@@ -63,8 +68,7 @@ def held_out(fit: Fit, extra: Array | None, groups: NDArray[np.int64]) -> HeldOu
         step = np.linalg.solve(gram, moment - white[rows].T @ white_target[rows] - pull)
         plain[rows] = target[rows] - design[rows] @ step
         whitened[rows] = (white_target[rows] - white[rows] @ step) / noise.sigma
-    block = fit.problem.samples.block
-    return HeldOut(np.bincount(block, plain**2), np.bincount(block, whitened**2), np.bincount(block).astype(float))
+    return HeldOut.of(fit.problem.samples.block, plain, whitened)
 
 
 def turn_folds(fit: Fit, rng: np.random.Generator, folds: int = FOLDS) -> NDArray[np.int64]:

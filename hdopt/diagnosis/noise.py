@@ -7,7 +7,7 @@ in the residual must stay visible.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,13 @@ class Noise:
     @classmethod
     def white(cls, samples: Samples, sigma: float = 1.0) -> Noise:
         return cls(np.zeros(0), sigma, np.sqrt(samples.weight))
+
+    def without(self, left_out: NDArray[np.bool_]) -> Noise:
+        """The same noise with no weight on the rows `left_out` (n,), nor where the filter would reach into them."""
+        touched = left_out.copy()
+        for lag in range(1, len(self.ar) + 1):
+            touched[lag:] |= left_out[:-lag]
+        return replace(self, root_weight=np.where(touched, 0.0, self.root_weight))
 
     def whiten(self, values: Array) -> Array:
         """`values` (n,) or (n, q), filtered and weighted along the first axis."""

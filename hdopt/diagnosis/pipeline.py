@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hdopt.diagnosis import noise as noise_model
 from hdopt.diagnosis.base import fit_base
 from hdopt.diagnosis.catalogue import EXPLANATIONS
+from hdopt.diagnosis.conditions import AcrossConditions, across_conditions
 from hdopt.diagnosis.effects import EFFECTS, HIGH_ORDER
 from hdopt.diagnosis.fit import Fit, Problem, evaluate, refine
 from hdopt.diagnosis.generic import generic_columns, strongest_orders, useful_columns
@@ -52,6 +53,7 @@ class Evidence:
     extended_held_out: HeldOut
     generic_held_out: HeldOut
     placebo_held_out: HeldOut
+    across_conditions: AcrossConditions | None
     remainder: Remainder
     noise_floor: float
     false_alarm_p: float
@@ -282,6 +284,7 @@ def assess(samples: Samples, selection: Selection, high: Selection | None, infla
         extended_held_out=best_out,
         generic_held_out=generic_out,
         placebo_held_out=placebo_out,
+        across_conditions=across_conditions(base, best),
         remainder=remainder,
         noise_floor=floor,
         false_alarm_p=p,

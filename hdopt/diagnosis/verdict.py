@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -72,6 +73,7 @@ class Diagnosis:
     where: dict[str, object] | None = None
     located: tuple[Location, ...] = ()
     confounded: tuple[Confounding, ...] = ()
+    each_condition: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     evidence: Evidence | None = field(default=None, repr=False)
 
     def to_dict(self) -> dict[str, object]:
@@ -90,6 +92,10 @@ class Diagnosis:
             },
             "located": [location.to_dict() for location in self.located],
             "fit": self.fit,
+            "heldout_conditions": [
+                {"condition": name, "rms_base_arcmin": base, "rms_extended_arcmin": extended}
+                for name, (base, extended) in self.each_condition.items()
+            ],
             "below_detection": self.below_detection,
             "warnings": list(self.warnings),
         }
@@ -160,6 +166,7 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
         )
         if evidence.selection.base.problem.base is None:
             says = "Nothing shows above the noise."
+    across = evidence.across_conditions
     return Diagnosis(
         verdict=verdict,
         effects=tuple(effects),
@@ -171,6 +178,8 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
             "heldout_rms_extended_arcmin": evidence.extended_held_out.rms,
             "heldout_rms_generic_arcmin": evidence.generic_held_out.rms,
             "heldout_rms_placebo_arcmin": evidence.placebo_held_out.rms,
+            "heldout_conditions_rms_base_arcmin": across.base if across is not None else None,
+            "heldout_conditions_rms_extended_arcmin": across.extended if across is not None else None,
             "noise_floor_arcmin": evidence.noise_floor,
             "false_alarm_p": evidence.false_alarm_p,
         },
@@ -185,6 +194,7 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
         where=where,
         located=tuple(locate(FitProbe(evidence.selection.base), np.random.default_rng(0))),
         confounded=confounded,
+        each_condition=across.each if across is not None else {},
         evidence=evidence,
     )
 

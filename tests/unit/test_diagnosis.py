@@ -132,6 +132,9 @@ def test_nothing_hidden_is_adequate(study, drive):
     assert set(diagnosis.below_detection) <= set(EFFECTS)
     assert max(diagnosis.below_detection.values()) < 0.5
     assert diagnosis.fit["heldout_rms_base_arcmin"] == pytest.approx(NOISE, rel=0.1)
+    # One record at one speed has no condition to leave out.
+    assert diagnosis.fit["heldout_conditions_rms_base_arcmin"] is None
+    assert diagnosis.to_dict()["heldout_conditions"] == []
 
 
 HIDDEN = {
