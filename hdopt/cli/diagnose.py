@@ -17,6 +17,9 @@ from hdopt.cli.common import emit, json_option, seed_option
 @click.option(
     "--columns", metavar="CHANNEL=NAME:UNIT,...", help="Layout: input, output or error, time, torque, temperature."
 )
+@click.option(
+    "--nuisance", metavar="NAME,...", default="", help="Fit beside every model, and never name: drift, time-warp."
+)
 @click.option("--report", "report_file", metavar="FILE", type=click.Path(path_type=Path), help="Write an HTML report.")
 @click.option(
     "--write-study",
@@ -27,7 +30,7 @@ from hdopt.cli.common import emit, json_option, seed_option
 )
 @json_option
 @seed_option
-def command(recordings, drive, ratio, columns, report_file, study_file, json_file, seed) -> None:
+def command(recordings, drive, ratio, columns, nuisance, report_file, study_file, json_file, seed) -> None:
     """What physics recordings of one drive hold that the model leaves out.
 
     REC are .csv, .parquet or .mat files of one drive, fitted jointly. Exit status 0 whenever a verdict was reached.
@@ -37,7 +40,8 @@ def command(recordings, drive, ratio, columns, report_file, study_file, json_fil
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     from hdopt.diagnosis import diagnose
 
-    diagnosis = diagnose(recordings, drive_of(drive, ratio), ratio, columns, seed)
+    asked = tuple(name.strip() for name in nuisance.split(",") if name.strip())
+    diagnosis = diagnose(recordings, drive_of(drive, ratio), ratio, columns, seed, asked)
     if report_file is not None:
         from hdopt.files import write_text
         from hdopt.report.html import render
@@ -83,5 +87,7 @@ def _lines(diagnosis):
             f"  conditions left out: base {fit['heldout_conditions_rms_base_arcmin']:.4f}, extended "
             f"{fit['heldout_conditions_rms_extended_arcmin']:.4f} arcmin"
         )
+    for name, p in diagnosis.nuisances.items():
+        yield f"  nuisance {name} {p.value:.3g}  ({p.low:.3g} to {p.high:.3g}) {p.unit}"
     for warning in diagnosis.warnings:
         yield f"  note: {warning}"

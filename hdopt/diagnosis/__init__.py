@@ -20,11 +20,13 @@ def diagnose(
     ratio: float | None = None,
     columns: str | None = None,
     seed: int = 1,
+    nuisance: Sequence[str] = (),
 ) -> Diagnosis:
     """Say whether the model of `drive` explains the recordings, and if not, what physics was left out.
 
     `recordings`: files, or `hdopt.recording.Recording`s, of one drive, fitted jointly. `drive` None diagnoses a gear of
-    `ratio` without a harmonic-drive model. The same seed gives the same answer.
+    `ratio` without a harmonic-drive model. `nuisance` ("drift", "time-warp") is fitted beside every model and never
+    named: for recordings without a sensor at the input. The same seed gives the same answer.
     """
     from hdopt.diagnosis.pipeline import gather_evidence
     from hdopt.diagnosis.verdict import draw_verdict
@@ -47,5 +49,5 @@ def diagnose(
     read = [r if isinstance(r, Recording) else read_recording(r, ratio, columns) for r in recordings]
     if any(abs(r.ratio - ratio) > 1e-9 for r in read):
         raise HdoptError("the recordings were read with different ratios; all must be of one drive")
-    evidence = gather_evidence(read, None if drive is None else BaseModel.of(drive), seed)
+    evidence = gather_evidence(read, None if drive is None else BaseModel.of(drive), seed, nuisance)
     return draw_verdict(evidence, tuple(w for r in read for w in r.warnings))

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdopt.deviations import ERROR_NAMES, DriveErrors
-from hdopt.diagnosis.effect import Parameter, Term
+from hdopt.diagnosis.effect import Parameter, Term, sine_columns
 from hdopt.diagnosis.fit import PRIOR_MM, Fit, Problem, evaluate, refine
+from hdopt.diagnosis.samples import Samples
 from hdopt.diagnosis.waveform import PARAMETERS
 
 Array = NDArray[np.float64]
@@ -185,3 +186,26 @@ def open_combinations(covariance: Array, prior_scale: float) -> tuple[str, ...]:
             members = [i for i in members if abs(vector[i]) > 0.3 * abs(vector[members[0]])][:4]
             found.append(" with ".join(CARTESIAN_NAMES[i] for i in members))
     return tuple(found)
+
+
+def beat_warning(samples: Samples) -> str | None:
+    """What a record shorter than an output turn cannot carry: whole orders k and those of the flexspline, k (1 + 1/N).
+
+    Both together beat once an output turn. The standard error of either grows, against a whole output turn at the same
+    sampling, by the root of N/turns and of what order 2 keeps of its power once 2 (1 + 1/N) is taken out. None where
+    that is less than 3.
+    """
+    order, other = 2.0, 2.0 * (1 + 1 / samples.ratio)
+    beside = np.column_stack([sine_columns(samples.theta, [other]), np.ones(len(samples))])
+    own = sine_columns(samples.theta, [order])
+    left = own - beside @ np.linalg.lstsq(beside, own, rcond=None)[0]
+    kept = max(float(np.min(np.linalg.eigvalsh(left.T @ left))) / len(samples) / 0.5, 1e-12)
+    part = samples.span_turns / samples.ratio
+    growth = math.sqrt(1 / kept / min(part, 1.0))
+    if growth < 3:
+        return None
+    return (
+        f"{samples.span_turns:.2g} input turns are {part:.2g} of an output turn: orders k and k (1 + 1/N) are told "
+        f"apart {growth:.2g} times worse than by a whole one; what stands there may be the circular spline's or the "
+        "flexspline's"
+    )

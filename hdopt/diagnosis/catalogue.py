@@ -7,6 +7,9 @@ from hdopt.diagnosis.outside import OUTSIDE
 
 EXPLANATIONS = {**EFFECTS, **OUTSIDE}
 
+STRAIN_WAVE_ONLY = ("tooth_mesh", "bearing_pass", "local_tooth_defect")
+"""Effects at the orders of a strain wave gear's teeth and bearing: of another gear their numbers mean nothing."""
+
 
 def is_outside(name: str) -> bool:
     """Whether `name` is a description without physics."""

@@ -123,6 +123,12 @@ class Estimate:
         """Amplitude of a pair of sine and cosine coefficients."""
         return self.derived(lambda v: math.hypot(v[sin], v[cos]), unit)
 
+    def range_of(self, shapes: Array, unit: str) -> Parameter:
+        """Largest less smallest value of the curve `shapes` (n, p) @ values."""
+        curve = shapes @ self.values
+        high, low = shapes[np.argmax(curve)], shapes[np.argmin(curve)]
+        return self.derived(lambda v: float((high - low) @ v), unit)
+
     def phase_deg(self, sin: int, cos: int) -> Parameter:
         """Phase phi of a sin(x + phi) from its sine and cosine coefficients, deg, in (-180, 180]."""
         value = math.degrees(math.atan2(self.values[cos], self.values[sin]))

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from hdopt.diagnosis import noise as noise_model
 from hdopt.diagnosis.base import fit_base
-from hdopt.diagnosis.catalogue import EXPLANATIONS
+from hdopt.diagnosis.catalogue import EXPLANATIONS, STRAIN_WAVE_ONLY
 from hdopt.diagnosis.conditions import AcrossConditions, across_conditions
 from hdopt.diagnosis.effects import EFFECTS, HIGH_ORDER
 from hdopt.diagnosis.fit import Fit, Problem, evaluate, refine
 from hdopt.diagnosis.generic import generic_columns, strongest_orders, useful_columns
 from hdopt.diagnosis.heldout import HeldOut, family_wise_p, held_out, paired_t, turn_folds
 from hdopt.diagnosis.noise import Noise
+from hdopt.diagnosis.nuisance import Nuisances, nuisances_for, with_time_warp
 from hdopt.diagnosis.probe import FitProbe
 from hdopt.diagnosis.samples import Samples, gather, neighbours_for
 from hdopt.diagnosis.select import Selection, highest_order, price, search_terms, select
@@ -25,9 +26,6 @@ from hdopt.diagnosis.waveform import BaseModel
 from hdopt.recording import Recording
 
 Array = NDArray[np.float64]
-
-SHARED_ZERO_ARCMIN = 5.0
-"""Recordings whose mean errors lie closer than this were made without a new zero: their offsets are physics."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +47,7 @@ class Evidence:
     samples: Samples
     selection: Selection
     high: Selection | None
+    nuisances: Nuisances
     base_held_out: HeldOut
     extended_held_out: HeldOut
     generic_held_out: HeldOut
@@ -62,55 +61,62 @@ class Evidence:
     below_detection: dict[str, float]
 
 
-def offsets(samples: Samples) -> Array:
-    """Offset columns: one for all recordings, or one each where they were zeroed anew; each zero of an interrupted
-    count.
-    """
-    one = np.ones((len(samples), 1))
-    if samples.records == 1:
-        return one
-    means = np.array([samples.error[samples.record == r].mean() for r in range(samples.records)])
-    if np.ptp(means) < SHARED_ZERO_ARCMIN:
-        return one
-    return (samples.record[:, None] == np.arange(samples.records)).astype(float)
-
-
-def gather_evidence(recordings: Sequence[Recording], base: BaseModel | None, seed: int) -> Evidence:
-    """Run the whole diagnosis."""
+def gather_evidence(
+    recordings: Sequence[Recording], base: BaseModel | None, seed: int, nuisance: Sequence[str] = ()
+) -> Evidence:
+    """Run the whole diagnosis; `nuisance` names what is free beside the model (`hdopt.diagnosis.nuisance`)."""
     rng = np.random.default_rng(seed)
     # Offsets of thousands of arcmin are zeros of encoders; without them the numbers keep their digits.
     middle = float(np.median(recordings[0].error_arcmin))
     recordings = [replace(r, error_arcmin=r.error_arcmin - middle) for r in recordings]
     samples = gather(recordings, neighbours_for(recordings))
-    problem = Problem(samples, base, offsets(samples), Noise.white(samples, 1.0))
+    nuisances = nuisances_for(samples, base, nuisance)
+    ruled_out = (*nuisances.hidden, *(STRAIN_WAVE_ONLY if base is None else ()))
+    problem = Problem(samples, base, nuisances.columns(samples), Noise.white(samples, 1.0))
     scale = float(np.std(samples.error - _mean_by_offset(problem)))
     problem = replace(problem, noise=Noise.white(samples, max(0.3 * scale, 1e-9)), prior_scale=max(1.0, scale / 0.3))
     start = fit_base(problem, rng)
+    if "time-warp" in nuisance:
+        start, nuisances = fit_time_warp(start, nuisances)
+        problem = start.problem
     noise, inflation = measure_noise(start)
     base_fit = refine(fit_base(problem.with_noise(noise), rng, starts=4, near=start), iterations=6)
     clean = clean_base(problem.with_noise(noise), rng)
-    selection = select(base_fit, inflation, rng, clean=clean)
+    selection = select(base_fit, inflation, rng, skip=ruled_out, clean=clean)
     best = selection.best.fit
     # The noise again, now without what was found.
     noise_2, inflation_2 = measure_noise(best)
     if selection.best.fit.terms and not (0.7 < noise_2.sigma / noise.sigma < 1.4):
         problem_2 = problem.with_noise(noise_2)
         base_fit = refine(_rebase(base_fit, problem_2), iterations=8)
-        selection = select(base_fit, inflation_2, rng, clean=_rebase(clean, problem_2) if clean is not None else None)
+        clean_2 = _rebase(clean, problem_2) if clean is not None else None
+        selection = select(base_fit, inflation_2, rng, skip=ruled_out, clean=clean_2)
         noise, inflation = noise_2, inflation_2
-    high = high_order_selection(recordings, selection.best.fit, rng)
+    high = high_order_selection(recordings, selection.best.fit, nuisances, ruled_out, rng)
     if high is not None and high.best.fit.terms:
         cleaned = subtract(recordings, high.best.fit)
         samples = gather(cleaned, neighbours_for(cleaned))
-        problem = replace(problem, samples=samples, noise=noise)
+        problem = replace(problem, samples=samples, nuisance=nuisances.columns(samples), noise=noise)
         base_fit = refine(_rebase(base_fit, problem), iterations=8)
         noise, inflation = measure_noise(
             base_fit if not selection.best.fit.terms else _rebase(selection.best.fit, problem)
         )
         base_fit = refine(_rebase(base_fit, problem.with_noise(noise)), iterations=4)
         clean = _rebase(clean, problem.with_noise(noise)) if clean is not None else None
-        selection = select(base_fit, inflation, rng, clean=clean, skip=[t.effect for t in high.best.fit.terms])
-    return assess(samples, selection, high, inflation, rng)
+        said = [*ruled_out, *(t.effect for t in high.best.fit.terms)]
+        selection = select(base_fit, inflation, rng, skip=said, clean=clean)
+    return assess(samples, selection, high, nuisances, inflation, rng)
+
+
+def fit_time_warp(start: Fit, nuisances: Nuisances, rounds: int = 3) -> tuple[Fit, Nuisances]:
+    """The base fitted with a time warp beside it, linearised anew where each fit stands."""
+    fit = start
+    for _ in range(rounds):
+        nuisances = with_time_warp(nuisances, fit)
+        problem = replace(start.problem, nuisance=nuisances.columns(start.problem.samples))
+        free = np.r_[fit.offsets, np.zeros(problem.nuisance.shape[1] - len(fit.offsets))]
+        fit = refine(evaluate(problem, fit.errors, free, (), ()), iterations=20)
+    return fit, nuisances
 
 
 def _mean_by_offset(problem: Problem) -> Array:
@@ -166,14 +172,20 @@ def measure_noise(fit: Fit) -> tuple[Noise, float]:
     return noise, float(np.clip(inflation, 1.0, 10.0))
 
 
-def high_order_selection(recordings: Sequence[Recording], low: Fit, rng: np.random.Generator) -> Selection | None:
+def high_order_selection(
+    recordings: Sequence[Recording],
+    low: Fit,
+    nuisances: Nuisances,
+    ruled_out: Sequence[str],
+    rng: np.random.Generator,
+) -> Selection | None:
     """Effects of orders above what the averaged rows hold, looked for on the rows as recorded."""
     averaged = low.problem.samples
     if averaged.locked or averaged.averaged <= 1.15:
         return None
     raw = gather(recordings)
     lowest = highest_order(averaged)
-    problem = Problem(raw, low.problem.base, _offsets_like(low, raw), Noise.white(raw, 1.0), low.problem.prior_scale)
+    problem = Problem(raw, low.problem.base, nuisances.columns(raw), Noise.white(raw, 1.0), low.problem.prior_scale)
     base_value = (
         low.problem.base.evaluate(raw.theta, low.errors)[0] if low.problem.base is not None else np.zeros(len(raw))
     )
@@ -192,7 +204,7 @@ def high_order_selection(recordings: Sequence[Recording], low: Fit, rng: np.rand
         clean = bare.residual - columns @ np.linalg.lstsq(columns, bare.residual, rcond=None)[0]
         noise = noise_model.estimate(raw, clean)
     bare = evaluate(problem.with_noise(noise), np.zeros(0), bare.offsets, (), ())
-    low_effects = ["_sine_in_time", "_jump", "_changing_order", "_even_in_torque", "_even_in_speed"]
+    low_effects = [*ruled_out, "_sine_in_time", "_jump", "_changing_order", "_even_in_torque", "_even_in_speed"]
     low_effects += [e for e in EFFECTS if e not in HIGH_ORDER]
     return select(bare, 1.0, rng, skip=low_effects, rounds=2, order_range=ripple_orders(averaged, raw))
 
@@ -200,12 +212,6 @@ def high_order_selection(recordings: Sequence[Recording], low: Fit, rng: np.rand
 def ripple_orders(averaged: Samples, raw: Samples) -> tuple[float, float]:
     """Orders that the rows as recorded hold and their averages do not."""
     return highest_order(averaged), 0.49 * raw.rows_per_turn
-
-
-def _offsets_like(fit: Fit, samples: Samples) -> Array:
-    if fit.problem.nuisance.shape[1] == 1:
-        return np.ones((len(samples), 1))
-    return (samples.record[:, None] == np.arange(samples.records)).astype(float)
 
 
 def subtract(recordings: Sequence[Recording], fit: Fit) -> list[Recording]:
@@ -235,7 +241,9 @@ def look_at_remainder(fit: Fit, folds: NDArray[np.int64], inflation: float) -> R
     return Remainder(generic, t, 0.0, gains, orders, columns)
 
 
-def assess(samples: Samples, selection: Selection, high: Selection | None, inflation: float, rng) -> Evidence:
+def assess(
+    samples: Samples, selection: Selection, high: Selection | None, nuisances: Nuisances, inflation: float, rng
+) -> Evidence:
     base, best = selection.base, selection.best.fit
     folds = turn_folds(base, rng)
     base_out = held_out(base, None, folds)
@@ -249,7 +257,8 @@ def assess(samples: Samples, selection: Selection, high: Selection | None, infla
     found = {t.effect for t in best.terms}
     # Placebo: the best single other effect of the catalogue, freed as much as the winner.
     probe = FitProbe(base)
-    pool = search_terms(probe)
+    strange = STRAIN_WAVE_ONLY if base.problem.base is None else ()
+    pool = search_terms(probe, skip=(*nuisances.hidden, *strange))
     others = [t for t in pool if t.effect not in found and t.effect in EFFECTS]
     placebo = max(others, key=probe.gain, default=None)
     placebo_out = base_out
@@ -271,6 +280,8 @@ def assess(samples: Samples, selection: Selection, high: Selection | None, infla
             )
         )
     }
+    lacking |= {name: "a harmonic drive (--drive)" for name in strange}
+    lacking |= {name: "a fit without a free drift (--nuisance)" for name in nuisances.hidden}
     if high is not None and "tooth_mesh" in lacking:
         lacking.pop("tooth_mesh")
     own = best.residual
@@ -280,6 +291,7 @@ def assess(samples: Samples, selection: Selection, high: Selection | None, infla
         samples=samples,
         selection=selection,
         high=high,
+        nuisances=nuisances,
         base_held_out=base_out,
         extended_held_out=best_out,
         generic_held_out=generic_out,

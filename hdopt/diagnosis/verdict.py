@@ -9,13 +9,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from hdopt.diagnosis.base import BaseEstimate, base_estimate
+from hdopt.diagnosis.base import BaseEstimate, base_estimate, beat_warning
 from hdopt.diagnosis.catalogue import is_outside
 from hdopt.diagnosis.confounding import CONFOUNDED, Confounding, confounded_with
 from hdopt.diagnosis.effect import Parameter, Term
 from hdopt.diagnosis.effects import EFFECTS, HIGH_ORDER
 from hdopt.diagnosis.fit import Fit
 from hdopt.diagnosis.locate import Location, locate
+from hdopt.diagnosis.nuisance import estimated, notes
 from hdopt.diagnosis.pipeline import Evidence, ripple_orders
 from hdopt.diagnosis.probe import FitProbe
 from hdopt.diagnosis.select import Candidate
@@ -33,6 +34,8 @@ REMAINDER_FLOOR = 0.04
 """Structure below this share of the noise power is left alone: no bench is free of it."""
 TIE = 5.0
 """Log evidence within which two explanations cannot be told apart."""
+FEWEST_BLOCKS = 6
+"""Turns (or parts of turns between reversals) below which nothing is claimed."""
 SMALLEST_SHARE = 0.02
 """An effect that takes less than this share of the held-out error's power is not worth a name."""
 
@@ -74,6 +77,7 @@ class Diagnosis:
     located: tuple[Location, ...] = ()
     confounded: tuple[Confounding, ...] = ()
     each_condition: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    nuisances: dict[str, Parameter] = field(default_factory=dict)
     evidence: Evidence | None = field(default=None, repr=False)
 
     def to_dict(self) -> dict[str, object]:
@@ -89,6 +93,7 @@ class Diagnosis:
                 "parameters": {name: p.to_dict() for name, p in self.base.parameters.items()},
                 "rms_arcmin": self.base.rms_arcmin,
                 "not_separable": list(self.base.open_combinations),
+                "nuisances": {name: p.to_dict() for name, p in self.nuisances.items()},
             },
             "located": [location.to_dict() for location in self.located],
             "fit": self.fit,
@@ -108,13 +113,14 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
     """The verdict on the evidence."""
     best = evidence.selection.best
     high = evidence.high.best if evidence.high is not None and evidence.high.best.fit.terms else None
-    if high is not None and not _stands_out(high, evidence):
+    few = too_few_turns(evidence)
+    if high is not None and (few or not _stands_out(high, evidence)):
         high = None
-    named = bool(best.fit.terms) and evidence.false_alarm_p <= SIGNIFICANCE and _worth_naming(evidence)
+    named = not few and bool(best.fit.terms) and evidence.false_alarm_p <= SIGNIFICANCE and _worth_naming(evidence)
     outside = (named and outside_share(best) > REMAINDER_SHARE) or (
         high is not None and outside_share(high) > REMAINDER_SHARE
     )
-    unexplained = outside or clearly_unexplained(evidence)
+    unexplained = outside or (not few and clearly_unexplained(evidence))
     effects: list[Found] = []
     if outside:
         high = None
@@ -167,12 +173,14 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
         if evidence.selection.base.problem.base is None:
             says = "Nothing shows above the noise."
     across = evidence.across_conditions
+    model = best.fit if named else evidence.selection.base
     return Diagnosis(
         verdict=verdict,
         effects=tuple(effects),
         ambiguous_with=ambiguous,
         separating_test=separating,
-        base=base_estimate(best.fit if named else evidence.selection.base),
+        base=base_estimate(model),
+        nuisances=estimated(model, evidence.nuisances),
         fit={
             "heldout_rms_base_arcmin": evidence.base_held_out.rms,
             "heldout_rms_extended_arcmin": evidence.extended_held_out.rms,
@@ -189,6 +197,8 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
             if not is_outside(name) and name not in {found.id for found in effects}
         },
         warnings=warnings
+        + tuple(notes(model, evidence.nuisances))
+        + beat_notes(evidence)
         + tuple(f"{name} cannot be seen here: it needs {need}" for name, need in evidence.lacking.items()),
         says=says,
         where=where,
@@ -236,13 +246,28 @@ def clearly_unexplained(evidence: Evidence) -> bool:
     return evidence.remainder.t > REMAINDER_T and left > REMAINDER_SHARE * explainable and left > floor
 
 
+def beat_notes(evidence: Evidence) -> tuple[str, ...]:
+    """What the record's length leaves open between circular spline and flexspline, of a harmonic drive."""
+    samples = evidence.samples
+    if samples.locked or evidence.selection.base.problem.base is None:
+        return ()
+    warning = beat_warning(samples)
+    return () if warning is None else (warning,)
+
+
+def too_few_turns(evidence: Evidence) -> bool:
+    """Whether turns can hardly be held out: then neither a name nor something unknown is claimed."""
+    samples = evidence.samples
+    return not samples.locked and samples.blocks < FEWEST_BLOCKS
+
+
 def too_little(evidence: Evidence) -> bool:
     """Too short for whole turns to be held out, or noise above the base's own size in every average."""
     samples = evidence.samples
     if samples.locked:
         return False
     base_power = float(np.std(evidence.selection.base.base_value))
-    if samples.blocks < 6 or samples.span_turns < 2:
+    if too_few_turns(evidence) or samples.span_turns < 2:
         return True
     limits = list(evidence.below_detection.values())
     return bool(limits) and base_power > 0 and float(np.median(limits)) > base_power

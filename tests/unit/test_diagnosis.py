@@ -17,7 +17,8 @@ from hdopt.diagnosis.base import base_estimate, fit_base, to_cartesian, to_drive
 from hdopt.diagnosis.effects import EFFECTS
 from hdopt.diagnosis.fit import Problem, refine
 from hdopt.diagnosis.noise import Noise, estimate
-from hdopt.diagnosis.pipeline import gather, offsets
+from hdopt.diagnosis.nuisance import nuisances_for
+from hdopt.diagnosis.pipeline import gather
 from hdopt.diagnosis.waveform import BaseModel
 from hdopt.errors import HdoptError
 from hdopt.kinematics.waveform import kinematic_error_arcmin
@@ -97,7 +98,8 @@ def test_jacobian_is_the_slope(drive):
 def test_base_recovers_the_waveform_and_what_is_identifiable(drive, study, seed):
     """To the noise: the fit of 12 numbers to 8000 samples leaves no more than the noise and a few parts of it."""
     samples = gather(bench(study, turns=80, seed=seed, rate=60))
-    problem = Problem(samples, BaseModel.of(drive), offsets(samples), Noise.white(samples, NOISE))
+    base = BaseModel.of(drive)
+    problem = Problem(samples, base, nuisances_for(samples, base).columns(samples), Noise.white(samples, NOISE))
     fit = refine(fit_base(problem, np.random.default_rng(seed)))
     assert np.std(fit.residual) < 1.02 * NOISE
     found = base_estimate(fit)

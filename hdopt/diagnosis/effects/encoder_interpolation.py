@@ -27,6 +27,8 @@ class EncoderInterpolation:
     def lacks(self, samples):
         if samples.rows_per_turn < 3 * LOWEST_ORDER:
             return f"more than {3 * LOWEST_ORDER:.0f} samples an input turn"
+        if samples.span_turns < 2:
+            return f"at least 2 input turns to count lines (there are {samples.span_turns:.1f})"
         return None
 
     def search(self, probe):

@@ -1,0 +1,233 @@
+"""What is fitted beside the model without being its physics: zeros, a drift, a time warp, and less than one turn.
+
+Every recording has a zero of its own that means nothing. A recording without a sensor at the input may have more: an
+error that drifts with the bench (a telescope mount whose polar axis is off), and an input angle computed from a clock
+that nobody recorded, so that the true angle is theta + w(t) with a small smooth warp w. To first order
+
+    error(t) = KE(theta) + KE'(theta) w(t) + drift(t),
+
+with w and drift polynomials of time (Legendre), free for each recording. KE' is the slope of the fitted base. A gear
+without a model has none: where a warp is asked for, its KE is a free sum of whole orders, which then get no name. All
+are free columns in every fit: base, candidates, placebo and generic basis alike, so that nothing they can explain is
+ever named. Without a drive's model, a recording of less than one turn holds errors that only depend on the angle
+(eccentricities, a ratio that is slightly off) and that it cannot tell from one another: they are one curve of the
+angle, free too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.diagnosis.effect import Estimate, Parameter, sine_columns
+from hdopt.diagnosis.fit import Fit
+from hdopt.diagnosis.samples import Samples
+from hdopt.diagnosis.waveform import BaseModel
+from hdopt.errors import HdoptError, unknown_name
+
+Array = NDArray[np.float64]
+
+NUISANCES = ("drift", "time-warp")
+"""What `--nuisance` may ask for."""
+
+SHARED_ZERO_ARCMIN = 5.0
+"""Recordings whose mean errors lie closer than this were made without a new zero: their offsets are physics."""
+DRIFT_DEGREE = 2
+WARP_DEGREE = 3
+"""A constant warp is a zero of the input angle and is left to the base; from degree 4 on it could bend single turns."""
+ROWS_A_KNOT, FEWEST_KNOTS, MOST_KNOTS = 100, 5, 60
+"""Knots of the free curve of the angle: ripple as of a motor's pole pairs belongs to it as much as a slope."""
+WHOLE_ORDERS = 6
+"""Orders of the free KE of a gear without a model."""
+LARGEST_WARP_DEG = 15.0
+"""Beyond this the first order in the warp is off by a sixth at order 4: told as a warning."""
+
+
+@dataclass(frozen=True)
+class Nuisances:
+    """Which columns are always free: one zero or one for each recording, `drift`, a curve of the `angle`, whole
+    `orders`, and a warp where the `slope` of the error by the input angle (arcmin/rad, a function of rad) is known.
+    """
+
+    separate_zeros: bool
+    drift: bool = False
+    angle: bool = False
+    orders: tuple[int, ...] = ()
+    slope: Callable[[Array], Array] | None = None
+
+    @property
+    def hidden(self) -> tuple[str, ...]:
+        """Effects that are no candidates beside these nuisances."""
+        return ("thermal_drift",) if self.drift else ()
+
+    def blocks(self, samples: Samples) -> dict[str, Array]:
+        """Columns (n, q) in arcmin by kind: zero, drift, angle, orders, time-warp."""
+        n = len(samples)
+        own = samples.record[:, None] == np.arange(samples.records)
+        blocks = {"zero": own.astype(float) if self.separate_zeros else np.ones((n, 1))}
+        if self.drift:
+            blocks["drift"] = _for_each(own, legendre(moment(samples), DRIFT_DEGREE))
+        if self.angle:
+            blocks["angle"] = hats(_to_unit(samples.theta))
+        if self.orders:
+            blocks["orders"] = sine_columns(samples.theta, self.orders)
+        if self.slope is not None:
+            blocks["time-warp"] = self.slope(samples.theta)[:, None] * warp_shapes(samples)
+        return blocks
+
+    def columns(self, samples: Samples) -> Array:
+        """All columns, (n, q), arcmin per coefficient; those of the time warp, last, arcmin per rad of input."""
+        return np.column_stack(list(self.blocks(samples).values()))
+
+
+def nuisances_for(samples: Samples, base: BaseModel | None, asked: Sequence[str] = ()) -> Nuisances:
+    """The nuisances of these recordings: zeros, a drift where asked, and the angle where less than a turn has no model.
+
+    Raises `HdoptError` for one that does not exist, or a time warp of an input that stands still.
+    """
+    for name in asked:
+        if name not in NUISANCES:
+            raise HdoptError(unknown_name("nuisance in --nuisance", name, NUISANCES))
+    if "time-warp" in asked and samples.locked:
+        raise HdoptError("--nuisance time-warp bends the input angle, but the input stands still; leave it out")
+    free = base is None and "time-warp" in asked
+    highest = min(WHOLE_ORDERS, int(0.4 * samples.rows_per_turn)) if free else 0
+    means = np.array([samples.error[samples.record == r].mean() for r in range(samples.records)])
+    return Nuisances(
+        separate_zeros=bool(np.ptp(means) >= SHARED_ZERO_ARCMIN),
+        drift="drift" in asked,
+        angle=base is None and not samples.locked and samples.span_turns < 1,
+        orders=tuple(k for k in range(1, highest + 1) if k * samples.span_turns >= 1),
+    )
+
+
+def with_time_warp(nuisances: Nuisances, fit: Fit) -> Nuisances:
+    """The same nuisances with a time warp, linearised where `fit` stands."""
+    return replace(nuisances, slope=base_slope(fit) if fit.problem.base is not None else order_slope(fit, nuisances))
+
+
+def base_slope(fit: Fit) -> Callable[[Array], Array]:
+    """dKE/dtheta of the fitted base, arcmin/rad, by central differences."""
+    base, errors, step = fit.problem.base, fit.errors, 1e-3
+
+    def slope(theta: Array) -> Array:
+        return (base.evaluate(theta + step, errors)[0] - base.evaluate(theta - step, errors)[0]) / (2 * step)
+
+    return slope
+
+
+def order_slope(fit: Fit, nuisances: Nuisances) -> Callable[[Array], Array]:
+    """Slope of the free whole orders by the input angle, arcmin/rad."""
+    pairs = coefficients(fit, nuisances)["orders"].reshape(-1, 2)
+
+    def slope(theta: Array) -> Array:
+        total = np.zeros(len(theta))
+        for k, (s, c) in zip(nuisances.orders, pairs, strict=True):
+            total += k * (s * np.cos(k * theta) - c * np.sin(k * theta))
+        return total
+
+    return slope
+
+
+def places(fit: Fit, nuisances: Nuisances) -> dict[str, slice]:
+    """Where each kind's coefficients stand among the fit's free ones."""
+    found, start = {}, 0
+    for kind, columns in nuisances.blocks(fit.problem.samples).items():
+        found[kind] = slice(start, start + columns.shape[1])
+        start += columns.shape[1]
+    return found
+
+
+def coefficients(fit: Fit, nuisances: Nuisances) -> dict[str, Array]:
+    """The fitted coefficients of each kind."""
+    return {kind: fit.offsets[place] for kind, place in places(fit, nuisances).items()}
+
+
+def moment(samples: Samples) -> Array:
+    """-1 at the start of each recording, 1 at its end: by time, or by row where no clock was recorded."""
+    clock = samples.time if samples.time is not None else np.arange(len(samples), dtype=float)
+    result = np.empty(len(samples))
+    for record in range(samples.records):
+        rows = samples.record == record
+        result[rows] = _to_unit(clock[rows])
+    return result
+
+
+def warp_shapes(samples: Samples) -> Array:
+    """Shapes of the warp w(t), (n, WARP_DEGREE for each recording)."""
+    own = samples.record[:, None] == np.arange(samples.records)
+    return _for_each(own, legendre(moment(samples), WARP_DEGREE))
+
+
+def legendre(x: Array, degree: int) -> Array:
+    """Legendre polynomials 1 to `degree` of `x` in -1..1, (n, degree)."""
+    return np.polynomial.legendre.legvander(x, degree)[:, 1:]
+
+
+def hats(x: Array) -> Array:
+    """Any piecewise linear curve of `x` in -1..1 but for a zero: tent functions on even knots, (n, knots - 1)."""
+    knots = int(np.clip(len(x) / ROWS_A_KNOT, FEWEST_KNOTS, MOST_KNOTS))
+    place = (x + 1) / 2 * (knots - 1)
+    return np.clip(1 - np.abs(place[:, None] - np.arange(1, knots)), 0, None)
+
+
+def estimated(fit: Fit, nuisances: Nuisances) -> dict[str, Parameter]:
+    """How large the nuisances came out, with 95 % intervals: drift (arcmin) and warp (deg of input) from smallest to
+    largest, whole orders by amplitude (arcmin).
+    """
+    samples = fit.problem.samples
+    covariance = fit.covariance()
+    found = {}
+    for kind, place in places(fit, nuisances).items():
+        inside = slice(fit.problem.base_width + place.start, fit.problem.base_width + place.stop)
+        estimate = Estimate(fit.offsets[place], covariance[inside, inside])
+        if kind == "drift":
+            found["drift_arcmin"] = estimate.range_of(nuisances.blocks(samples)[kind], "arcmin")
+        elif kind == "time-warp":
+            found["time_warp_deg"] = estimate.range_of(np.degrees(warp_shapes(samples)), "deg")
+        elif kind == "orders":
+            for i, order in enumerate(nuisances.orders):
+                found[f"order_{order}_arcmin"] = estimate.amplitude(2 * i, 2 * i + 1)
+    return found
+
+
+def notes(fit: Fit, nuisances: Nuisances) -> list[str]:
+    """What the nuisances keep from being named, in words."""
+    said = []
+    if nuisances.angle:
+        said.append(
+            f"the recording covers {fit.problem.samples.span_turns:.2g} input turns and the gear has no model: what "
+            "depends on the angle alone (eccentricities, a ratio slightly off) is a free curve and gets no name"
+        )
+    if nuisances.drift:
+        said.append("a slow drift was fitted as a nuisance: thermal drift gets no name")
+    if nuisances.orders:
+        said.append(
+            "the gear has no model to bend: whole orders were fitted freely and get no name; the record's length tells "
+            f"orders apart that differ by about {1 / fit.problem.samples.span_turns:.2g}"
+        )
+    if nuisances.slope is not None:
+        warp = estimated(fit, nuisances)["time_warp_deg"].value
+        said.append(
+            f"a time warp of {warp:.2g} deg of input, end to end, was fitted as a nuisance; its steady part "
+            "stretches every order alike, as k (1 + 1/N) would"
+        )
+        if warp > LARGEST_WARP_DEG:
+            said.append(
+                f"the time warp is above {LARGEST_WARP_DEG:g} deg, more than its linear model carries: check the input "
+                "angle's rate"
+            )
+    return said
+
+
+def _for_each(own: NDArray[np.bool_], columns: Array) -> Array:
+    """Columns repeated for each recording, zero on the rows of the others."""
+    return np.column_stack([columns * own[:, [r]] for r in range(own.shape[1])])
+
+
+def _to_unit(values: Array) -> Array:
+    low, high = float(np.min(values)), float(np.max(values))
+    return 2 * (values - low) / (high - low) - 1 if high > low else np.zeros(len(values))
