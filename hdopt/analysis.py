@@ -9,6 +9,8 @@ from typing import Any
 from hdopt.bending import max_bending_stress, max_curvature_change
 from hdopt.contact import contact_angle, homogenization_coefficient, mean_flank_pressure, meshing_teeth
 from hdopt.errors import HdoptError, MissingValue
+from hdopt.extended_look import Look, extended_look, walked_extended_arcmin
+from hdopt.included import extended_model
 from hdopt.kinematics.extremes import extremes_arcmin, walked_peak_to_peak_arcmin
 from hdopt.kinematics.lag import lag
 from hdopt.kinematics.waveform import relative_turn
@@ -24,7 +26,9 @@ class KinematicErrorResult:
     """Kinematic error of one drive. A value that needs a number nobody gave is None, and `notes` says which number.
 
     `peak_to_peak_arcmin` is converged, of a single tooth pair (k_e = 1); `nonuniform_arcmin` is it times k_e;
-    `sampled_peak_to_peak_arcmin` is taken only on the grid asked for.
+    `sampled_peak_to_peak_arcmin` is taken only on the grid asked for. Where the study has effects, all of these are of
+    the extended model; `base_peak_to_peak_arcmin` is without effects. `effects` says of each whether it counts, where
+    it comes from ('drive' or 'bench') and what it adds to the peak-to-peak of the others.
     """
 
     study: str
@@ -41,6 +45,8 @@ class KinematicErrorResult:
     orders: tuple[dict[str, Any], ...]
     lag_arcmin: dict[str, Any] | None
     notes: tuple[str, ...]
+    base_peak_to_peak_arcmin: float
+    effects: tuple[dict[str, Any], ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         return asdict(self)
@@ -93,31 +99,37 @@ class _Notes:
 def kinematic_error(
     study: Study, sampling_deg: float | None = None, turns: float | None = None
 ) -> KinematicErrorResult:
-    """Kinematic error of the study's one drive ([errors]): converged peak-to-peak, orders, contact, lag.
+    """Kinematic error of the study's one drive ([errors], and [effects] where it has some): converged peak-to-peak,
+    orders, contact, lag.
 
     The exact geometry is used throughout (Jia 2021, Eqs. (16)-(32)). `sampling_deg` asks for the peak-to-peak on a grid
     from 0 over `turns` input turns, end included; `turns` defaults to one full relative turn.
     """
     drive, errors = study.drive, study.errors
     gear = drive.geometry
-    low, high = extremes_arcmin(drive, errors, "exact")
-    theta, waveform = relative_turn(drive, errors, SAMPLES_PER_TURN, "exact")
-    named = model_orders(gear.ratio)
-    spectrum = order_spectrum(theta, waveform, [order.order for order in named])
     notes = _Notes()
     angle = notes.value(contact_angle, gear, drive.wave_generator.profile)
     teeth = None if angle is None else meshing_teeth(gear, angle)
     k_e = None if teeth is None else homogenization_coefficient(teeth)
-    lost = notes.value(lag, drive, errors, theta, waveform)
+    model = extended_model(study)
+    base_low, base_high = extremes_arcmin(drive, errors, "exact")
+    if study.effects:
+        look = extended_look(study, model, base_high - base_low, k_e)
+    else:
+        theta, waveform = relative_turn(drive, errors, SAMPLES_PER_TURN, "exact")
+        nonuniform = None if k_e is None else k_e * (base_high - base_low)
+        look = Look(base_low, base_high, nonuniform, theta, waveform, waveform, model_orders(gear.ratio))
+    spectrum = order_spectrum(look.theta, look.waveform, [order.order for order in look.orders])
+    lost = notes.value(lag, drive, errors, look.theta, look.driven)
     return KinematicErrorResult(
         study=study.name,
         profile=drive.wave_generator.profile.name,
         structure=drive.wave_generator.structure.value,
-        peak_to_peak_arcmin=high - low,
-        minimum_arcmin=low,
-        maximum_arcmin=high,
+        peak_to_peak_arcmin=look.high - look.low,
+        minimum_arcmin=look.low,
+        maximum_arcmin=look.high,
         sampled_peak_to_peak_arcmin=_sampled(study, sampling_deg, turns),
-        nonuniform_arcmin=None if k_e is None else k_e * (high - low),
+        nonuniform_arcmin=look.nonuniform,
         contact_angle_deg=None if angle is None else math.degrees(angle),
         meshing_teeth=teeth,
         homogenization_coefficient=k_e,
@@ -129,10 +141,12 @@ def kinematic_error(
                 "phase_deg": math.degrees(phase),
                 "origin": named_order.origin,
             }
-            for named_order, size, phase in zip(named, spectrum.amplitudes, spectrum.phases, strict=True)
+            for named_order, size, phase in zip(look.orders, spectrum.amplitudes, spectrum.phases, strict=True)
         ),
         lag_arcmin=None if lost is None else lost.to_dict(),
-        notes=tuple(notes.notes),
+        notes=(*notes.notes, *look.notes),
+        base_peak_to_peak_arcmin=base_high - base_low,
+        effects=look.effects,
     )
 
 
@@ -150,6 +164,8 @@ def _sampled(study: Study, sampling_deg: float | None, turns: float | None) -> f
         raise HdoptError(
             f"{turns:g} turns every {sampling_deg:g} deg are more than 1e7 angles; take a coarser grid or fewer turns"
         )
+    if study.effects:
+        return walked_extended_arcmin(extended_model(study), math.radians(sampling_deg), turns)
     return walked_peak_to_peak_arcmin(study.drive, study.errors, math.radians(sampling_deg), turns)
 
 

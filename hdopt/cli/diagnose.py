@@ -26,7 +26,7 @@ from hdopt.cli.common import emit, json_option, seed_option
     "study_file",
     metavar="FILE",
     type=click.Path(path_type=Path),
-    help="Write a study with the drive's fitted errors.",
+    help="Write a study with the drive's fitted errors and the effects found.",
 )
 @json_option
 @seed_option

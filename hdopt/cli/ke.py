@@ -32,6 +32,11 @@ def command(study, drive, overrides, structure, sampling_deg, turns, json_file, 
 def _lines(result):
     yield f"{result.study}: {result.profile} wave generator, {result.structure}"
     yield f"  peak-to-peak, converged (k_e = 1)    {result.peak_to_peak_arcmin:9.4f} arcmin"
+    if result.effects:
+        yield f"    of the base model, without effects   {result.base_peak_to_peak_arcmin:9.4f} arcmin"
+    for effect in result.effects:
+        added = f"adds {effect['adds_arcmin']:9.4f} arcmin" if effect["counted"] else "not counted"
+        yield f"    {effect['id']:28s} ({effect['origin']})  {added}"
     if result.sampled_peak_to_peak_arcmin is not None:
         yield f"  peak-to-peak, on the grid asked for  {result.sampled_peak_to_peak_arcmin:9.4f} arcmin"
     if result.nonuniform_arcmin is not None:

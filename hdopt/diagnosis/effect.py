@@ -86,7 +86,11 @@ class Effect(Protocol):
         """The best terms for this residual, one for each variant worth considering."""
 
     def term(self, samples: Samples, shape: Mapping[str, float], base_value: Array | None = None) -> Term:
-        """The term at a given shape."""
+        """The term at a given shape, kept to what the recordings can show.
+
+        Where such limits exist, `unbounded(samples, shape, base_value)` is the same physics without them, and an effect
+        with a memory of speed has `steady_state` in its place: both serve `hdopt.extended`, which predicts.
+        """
 
     def parameters(self, term: Term, estimate: Estimate) -> dict[str, Parameter]:
         """The effect's parameters with units and intervals."""

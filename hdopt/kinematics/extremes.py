@@ -32,8 +32,8 @@ def extremes_arcmin(drive: Drive, errors: DriveErrors, geometry: str | None = No
     """
     theta = _scan(drive, errors, geometry)
     low, high = _over_phases(drive, errors, theta, geometry)
-    lowest = _zoom(lambda angles: _over_phases(drive, errors, angles, geometry)[0], theta, low)
-    highest = -_zoom(lambda angles: -_over_phases(drive, errors, angles, geometry)[1], theta, -high)
+    lowest = zoom_lowest(lambda angles: _over_phases(drive, errors, angles, geometry)[0], theta, low)
+    highest = -zoom_lowest(lambda angles: -_over_phases(drive, errors, angles, geometry)[1], theta, -high)
     scale = drive.geometry.arcmin_per_mm
     return lowest * scale, highest * scale
 
@@ -71,11 +71,11 @@ def _over_phases(drive: Drive, errors: DriveErrors, theta: Array, geometry: str 
     return driving.min(axis=0), driving.max(axis=0)
 
 
-def _zoom(function, theta: Array, values: Array) -> float:
-    """Least value of `function` near the lowest local minima of its `values` at the angles `theta` of one turn."""
+def zoom_lowest(function, theta: Array, values: Array, period: float = 2 * np.pi) -> float:
+    """Least value of `function` near the lowest local minima of its `values` at the angles `theta` of one period."""
     local = np.flatnonzero((values <= np.roll(values, 1)) & (values <= np.roll(values, -1)))
     local = local[np.argsort(values[local])[:CANDIDATES]]
-    gaps = np.diff(np.append(theta, theta[0] + 2 * np.pi))
+    gaps = np.diff(np.append(theta, theta[0] + period))
     half = np.maximum(gaps[local], gaps[local - 1])[:, None]
     centres, best = theta[local], float(values.min())
     for _ in range(ZOOMS):

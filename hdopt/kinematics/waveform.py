@@ -89,7 +89,15 @@ def full_turn(drive: Drive, samples_per_turn: int) -> Array:
 def relative_turn(
     drive: Drive, errors: DriveErrors, samples_per_turn: int, geometry: str | None = None
 ) -> tuple[Array, Array]:
-    """Input angles (rad) and kinematic error (arcmin, k_e = 1) of one drive over one full relative turn; shapes (n,).
+    """Input angles (rad) and kinematic error (arcmin, k_e = 1) over one full relative turn of a drive; shapes (n,)."""
+    theta, deviation = relative_turn_deviation(drive, errors, samples_per_turn, geometry)
+    return theta, drive.geometry.arcmin_per_mm * np.max(deviation, axis=0)
+
+
+def relative_turn_deviation(
+    drive: Drive, errors: DriveErrors, samples_per_turn: int, geometry: str | None = None
+) -> tuple[Array, Array]:
+    """Input angles (rad, shape (n,)) of one full relative turn, and tau_1 and tau_2 there, mm of arc, shape (2, n).
 
     The deepest points repeat every input turn and are found once; only the FS teeth met differ from turn to turn.
     """
@@ -99,4 +107,4 @@ def relative_turn(
     points = DeepestPoints(
         *(np.tile(values, turns) for values in (one_turn.depth, one_turn.offset_cs, one_turn.offset_fs, one_turn.rim))
     )
-    return theta, drive.geometry.arcmin_per_mm * np.max(deviation_at(drive, errors, theta, points), axis=0)
+    return theta, deviation_at(drive, errors, theta, points)

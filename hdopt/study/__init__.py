@@ -24,6 +24,7 @@ from hdopt.study.document import (
 
 if TYPE_CHECKING:
     from hdopt.deviations import DriveErrors
+    from hdopt.extended import AddedEffect, Operation
     from hdopt.study.base import Section
 
 DEFAULT_STUDY = "csf-25-80"
@@ -70,6 +71,28 @@ class Study:
     def errors(self) -> DriveErrors:
         """The errors of the one drive in [errors]."""
         return self._built("errors")
+
+    @cached_property
+    def effects(self) -> tuple[AddedEffect, ...]:
+        """The effects in [effects], which the base model leaves out; () where there are none."""
+        if "effects" not in self.sections:
+            return ()
+        from hdopt.study.effects import added_effects
+
+        built = []
+        for name, section in added_effects(self.sections["effects"]).items():
+            try:
+                built.append(section.build(self.drive.geometry))
+            except HdoptError as error:
+                raise HdoptError(f"{self.document.where(('effects', name))}: {error}") from error
+        return tuple(built)
+
+    @cached_property
+    def operation(self) -> Operation:
+        """The operating condition in [operation]; forward motion and nothing else where the study does not say."""
+        from hdopt.extended import Operation
+
+        return self._built("operation") if "operation" in self.sections else Operation()
 
     @property
     def title(self) -> str:

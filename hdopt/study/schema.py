@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -18,6 +18,8 @@ SECTIONS: dict[str, str] = {
     "drive": "hdopt.study.drive:DriveSection",
     "wave_generator": "hdopt.study.drive:WaveGeneratorSection",
     "errors": "hdopt.study.drive:ErrorsSection",
+    "effects": "hdopt.study.effects:EffectsSection",
+    "operation": "hdopt.study.effects:OperationSection",
     "clearances": "hdopt.study.drive:ClearancesSection",
     "material": "hdopt.study.drive:MaterialSection",
     "load": "hdopt.study.drive:LoadSection",
@@ -66,10 +68,15 @@ def _fault(fault: ErrorDetails, document: Document, section: str) -> str:
     path = (section, *(str(part) for part in _path_in_file(fault["loc"], document.data.get(section))))
     where = document.where(path)
     if fault["type"] == "extra_forbidden":
-        known = section_model(section).model_fields if len(path) == 2 else fault.get("ctx", {}).get("known", ())
+        known = _known_keys(section_model(section), path[1:-1])
+        with_unit = [key for key in known if key.startswith(f"{path[-1]}_")]
+        if len(with_unit) == 1:
+            return f"{where}: unknown key {path[-1]!r}; write {with_unit[0]!r}, with its unit"
         return f"{where}: {unknown_name('key', path[-1], known) if known else 'unknown key'}"
     if fault["type"] == "missing":
         return f"{where}: is missing; give it"
+    if fault["type"] == "model_type":
+        return f"{where}: is {fault['input']!r}; write it as a table, [{'.'.join(path)}]"
     message = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     value = fault["input"]
     if isinstance(value, Mapping):
@@ -77,6 +84,18 @@ def _fault(fault: ErrorDetails, document: Document, section: str) -> str:
     if message[0].isupper():
         return f"{where}: {message}"
     return f"{where}: is {value!r}; it must be {message}"
+
+
+def _known_keys(model: Any, path: Keys) -> tuple[str, ...]:
+    """The keys that the table at `path` of a section may have; () where that depends on what else it says."""
+    for part in path:
+        field = model.model_fields.get(part)
+        choices = () if field is None else (field.annotation, *get_args(field.annotation))
+        tables = [choice for choice in choices if isinstance(choice, type) and issubclass(choice, Section)]
+        if len(tables) != 1:
+            return ()
+        model = tables[0]
+    return tuple(model.model_fields)
 
 
 def _path_in_file(location: tuple[Any, ...], content: Any) -> Keys:

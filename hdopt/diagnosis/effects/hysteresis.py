@@ -54,6 +54,11 @@ class Hysteresis:
             trials=10.0,
         )
 
+    def unbounded(self, samples, shape, base_value=None):
+        """The term of a drive that has run in: no limits by a record, no unknown start."""
+        state = friction_state(samples, shape["transition_deg"], bool(shape["maxwell"]))
+        return Term(self.id, dict(shape), columns=state[:, None])
+
     def parameters(self, term, estimate):
         return {
             "half_loop_arcmin": estimate.derived(lambda v: abs(v[0]), "arcmin"),

@@ -62,6 +62,11 @@ class Resonance:
             trials=40.0,
         )
 
+    def steady_state(self, samples, shape, base_value):
+        """The term at constant speed once the start has died away; the rows are one whole period, even in time."""
+        column = settled_response(samples.time, base_value, shape["frequency_hz"], shape["damping_ratio"])
+        return Term(self.id, dict(shape), columns=column[:, None])
+
     def parameters(self, term, estimate):
         return {
             "gain": estimate.parameter(0, "1"),
@@ -106,3 +111,13 @@ def relative_response(samples, excitation, frequency, damping):
         e = lfilter(numerator / denominator[0], denominator / denominator[0], y - y[0])
         result[start:end] = np.interp(time, even, e)
     return result
+
+
+def settled_response(time, excitation, frequency, damping):
+    """x - y as in `relative_response`, for an excitation (arcmin, n) that repeats after these n even times, s.
+
+    The same equation for a sine of the circular frequency s: E = s^2/(w^2 - s^2 + 2 i zeta w s) Y.
+    """
+    n, w = len(time), TURN * frequency
+    s = TURN * np.fft.rfftfreq(n, time[1] - time[0])
+    return np.fft.irfft(s**2 / (w**2 - s**2 + 2j * damping * w * s) * np.fft.rfft(excitation), n)

@@ -42,10 +42,16 @@ class ThermalDrift:
         return Term(
             self.id,
             {"time_constant_s": tau},
-            columns=(1 - np.exp(-elapsed(samples) / tau))[:, None],
+            columns=warming(elapsed(samples), tau),
             steps={"time_constant_s": 0.02 * tau},
             trials=8.0,
         )
+
+    def unbounded(self, samples, shape, base_value=None):
+        """The term where `temperature` is the difference from the reference, and `time` counts from cold."""
+        tau = shape.get("time_constant_s")
+        columns = samples.temperature[:, None] if tau is None else warming(samples.time, tau)
+        return Term(self.id, dict(shape), columns=columns)
 
     def parameters(self, term, estimate):
         if "time_constant_s" not in term.shape:
@@ -59,6 +65,11 @@ class ThermalDrift:
             f"The error drifts by {parameters['amplitude_arcmin'].value:.2g} arcmin with a time constant of "
             f"{parameters['time_constant_s'].value:.3g} s, as of something warming up."
         )
+
+
+def warming(time, time_constant):
+    """1 - exp(-t/tau), shape (n, 1): one thermal mass that warms up."""
+    return (1 - np.exp(-time / time_constant))[:, None]
 
 
 def elapsed(samples):

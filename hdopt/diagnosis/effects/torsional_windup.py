@@ -10,11 +10,15 @@ at the output. Prior: K 1e2 to 1e6 Nm/rad, knees inside the torque that was reac
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 
 from hdopt.diagnosis.effect import Term, best_terms
 from hdopt.drive import ARCMIN
+
+COMPLIANCE = 1e-5
+"""rad/Nm that a coefficient of one stands for."""
 
 
 class TorsionalWindup:
@@ -45,11 +49,16 @@ class TorsionalWindup:
         return [*best_terms(probe, terms), best_one, *best_terms(probe, two)]
 
     def term(self, samples, shape, base_value=None):
-        torque = samples.torque
-        reached = float(np.max(np.abs(torque)))
+        reached = float(np.max(np.abs(samples.torque)))
         shape = {
             k: min(max(v, 0.02 * reached), 0.98 * reached) if k.startswith("knee") else v for k, v in shape.items()
         }
+        steps = {name: 0.01 * reached for name in ("knee_1", "knee_2") if name in shape}
+        return replace(self.unbounded(samples, shape), steps=steps, trials=10.0 ** len(steps))
+
+    def unbounded(self, samples, shape, base_value=None):
+        """The term where a knee may lie beyond the torque that is reached."""
+        torque = samples.torque
         knees = sorted(shape[k] for k in ("knee_1", "knee_2") if k in shape)
         edges = [0.0, *knees, np.inf]
         size, sign = np.abs(torque), np.sign(torque)
@@ -57,15 +66,14 @@ class TorsionalWindup:
         if "angle" in shape:
             parts += [torque * np.cos(2 * samples.theta), torque * np.sin(2 * samples.theta)]
         # In arcmin for a compliance in rad/Nm scaled by 1e-5: coefficients of order one for size-25 drives.
-        columns = np.column_stack(parts) * (1e-5 / ARCMIN)
-        steps = {name: 0.01 * reached for name in ("knee_1", "knee_2") if name in shape}
-        return Term(self.id, dict(shape), columns=columns, steps=steps, trials=10.0 ** len(knees))
+        columns = np.column_stack(parts) * (COMPLIANCE / ARCMIN)
+        return Term(self.id, dict(shape), columns=columns)
 
     def parameters(self, term, estimate):
         segments = 1 + ("knee_1" in term.shape) + ("knee_2" in term.shape)
         found = {}
         for i in range(segments):
-            stiffness = estimate.derived(lambda v, i=i: 1e5 / max(abs(v[i]), 1e-9), "Nm/rad")
+            stiffness = estimate.derived(lambda v, i=i: 1 / (COMPLIANCE * max(abs(v[i]), 1e-9)), "Nm/rad")
             found[f"stiffness_{i + 1}"] = stiffness
         free = list(term.steps)
         for name in free:

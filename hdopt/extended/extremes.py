@@ -1,0 +1,56 @@
+"""Extremes of the extended model over a full relative turn: a grid, then a zoom into its best local extremes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.extended.model import ExtendedModel
+from hdopt.kinematics.extremes import CANDIDATES, zoom_lowest
+
+Array = NDArray[np.float64]
+
+RIPPLE_POINTS = 64
+"""Points in a period of a ripple that is finer than the grid: its peak is met within 0.2 % of its amplitude."""
+RIPPLE_PERIODS = 2
+
+
+def extremes_arcmin(model: ExtendedModel) -> tuple[float, float]:
+    """Infimum and supremum of the extended model's kinematic error over one full relative turn, arcmin.
+
+    Of a motion in both directions, over both passes together. Effects whose orders do not fit into the relative turn
+    (a bearing's) are met in the one turn that their phases describe.
+    """
+    found = [_of_pass(model, direction) for direction in model.operation.directions]
+    return min(low for low, _ in found), max(high for _, high in found)
+
+
+def peak_to_peak_arcmin(model: ExtendedModel) -> float:
+    """Supremum less infimum, arcmin."""
+    low, high = extremes_arcmin(model)
+    return high - low
+
+
+def _of_pass(model: ExtendedModel, direction: float) -> tuple[float, float]:
+    fine = model.too_fine
+    coarse = model.with_effects([effect for effect in model.effects if effect not in fine])
+    theta, values = coarse.relative_turn(direction)
+    if fine:
+        order = max(effect.highest_order(model.ratio) for effect in fine)
+        return tuple(
+            sign * _lowest_with_ripple(lambda x, s=sign: s * model.waveform(x, direction), theta, sign * values, order)
+            for sign in (1.0, -1.0)
+        )
+    low = zoom_lowest(lambda x: model.waveform(x, direction), theta, values, model.span)
+    high = -zoom_lowest(lambda x: -model.waveform(x, direction), theta, -values, model.span)
+    return low, high
+
+
+def _lowest_with_ripple(function, theta: Array, values: Array, order: float) -> float:
+    """Least value of `function` near the lowest local minima of the coarse `values`, ripple by ripple."""
+    local = np.flatnonzero((values <= np.roll(values, 1)) & (values <= np.roll(values, -1)))
+    local = local[np.argsort(values[local])[:CANDIDATES]]
+    period = 2 * np.pi / order
+    half = max(theta[1] - theta[0], RIPPLE_PERIODS * period)
+    offsets = np.arange(-half, half, period / RIPPLE_POINTS)
+    return float(min(function(centre + offsets).min() for centre in theta[local]))

@@ -1,0 +1,134 @@
+"""The extended model of one drive: its waveform, with effects, at an operating condition."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.deviations import DriveErrors
+from hdopt.drive import Drive
+from hdopt.errors import MissingValue
+from hdopt.extended.effects import AddedEffect
+from hdopt.extended.operation import NO_LOAD, Operation
+from hdopt.kinematics.waveform import full_turn, relative_turn_deviation, zone_deviation
+
+Array = NDArray[np.float64]
+
+FEWEST_PER_TURN, MOST_PER_TURN = 720, 8192
+PER_PERIOD = 16
+"""Samples in a period of the highest order, up to `MOST_PER_TURN` in a turn."""
+FEWEST_PER_PERIOD = 8
+"""With fewer than this an effect counts as too fine for a grid over the relative turn."""
+
+
+@dataclass(frozen=True)
+class ExtendedModel:
+    """One drive's errors with `effects` beside them, at `operation`.
+
+    Effects of the meshing zones add to the deviation of each zone before the larger one drives (Jia 2021, Eqs. (31),
+    (32)); the others add to the kinematic error itself. `homogenization` is k_e, which evens out the driving deviation
+    only. `geometry` is that of `hdopt.kinematics.waveform`. Raises `MissingValue` where an effect needs a number that
+    `operation` does not have.
+    """
+
+    drive: Drive
+    errors: DriveErrors
+    effects: tuple[AddedEffect, ...]
+    operation: Operation = NO_LOAD
+    homogenization: float = 1.0
+    geometry: str = "exact"
+
+    def __post_init__(self) -> None:
+        for effect in self.effects:
+            missing = [key for name, key in effect.needs.items() if getattr(self.operation, name) is None]
+            if missing:
+                raise MissingValue(f"the effect {effect.id}", *(f"operation.{key}" for key in missing))
+
+    @property
+    def ratio(self) -> float:
+        return self.drive.geometry.ratio
+
+    @property
+    def span(self) -> float:
+        """Input angle of one full relative turn of FS and CS, rad."""
+        return 2 * math.pi * self.drive.geometry.beat_phases
+
+    @property
+    def samples_per_turn(self) -> int:
+        """Enough samples a turn for the orders of all effects, as far as a grid can hold them."""
+        highest = max((effect.highest_order(self.ratio) for effect in self.effects), default=0.0)
+        return int(np.clip(math.ceil(PER_PERIOD * highest), FEWEST_PER_TURN, MOST_PER_TURN))
+
+    @property
+    def too_fine(self) -> tuple[AddedEffect, ...]:
+        """Effects whose ripple is finer than the grid over the relative turn resolves."""
+        most = self.samples_per_turn / FEWEST_PER_PERIOD
+        return tuple(effect for effect in self.effects if effect.highest_order(self.ratio) > most)
+
+    def with_effects(self, effects: Sequence[AddedEffect]) -> ExtendedModel:
+        """The same drive with these effects only."""
+        return replace(self, effects=tuple(effects))
+
+    def waveform(self, theta: Array, direction: float = 1.0) -> Array:
+        """Kinematic error (arcmin) at input angles `theta` (rad, shape (n,), within one relative turn) passed in
+        `direction`; shape (n,)."""
+        theta = np.mod(theta, self.span)
+        deviation = zone_deviation(self.drive, self.errors, theta, self.geometry)
+        return self.driven(theta, deviation, direction) + self.beside(theta, direction)
+
+    def relative_turn(self, direction: float = 1.0) -> tuple[Array, Array]:
+        """Input angles (rad) of one full relative turn and the kinematic error there (arcmin); shapes (n,)."""
+        theta, deviation = relative_turn_deviation(self.drive, self.errors, self.samples_per_turn, self.geometry)
+        return theta, self.driven(theta, deviation, direction) + self.beside(theta, direction)
+
+    def driven(self, theta: Array, deviation: Array, direction: float = 1.0) -> Array:
+        """What the driving zone makes of the base's `deviation`, mm, shape (2, n), and the zones' effects, arcmin."""
+        driving = np.max(deviation + self.in_zones(theta, direction), axis=0)
+        return self.homogenization * self.drive.geometry.arcmin_per_mm * driving
+
+    def in_zones(self, theta: Array, direction: float = 1.0) -> Array:
+        """What effects add to the deviation of each meshing zone, mm of arc, shape (2, n)."""
+        added = np.zeros((2, len(theta)))
+        for effect, term in self._terms(theta, direction):
+            if term.zones is not None:
+                added += self.operation.rows_of_pass(term.zones @ np.array(effect.coefficients))
+        return added
+
+    def beside(self, theta: Array, direction: float = 1.0) -> Array:
+        """What effects add to the kinematic error outside the zones, arcmin, shape (n,)."""
+        added = np.zeros(len(theta))
+        for effect, term in self._terms(theta, direction):
+            if term.columns is not None:
+                added += self.operation.rows_of_pass(term.columns @ np.array(effect.coefficients))
+        for grid, values in self._settled.get(direction, ()):
+            added += np.interp(theta, grid, values, period=self.span)
+        return added
+
+    def _terms(self, theta: Array, direction: float):
+        rows = self.operation.rows(self.ratio, theta, direction, self.span)
+        return [(effect, effect.term(rows)) for effect in self.effects if not effect.follows_base]
+
+    @cached_property
+    def _settled(self) -> dict[float, tuple[tuple[Array, Array], ...]]:
+        """Of the effects that follow the base: (angles, arcmin) over one relative turn, by direction."""
+        followers = [effect for effect in self.effects if effect.follows_base]
+        if not followers:
+            return {}
+        theta, deviation = relative_turn_deviation(self.drive, self.errors, self.samples_per_turn, self.geometry)
+        # Each direction runs on by itself here: what a reversal stirs up dies away and is left out.
+        running = replace(self.operation, motion="forward")
+        settled = {}
+        for direction in self.operation.directions:
+            order = slice(None, None, int(direction))
+            excitation = self.driven(theta, deviation, direction)[order]
+            rows = running.rows(self.ratio, full_turn(self.drive, self.samples_per_turn), 1.0, self.span)
+            settled[direction] = tuple(
+                (theta, (effect.term(rows, excitation).columns @ np.array(effect.coefficients))[order])
+                for effect in followers
+            )
+        return settled

@@ -1,0 +1,127 @@
+"""Effects of the teeth and of the circular spline: harmonics of the deviation, mesh ripple, lobes, a damaged tooth."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from hdopt.diagnosis.effects.circular_spline_lobing import LOBES
+from hdopt.diagnosis.effects.cs_tooth_harmonics import SETS
+from hdopt.diagnosis.effects.local_tooth_defect import COORDINATES
+from hdopt.diagnosis.effects.tooth_mesh import SIDEBANDS
+from hdopt.errors import HdoptError
+from hdopt.extended import AddedEffect
+from hdopt.study.base import NotNegative
+from hdopt.study.effects.base import UM, EffectSection, SineSet, polar, smallest_set, with_sine_keys
+
+
+@with_sine_keys
+class CircularSplineToothHarmonics(SineSet):
+    """[effects.cs_tooth_harmonics]: waves of the tooth deviation beyond the first, um of arc at the pitch line."""
+
+    id = "cs_tooth_harmonics"
+    unit = UM
+    sines: ClassVar = {h: (f"amplitude_{h}_um", f"phase_{h}_deg") for h in sorted({h for group in SETS for h in group})}
+
+    def build(self, gear):
+        index = smallest_set(SETS, list(self.given()))
+        return AddedEffect(self.id, {"harmonics": float(index)}, self.coefficients(SETS[index]))
+
+    @classmethod
+    def keys(cls, effect, gear):
+        return cls.written(SETS[int(effect.shape["harmonics"])], effect.coefficients)
+
+
+class FlexsplineToothHarmonics(CircularSplineToothHarmonics):
+    """[effects.fs_tooth_harmonics]: the same of the flexspline."""
+
+    id = "fs_tooth_harmonics"
+
+
+def _sideband(offset: int) -> tuple[str, str]:
+    if offset == 0:
+        return "amplitude_arcmin", "phase_deg"
+    side = f"{'plus' if offset > 0 else 'minus'}_{abs(offset)}"
+    return f"amplitude_{side}_arcmin", f"phase_{side}_deg"
+
+
+@with_sine_keys
+class ToothMesh(SineSet):
+    """[effects.tooth_mesh]: ripple at the tooth-mesh order Z_CS and its sidebands Z_CS +- 1, 2, 3, 4."""
+
+    id = "tooth_mesh"
+    sines: ClassVar = {k: _sideband(k) for k in sorted({k for group in SIDEBANDS for k in group}, key=abs)}
+
+    def build(self, gear):
+        index = smallest_set(SIDEBANDS, list(self.given()))
+        return AddedEffect(self.id, {"sidebands": float(index)}, self.coefficients(SIDEBANDS[index]))
+
+    @classmethod
+    def keys(cls, effect, gear):
+        return cls.written(SIDEBANDS[int(effect.shape["sidebands"])], effect.coefficients)
+
+
+class CircularSplineLobing(EffectSection):
+    """[effects.circular_spline_lobing]: out of round by `radial_amplitude_um` sin(lobes theta + phase)."""
+
+    id = "circular_spline_lobing"
+    lobes: int = Field(ge=LOBES.start, lt=LOBES.stop)
+    radial_amplitude_um: NotNegative
+    phase_deg: float
+
+    def build(self, gear):
+        slope = UM * math.tan(gear.pressure_angle)
+        sine, cosine = self.sine("radial_amplitude_um", "phase_deg")
+        return AddedEffect(self.id, {"lobes": float(self.lobes)}, (slope * sine, slope * cosine))
+
+    @classmethod
+    def keys(cls, effect, gear):
+        arc, phase = polar(*effect.coefficients)
+        radial = arc / math.tan(gear.pressure_angle) / UM
+        return {"lobes": int(effect.shape["lobes"]), "radial_amplitude_um": radial, "phase_deg": phase}
+
+
+SEEN = {
+    "circular_spline": "cs",
+    "flexspline": "fs",
+    "circular_spline_once": "cs_once",
+    "flexspline_once": "fs_once",
+    "output": "output",
+}
+"""Where a damaged tooth sits: met by both zones, seen once a turn whichever zone drives, or at one output angle."""
+
+
+class LocalToothDefect(EffectSection):
+    """[effects.local_tooth_defect]: a Gaussian pulse, `width_deg` its standard deviation in wave-generator travel."""
+
+    id = "local_tooth_defect"
+    on: Literal["circular_spline", "flexspline", "circular_spline_once", "flexspline_once", "output"]
+    angle_deg: float
+    width_deg: float = Field(ge=0.5, le=14)
+    height_um: float | None = None
+    """On a tooth that both zones meet: of arc at the pitch line."""
+    height_arcmin: float | None = None
+    """Of the other kinds: at the output."""
+
+    def build(self, gear):
+        in_zones = self.on in ("circular_spline", "flexspline")
+        key, other = ("height_um", "height_arcmin") if in_zones else ("height_arcmin", "height_um")
+        if getattr(self, key) is None or getattr(self, other) is not None:
+            raise HdoptError(f"effects.{self.id}: a defect on {self.on!r} has {key}, not {other}; give {key} alone")
+        shape = {
+            "centre": math.radians(self.angle_deg),
+            "width_deg": self.width_deg,
+            "on": float(COORDINATES.index(SEEN[self.on])),
+        }
+        return AddedEffect(self.id, shape, (UM * self.height_um if in_zones else self.height_arcmin,))
+
+    @classmethod
+    def keys(cls, effect, gear):
+        name = COORDINATES[int(effect.shape["on"])]
+        on = next(key for key, value in SEEN.items() if value == name)
+        height = effect.coefficients[0]
+        size = {"height_um": height / UM} if name in ("cs", "fs") else {"height_arcmin": height}
+        angle = math.degrees(effect.shape["centre"])
+        return {"on": on, "angle_deg": angle, "width_deg": effect.shape["width_deg"], **size}
