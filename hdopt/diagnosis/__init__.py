@@ -30,7 +30,7 @@ def diagnose(
     """
     from hdopt.diagnosis.pipeline import gather_evidence
     from hdopt.diagnosis.verdict import draw_verdict
-    from hdopt.diagnosis.waveform import BaseModel
+    from hdopt.kinematics.cartesian import CartesianModel
     from hdopt.recording import Recording, read_recording
 
     if isinstance(recordings, Recording | str | Path):
@@ -49,5 +49,5 @@ def diagnose(
     read = [r if isinstance(r, Recording) else read_recording(r, ratio, columns) for r in recordings]
     if any(abs(r.ratio - ratio) > 1e-9 for r in read):
         raise HdoptError("the recordings were read with different ratios; all must be of one drive")
-    evidence = gather_evidence(read, None if drive is None else BaseModel.of(drive), seed, nuisance)
+    evidence = gather_evidence(read, None if drive is None else CartesianModel.of(drive), seed, nuisance)
     return draw_verdict(evidence, tuple(w for r in read for w in r.warnings))

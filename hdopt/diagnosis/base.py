@@ -8,7 +8,7 @@ them on all rows.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from hdopt.deviations import ERROR_NAMES, DriveErrors
 from hdopt.diagnosis.effect import Parameter, Term, sine_columns
 from hdopt.diagnosis.fit import PRIOR_MM, Fit, Problem, evaluate, refine
 from hdopt.diagnosis.samples import Samples
-from hdopt.diagnosis.waveform import PARAMETERS
+from hdopt.kinematics.cartesian import CARTESIAN_NAMES, PARAMETERS, to_drive_errors
 
 Array = NDArray[np.float64]
 
@@ -63,8 +63,6 @@ def fit_base(
 
 
 def _thin(term: Term, mask: NDArray) -> Term:
-    from dataclasses import replace
-
     return replace(
         term,
         columns=None if term.columns is None else term.columns[mask],
@@ -88,69 +86,13 @@ class BaseEstimate:
     rms_arcmin: float
 
 
-def to_drive_errors(cartesian: Array, half_width: float) -> DriveErrors:
-    """`DriveErrors` from the Cartesian errors of `hdopt.diagnosis.waveform`."""
-    p = np.asarray(cartesian, float)
-    return DriveErrors(
-        axis_eccentricity=math.hypot(p[0], p[1]),
-        axis_eccentricity_direction=math.atan2(p[0], p[1]),
-        axis_tilt_y=math.atan(p[3] / half_width),
-        axis_tilt_x=math.atan(p[2] / half_width),
-        wg_eccentricity=math.hypot(p[4], p[5]),
-        wg_eccentricity_direction=math.atan2(p[5], p[4]),
-        wg_tilt_major=math.atan(p[6] / half_width),
-        wg_tilt_minor=math.atan(p[7] / half_width),
-        cs_tooth_amplitude=math.hypot(p[8], p[9]),
-        cs_tooth_phase=math.atan2(p[9], p[8]),
-        fs_tooth_amplitude=math.hypot(p[10], p[11]),
-        fs_tooth_phase=math.atan2(p[11], p[10]),
-    )
-
-
-def to_cartesian(errors: DriveErrors, half_width: float) -> Array:
-    """Cartesian errors (mm) of `hdopt.diagnosis.waveform` from `DriveErrors` of one drive."""
-    e = errors
-    return np.array(
-        [
-            e.axis_eccentricity * math.sin(e.axis_eccentricity_direction),
-            e.axis_eccentricity * math.cos(e.axis_eccentricity_direction),
-            half_width * math.tan(e.axis_tilt_x),
-            half_width * math.tan(e.axis_tilt_y),
-            e.wg_eccentricity * math.cos(e.wg_eccentricity_direction),
-            e.wg_eccentricity * math.sin(e.wg_eccentricity_direction),
-            half_width * math.tan(e.wg_tilt_major),
-            half_width * math.tan(e.wg_tilt_minor),
-            e.cs_tooth_amplitude * math.cos(e.cs_tooth_phase),
-            e.cs_tooth_amplitude * math.sin(e.cs_tooth_phase),
-            e.fs_tooth_amplitude * math.cos(e.fs_tooth_phase),
-            e.fs_tooth_amplitude * math.sin(e.fs_tooth_phase),
-        ]
-    )
-
-
-CARTESIAN_NAMES = (
-    "axis eccentricity x",
-    "axis eccentricity y",
-    "axis tilt x",
-    "axis tilt y",
-    "wave-generator eccentricity along its major axis",
-    "wave-generator eccentricity along its minor axis",
-    "wave-generator tilt major",
-    "wave-generator tilt minor",
-    "CS tooth sine",
-    "CS tooth cosine",
-    "FS tooth sine",
-    "FS tooth cosine",
-)
-
-
 def base_estimate(fit: Fit) -> BaseEstimate:
     """What the fit says of the drive's errors, with 95 % intervals and what it leaves open."""
     base = fit.problem.base
     rms = float(np.std(fit.base_value)) if base is not None else 0.0
     if base is None:
         return BaseEstimate(DriveErrors(), {}, (), rms)
-    half_width = float(base.constants[2])
+    half_width = base.half_width
     covariance = fit.covariance()[:PARAMETERS, :PARAMETERS]
     errors = to_drive_errors(fit.errors, half_width)
     values = errors.to_matrix()[0]

@@ -106,8 +106,8 @@ def held_out(fit: Fit, folds: Index) -> Array:
 
     The refit is of the whole nonlinear model, from where it stands: turns of one condition differ little from each
     other, conditions may differ much. What the fit consists of was chosen with all conditions in sight. A recording
-    that was zeroed anew brings a zero that no other can know: where a fold alone holds an offset's column, that offset,
-    and nothing else, is fitted on the fold itself.
+    that was zeroed anew brings a zero that no other can know: where a fold alone holds a column that is always free (a
+    zero; a drift where one was asked for), that column, and nothing else, is fitted on the fold itself.
     """
     errors = np.empty(len(folds))
     problem, nuisance = fit.problem, fit.problem.nuisance

@@ -62,6 +62,8 @@ class Probe(Protocol):
     samples: Samples
     residual: Array
     base_value: Array
+    order_range: tuple[float, float]
+    """Orders (cycles per input turn) that the search looks at."""
 
     def gain(self, term: Term) -> float:
         """Drop of the weighted sum of squares, in units of the noise variance, when `term` joins the fit."""
@@ -150,3 +152,21 @@ def best_terms(probe: Probe, terms: Sequence[Term], keep: int = 1) -> list[Term]
     cost = math.log(max(len(probe.residual), 2))
     ranked = sorted(terms, key=lambda term: probe.gain(term) - cost * term.freedom, reverse=True)
     return ranked[:keep]
+
+
+def strongest_orders(probe: Probe, count: int, lowest: float = 0.2, highest: float | None = None) -> list[float]:
+    """The residual's strongest separate orders, cycles per input turn."""
+    span = probe.samples.span_turns
+    highest = highest or min(0.45 * probe.samples.rows_per_turn, probe.order_range[1])
+    grid = np.arange(max(lowest, 1.0 / span), highest, 0.25 / span)
+    if len(grid) < 8:
+        return []
+    amplitude = probe.spectrum(grid)
+    found = []
+    for _ in range(count):
+        at = int(np.argmax(amplitude))
+        if amplitude[at] <= 0:
+            break
+        found.append(float(grid[at]))
+        amplitude[np.abs(grid - grid[at]) < 1.5 / span] = 0.0
+    return found

@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hdopt.diagnosis.catalogue import EXPLANATIONS
 from hdopt.diagnosis.effect import Estimate, Term
 from hdopt.diagnosis.noise import Noise
 from hdopt.diagnosis.samples import Samples
-from hdopt.diagnosis.waveform import PARAMETERS, BaseModel
+from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel
 
 Array = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ class Problem:
     """What is fitted: rows, base model (None for a gear without one), columns that are always free (offsets), noise."""
 
     samples: Samples
-    base: BaseModel | None
+    base: CartesianModel | None
     nuisance: Array
     noise: Noise
     prior_scale: float = 1.0
@@ -132,7 +133,7 @@ class Fit:
         return found
 
 
-def term_columns(term: Term, zone: NDArray[np.int64], base: BaseModel | None) -> Array:
+def term_columns(term: Term, zone: NDArray[np.int64], base: CartesianModel | None) -> Array:
     """The term's columns in arcmin per coefficient, with the zones as they drive now."""
     if term.zones is None:
         return term.columns
@@ -141,8 +142,6 @@ def term_columns(term: Term, zone: NDArray[np.int64], base: BaseModel | None) ->
 
 def shape_columns(term: Term, coefficients: Array, problem: Problem, zone: NDArray, base_value: Array) -> Array:
     """Derivative of the term's contribution by each of its free shape parameters, (n, k), by central differences."""
-    from hdopt.diagnosis.catalogue import EXPLANATIONS
-
     columns = []
     for name, step in term.steps.items():
         sides = []
@@ -186,8 +185,6 @@ def evaluate(
 
 def refine(fit: Fit, iterations: int = 12, tolerance: float = 1e-5, move_shapes: bool = True) -> Fit:
     """Levenberg-Marquardt from `fit` on."""
-    from hdopt.diagnosis.catalogue import EXPLANATIONS
-
     problem, damping = fit.problem, 1e-4
     wb, wn = problem.base_width, problem.nuisance.shape[1]
     for _ in range(iterations):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hdopt.diagnosis.effect import sine_columns
+from hdopt.diagnosis.effect import sine_columns, strongest_orders
 from hdopt.diagnosis.probe import FitProbe
 from hdopt.diagnosis.samples import Samples
 
@@ -111,24 +111,6 @@ def _groups(domains: list[str]) -> list[list[int]]:
         groups.append([i, i + 1] if pair else [i])
         i += 2 if pair else 1
     return groups
-
-
-def strongest_orders(probe: FitProbe, count: int, lowest: float = 0.2, highest: float | None = None) -> list[float]:
-    """The residual's strongest separate orders, cycles per input turn."""
-    span = probe.samples.span_turns
-    highest = highest or min(0.45 * probe.samples.rows_per_turn, probe.order_range[1])
-    grid = np.arange(max(lowest, 1.0 / span), highest, 0.25 / span)
-    if len(grid) < 8:
-        return []
-    amplitude = probe.spectrum(grid)
-    found = []
-    for _ in range(count):
-        at = int(np.argmax(amplitude))
-        if amplitude[at] <= 0:
-            break
-        found.append(float(grid[at]))
-        amplitude[np.abs(grid - grid[at]) < 1.5 / span] = 0.0
-    return found
 
 
 def _polynomial(values: Array, degree: int) -> Array:

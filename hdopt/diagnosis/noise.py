@@ -46,11 +46,6 @@ class Noise:
             filtered[lag:] -= coefficient * values[:-lag]
         return filtered * (self.root_weight if values.ndim == 1 else self.root_weight[:, None])
 
-    @property
-    def inflation(self) -> float:
-        """Long-run variance over innovation variance: how much slower slow averages settle than in white noise."""
-        return float(1 / max(1 - self.ar.sum(), 1e-3) ** 2)
-
 
 def estimate(samples: Samples, residual: Array, highest_order: int = HIGHEST_ORDER) -> Noise:
     """AR noise from a residual that holds no structure any more."""

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from hdopt.diagnosis.effect import Estimate, Parameter, sine_columns
 from hdopt.diagnosis.fit import Fit
 from hdopt.diagnosis.samples import Samples
-from hdopt.diagnosis.waveform import BaseModel
 from hdopt.errors import HdoptError, unknown_name
+from hdopt.kinematics.cartesian import CartesianModel
 
 Array = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ class Nuisances:
         return np.column_stack(list(self.blocks(samples).values()))
 
 
-def nuisances_for(samples: Samples, base: BaseModel | None, asked: Sequence[str] = ()) -> Nuisances:
+def nuisances_for(samples: Samples, base: CartesianModel | None, asked: Sequence[str] = ()) -> Nuisances:
     """The nuisances of these recordings: zeros, a drift where asked, and the angle where less than a turn has no model.
 
     Raises `HdoptError` for one that does not exist, or a time warp of an input that stands still.

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hdopt.diagnosis.effect import Term, best_terms, sine_columns
+from hdopt.diagnosis.effect import Term, best_terms, sine_columns, strongest_orders
 from hdopt.recording import TURN
 
 ODDS = -3.0
@@ -27,8 +27,6 @@ class AnyOrder:
         return None if samples.span_turns >= 4 else "at least 4 input turns"
 
     def search(self, probe):
-        from hdopt.diagnosis.generic import strongest_orders
-
         span = probe.samples.span_turns
         highest = min(0.45 * probe.samples.rows_per_turn, probe.order_range[1])
         lines = strongest_orders(probe, 3, lowest=max(2 / span, probe.order_range[0]), highest=highest)

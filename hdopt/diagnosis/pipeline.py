@@ -13,16 +13,17 @@ from hdopt.diagnosis import noise as noise_model
 from hdopt.diagnosis.base import fit_base
 from hdopt.diagnosis.catalogue import EXPLANATIONS, STRAIN_WAVE_ONLY
 from hdopt.diagnosis.conditions import AcrossConditions, across_conditions
+from hdopt.diagnosis.effect import sine_columns, strongest_orders
 from hdopt.diagnosis.effects import EFFECTS, HIGH_ORDER
-from hdopt.diagnosis.fit import Fit, Problem, evaluate, refine
-from hdopt.diagnosis.generic import generic_columns, strongest_orders, useful_columns
+from hdopt.diagnosis.fit import Fit, Problem, evaluate, refine, term_columns
+from hdopt.diagnosis.generic import generic_columns, useful_columns
 from hdopt.diagnosis.heldout import HeldOut, family_wise_p, held_out, paired_t, turn_folds
 from hdopt.diagnosis.noise import Noise
 from hdopt.diagnosis.nuisance import Nuisances, nuisances_for, with_time_warp
 from hdopt.diagnosis.probe import FitProbe
 from hdopt.diagnosis.samples import Samples, gather, neighbours_for
 from hdopt.diagnosis.select import Selection, highest_order, price, search_terms, select
-from hdopt.diagnosis.waveform import BaseModel
+from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recording import Recording
 
 Array = NDArray[np.float64]
@@ -34,7 +35,6 @@ class Remainder:
 
     held_out: HeldOut
     t: float
-    share: float
     domains: dict[str, float]
     orders: tuple[float, ...]
     columns: Array
@@ -62,7 +62,7 @@ class Evidence:
 
 
 def gather_evidence(
-    recordings: Sequence[Recording], base: BaseModel | None, seed: int, nuisance: Sequence[str] = ()
+    recordings: Sequence[Recording], base: CartesianModel | None, seed: int, nuisance: Sequence[str] = ()
 ) -> Evidence:
     """Run the whole diagnosis; `nuisance` names what is free beside the model (`hdopt.diagnosis.nuisance`)."""
     rng = np.random.default_rng(seed)
@@ -141,8 +141,6 @@ def clean_base(problem: Problem, rng: np.random.Generator) -> Fit | None:
     wanted = [
         i for i, d in enumerate(domains) if d not in ("integer order", "output-synchronous order", "asynchronous order")
     ]
-    from hdopt.diagnosis.effect import sine_columns
-
     nuisance = np.column_stack([problem.nuisance, columns[:, wanted], sine_columns(problem.samples.theta, [1])])
     fit = fit_base(replace(problem, nuisance=nuisance), rng, starts=12)
     bare = evaluate(problem, fit.errors, fit.offsets[: problem.nuisance.shape[1]], (), ())
@@ -196,8 +194,6 @@ def high_order_selection(
     bare = refine(evaluate(problem, np.zeros(0), np.zeros(1), (), ()), iterations=2)
     noise = noise_model.estimate(raw, bare.residual)
     # A strong ripple must not be taken for noise: its strongest lines are taken out before the noise is measured.
-    from hdopt.diagnosis.effect import sine_columns
-
     lines = strongest_orders(FitProbe(bare), 6, lowest=lowest, highest=0.49 * raw.rows_per_turn)
     if lines:
         columns = sine_columns(raw.theta, lines)
@@ -238,7 +234,7 @@ def look_at_remainder(fit: Fit, folds: NDArray[np.int64], inflation: float) -> R
         alone = held_out(fit, columns[:, chosen], folds)
         gains[domain] = own.variance - alone.variance
     t = paired_t(own.white, generic.white)
-    return Remainder(generic, t, 0.0, gains, orders, columns)
+    return Remainder(generic, t, gains, orders, columns)
 
 
 def assess(
@@ -263,8 +259,6 @@ def assess(
     placebo = max(others, key=probe.gain, default=None)
     placebo_out = base_out
     if placebo is not None:
-        from hdopt.diagnosis.fit import term_columns
-
         placebo_out = held_out(base, term_columns(placebo, base.zone, base.problem.base), folds)
     rows = float((base.problem.noise.root_weight > 0).sum())
     prices = [price([t], rows, 0.0, inflation) for t in pool]
@@ -284,9 +278,7 @@ def assess(
     lacking |= {name: "a fit without a free drift (--nuisance)" for name in nuisances.hidden}
     if high is not None and "tooth_mesh" in lacking:
         lacking.pop("tooth_mesh")
-    own = best.residual
     floor = float(np.sqrt(min(remainder.held_out.variance, best_out.variance)))
-    del own
     return Evidence(
         samples=samples,
         selection=selection,
@@ -308,8 +300,6 @@ def assess(
 
 def detection_limits(probe: FitProbe, terms, rows: float, inflation: float) -> dict[str, float]:
     """Smallest rms (arcmin) of each effect that would have been found: where its gain just pays its price."""
-    from hdopt.diagnosis.fit import term_columns
-
     limits: dict[str, float] = {}
     for term in terms:
         raw = term_columns(term, probe.fit.zone, probe.fit.problem.base)

@@ -45,8 +45,8 @@ class FitProbe:
         prior = np.sqrt(fit.prior_precision(design.shape[1])) * self.noise.sigma
         augmented = np.vstack([white, np.diag(prior)])
         scale = np.sqrt((augmented**2).sum(0))
-        basis, _, _ = np.linalg.svd(augmented / np.where(scale > 0, scale, 1), full_matrices=False)
-        rank = int(np.sum(_ > 1e-7 * _[0]))
+        basis, size, _ = np.linalg.svd(augmented / np.where(scale > 0, scale, 1), full_matrices=False)
+        rank = int(np.sum(size > 1e-7 * size[0]))
         self.basis = np.asfortranarray(basis[: len(white), :rank])
         self.white_residual = self.project(self.noise.whiten(self.residual))
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from hdopt.diagnosis.base import fit_base
 from hdopt.diagnosis.catalogue import EXPLANATIONS, is_outside
 from hdopt.diagnosis.effect import Term
-from hdopt.diagnosis.fit import Fit, extend, refine
+from hdopt.diagnosis.fit import Fit, evaluate, extend, refine
 from hdopt.diagnosis.probe import FitProbe
 
 Array = NDArray[np.float64]
@@ -155,8 +155,6 @@ def joint_fit(start: Fit, terms: Sequence[Term], rng: np.random.Generator | None
     for term in terms:
         parts.append(solution[position : position + term.width])
         position += term.width
-    from hdopt.diagnosis.fit import evaluate
-
     seeded = evaluate(start.problem, start.errors, start.offsets, terms, parts)
     best = refine(min(seeded, bare, key=lambda f: f.objective), iterations=15)
     if rng is not None and start.problem.base is not None:
@@ -168,8 +166,6 @@ def joint_fit(start: Fit, terms: Sequence[Term], rng: np.random.Generator | None
 
 
 def replace_terms(fit: Fit, terms: Sequence[Term]) -> Fit:
-    from hdopt.diagnosis.fit import evaluate
-
     return evaluate(fit.problem, fit.errors, fit.offsets, terms, [np.zeros(t.width) for t in terms])
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdopt.diagnosis.base import BaseEstimate, base_estimate, beat_warning
-from hdopt.diagnosis.catalogue import is_outside
+from hdopt.diagnosis.catalogue import EXPLANATIONS, is_outside
 from hdopt.diagnosis.confounding import CONFOUNDED, Confounding, confounded_with
 from hdopt.diagnosis.effect import Parameter, Term
 from hdopt.diagnosis.effects import EFFECTS, HIGH_ORDER
@@ -282,7 +282,7 @@ def rivals(evidence: Evidence, high: Candidate | None) -> tuple[tuple[str, ...],
     for other in others:
         if not other.fit.terms or (other.outside and not best.outside) or len(other.fit.terms) > len(best.fit.terms):
             continue
-        if best.evidence - other.evidence <= tie_width(evidence):
+        if best.evidence - other.evidence <= TIE:
             found.append(tuple(name for name in (*other.effects, *tail) if not is_outside(name)))
     return tuple(names for names in dict.fromkeys(found) if names and set(names) != said)[:3]
 
@@ -291,10 +291,11 @@ def confounded_pairs(evidence: Evidence, named: bool, high: Candidate | None) ->
     """Each effect that is said against every other of the catalogue, the most confounded pair first."""
     pairs: list[Confounding] = []
     if named:
+        others = [name for name in EFFECTS if name not in evidence.lacking]
         fit = evidence.selection.best.fit
         for index, term in enumerate(fit.terms):
             if not is_outside(term.effect):
-                pairs += confounded_with(fit, index, evidence.inflation)
+                pairs += confounded_with(fit, index, evidence.inflation, others)
     if high is not None:
         orders = ripple_orders(evidence.samples, high.fit.problem.samples)
         for index, term in enumerate(high.fit.terms):
@@ -312,10 +313,6 @@ def tied_pairs(
         for pair in pairs
         if any(pair.effect not in other and pair.other in other and pair.other not in ids for other in ambiguous)
     )
-
-
-def tie_width(evidence: Evidence) -> float:
-    return TIE
 
 
 def confidences(evidence: Evidence) -> dict[str, float]:
@@ -366,8 +363,6 @@ def describe(candidate: Candidate, evidence: Evidence, high: bool = False) -> li
 
 def _share(fit: Fit, index: int) -> float:
     """Share of the power left by the base and the other effects that this effect takes."""
-    from hdopt.diagnosis.probe import FitProbe
-
     keep = [i for i in range(len(fit.terms)) if i != index]
     probe = FitProbe(fit, keep=keep)
     power = float(probe.white_residual @ probe.white_residual)
@@ -421,8 +416,6 @@ def locate_remainder(evidence: Evidence) -> dict[str, object]:
     for candidate in [evidence.selection.best] + ([evidence.high.best] if evidence.high is not None else []):
         for index, term in enumerate(candidate.fit.terms):
             if is_outside(term.effect):
-                from hdopt.diagnosis.catalogue import EXPLANATIONS
-
                 contribution = candidate.fit.contribution(index)
                 return {
                     "domain": EXPLANATIONS[term.effect].domain,

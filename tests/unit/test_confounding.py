@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from hdopt.diagnosis.base import to_cartesian
 from hdopt.diagnosis.confounding import confounded_with, remaining_span, share_in_span, smallest_angle_deg
 from hdopt.diagnosis.effects import EFFECTS
 from hdopt.diagnosis.fit import Fit, Problem, evaluate, refine
 from hdopt.diagnosis.noise import Noise
-from hdopt.diagnosis.pipeline import gather, offsets
+from hdopt.diagnosis.nuisance import nuisances_for
+from hdopt.diagnosis.samples import gather
 from hdopt.diagnosis.select import joint_fit
-from hdopt.diagnosis.waveform import BaseModel
+from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.study import load_study
 from tests.unit.test_diagnosis import HIDDEN, NOISE, bench
 
@@ -33,9 +33,9 @@ def study():
 def fitted(study, names: list[str], shapes=SHAPES, hidden=HIDDEN, **record) -> Fit:
     """The base, from the errors it was made with, and the effects `names` fitted to a record that has them."""
     samples = gather(bench(study, lambda state: sum(hidden[name](state) for name in names), turns=20, **record))
-    base = BaseModel.of(study.drive)
-    problem = Problem(samples, base, offsets(samples), Noise.white(samples, NOISE))
-    errors = to_cartesian(study.errors, float(base.constants[2]))
+    base = CartesianModel.of(study.drive)
+    problem = Problem(samples, base, nuisances_for(samples, base).columns(samples), Noise.white(samples, NOISE))
+    errors = to_cartesian(study.errors, base.half_width)
     start = refine(evaluate(problem, errors, np.zeros(problem.nuisance.shape[1]), (), ()), iterations=3)
     return joint_fit(start, [EFFECTS[name].term(samples, shapes[name], start.base_value) for name in names])
 

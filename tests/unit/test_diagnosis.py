@@ -13,14 +13,14 @@ import pytest
 
 from hdopt.cli import main
 from hdopt.diagnosis import diagnose
-from hdopt.diagnosis.base import base_estimate, fit_base, to_cartesian, to_drive_errors
+from hdopt.diagnosis.base import base_estimate, fit_base
 from hdopt.diagnosis.effects import EFFECTS
 from hdopt.diagnosis.fit import Problem, refine
 from hdopt.diagnosis.noise import Noise, estimate
 from hdopt.diagnosis.nuisance import nuisances_for
 from hdopt.diagnosis.pipeline import gather
-from hdopt.diagnosis.waveform import BaseModel
 from hdopt.errors import HdoptError
+from hdopt.kinematics.cartesian import CartesianModel, to_cartesian, to_drive_errors
 from hdopt.kinematics.waveform import kinematic_error_arcmin
 from hdopt.recording import recording_from_table
 from hdopt.study import load_study
@@ -73,17 +73,17 @@ def bench(study, hidden=None, turns=40, rate=100, seed=0, speeds=(1.0,)):
 def test_waveform_is_the_models(drive, study):
     """The compiled form for fits and the library's waveform are one model (both sum the same terms: rounding only)."""
     rng = np.random.default_rng(2)
-    base = BaseModel.of(drive)
+    base = CartesianModel.of(drive)
     theta = np.linspace(0, 80 * TURN, 4001)
     for _ in range(5):
-        errors = to_drive_errors(rng.normal(size=12) * 0.005, float(base.constants[2]))
-        value, _, _ = base.evaluate(theta, to_cartesian(errors, float(base.constants[2])))
+        errors = to_drive_errors(rng.normal(size=12) * 0.005, base.half_width)
+        value, _, _ = base.evaluate(theta, to_cartesian(errors, base.half_width))
         np.testing.assert_allclose(value, kinematic_error_arcmin(drive, errors, theta), atol=1e-10)
 
 
 def test_jacobian_is_the_slope(drive):
     rng = np.random.default_rng(4)
-    base = BaseModel.of(drive)
+    base = CartesianModel.of(drive)
     theta = np.linspace(0, 20, 997)
     parameters = rng.normal(size=12) * 0.005
     _, _, jacobian = base.evaluate(theta, parameters)
@@ -98,7 +98,7 @@ def test_jacobian_is_the_slope(drive):
 def test_base_recovers_the_waveform_and_what_is_identifiable(drive, study, seed):
     """To the noise: the fit of 12 numbers to 8000 samples leaves no more than the noise and a few parts of it."""
     samples = gather(bench(study, turns=80, seed=seed, rate=60))
-    base = BaseModel.of(drive)
+    base = CartesianModel.of(drive)
     problem = Problem(samples, base, nuisances_for(samples, base).columns(samples), Noise.white(samples, NOISE))
     fit = refine(fit_base(problem, np.random.default_rng(seed)))
     assert np.std(fit.residual) < 1.02 * NOISE

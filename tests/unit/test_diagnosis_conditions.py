@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from hdopt.diagnosis import diagnose
-from hdopt.diagnosis.base import to_cartesian
 from hdopt.diagnosis.conditions import across_conditions, find_conditions, levels
 from hdopt.diagnosis.effects import EFFECTS
 from hdopt.diagnosis.fit import Problem, evaluate, refine
 from hdopt.diagnosis.noise import Noise
-from hdopt.diagnosis.pipeline import gather, offsets
+from hdopt.diagnosis.nuisance import nuisances_for
+from hdopt.diagnosis.samples import gather
 from hdopt.diagnosis.select import joint_fit
-from hdopt.diagnosis.waveform import BaseModel
+from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.study import load_study
 from tests.unit.test_diagnosis import HIDDEN, NOISE, bench
 
@@ -24,9 +24,9 @@ def study():
 def fits(study, records, names, shapes):
     """The base alone, and the base with the effects `names`, on `records`."""
     samples = gather(records)
-    base = BaseModel.of(study.drive)
-    problem = Problem(samples, base, offsets(samples), Noise.white(samples, NOISE))
-    errors = to_cartesian(study.errors, float(base.constants[2]))
+    base = CartesianModel.of(study.drive)
+    problem = Problem(samples, base, nuisances_for(samples, base).columns(samples), Noise.white(samples, NOISE))
+    errors = to_cartesian(study.errors, base.half_width)
     start = refine(evaluate(problem, errors, np.zeros(problem.nuisance.shape[1]), (), ()))
     terms = [EFFECTS[name].term(samples, shape, start.base_value) for name, shape in zip(names, shapes, strict=True)]
     return start, joint_fit(start, terms) if terms else start

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hdopt.diagnosis.effect import Term, best_terms, sine_columns
+from hdopt.diagnosis.effect import Parameter, Term, best_terms, sine_columns
 from hdopt.diagnosis.effects._zone_harmonics import zone_harmonics
 
 BALLS = np.arange(7, 41)
@@ -180,8 +180,6 @@ class BearingPass:
         return [float(orders[i]) for i in LINES[int(term.shape["lines"])]]
 
     def parameters(self, term, estimate):
-        from hdopt.diagnosis.effect import Parameter
-
         if "zones" in term.shape:
             return {
                 "ball_to_pitch_ratio": estimate.parameter(term.width, "1"),

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hdopt.diagnosis.effect import Term, sine_columns
+from hdopt.diagnosis.effect import Parameter, Term, best_terms, sine_columns
 
 LOWEST_ORDER = 8.0
 
@@ -58,8 +58,6 @@ class EncoderInterpolation:
                                 trials=float(len(lines)),
                             )
                         )
-        from hdopt.diagnosis.effect import best_terms
-
         return best_terms(probe, found, 2) if found else []
 
     def term(self, samples, shape, base_value=None, trials=1000.0):
@@ -73,8 +71,6 @@ class EncoderInterpolation:
         return [m * order for m in {1.0: (1,), 2.0: (1, 2), 3.0: (2,)}[term.shape["harmonics"]]]
 
     def parameters(self, term, estimate):
-        from hdopt.diagnosis.effect import Parameter
-
         lines = term.shape["lines"]
         return {
             "lines": Parameter(lines, lines, lines, "1"),
