@@ -20,7 +20,7 @@ from hdopt.diagnosis.noise import Noise, estimate
 from hdopt.diagnosis.nuisance import nuisances_for
 from hdopt.diagnosis.pipeline import gather
 from hdopt.errors import HdoptError
-from hdopt.kinematics.cartesian import CartesianModel, to_cartesian, to_drive_errors
+from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.kinematics.waveform import kinematic_error_arcmin
 from hdopt.recording import recording_from_table
 from hdopt.study import load_study
@@ -70,30 +70,6 @@ def bench(study, hidden=None, turns=40, rate=100, seed=0, speeds=(1.0,)):
     return parts
 
 
-def test_waveform_is_the_models(drive, study):
-    """The compiled form for fits and the library's waveform are one model (both sum the same terms: rounding only)."""
-    rng = np.random.default_rng(2)
-    base = CartesianModel.of(drive)
-    theta = np.linspace(0, 80 * TURN, 4001)
-    for _ in range(5):
-        errors = to_drive_errors(rng.normal(size=12) * 0.005, base.half_width)
-        value, _, _ = base.evaluate(theta, to_cartesian(errors, base.half_width))
-        np.testing.assert_allclose(value, kinematic_error_arcmin(drive, errors, theta), atol=1e-10)
-
-
-def test_jacobian_is_the_slope(drive):
-    rng = np.random.default_rng(4)
-    base = CartesianModel.of(drive)
-    theta = np.linspace(0, 20, 997)
-    parameters = rng.normal(size=12) * 0.005
-    _, _, jacobian = base.evaluate(theta, parameters)
-    for j in range(12):
-        step = np.eye(12)[j] * 1e-7
-        slope = (base.evaluate(theta, parameters + step)[0] - base.evaluate(theta, parameters - step)[0]) / 2e-7
-        # The median: a central difference is wrong where it straddles a change of zone or rim.
-        assert np.median(np.abs(slope - jacobian[:, j])) < 1e-5
-
-
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_base_recovers_the_waveform_and_what_is_identifiable(drive, study, seed):
     """To the noise: the fit of 12 numbers to 8000 samples leaves no more than the noise and a few parts of it."""
@@ -107,11 +83,6 @@ def test_base_recovers_the_waveform_and_what_is_identifiable(drive, study, seed)
     amplitude = found.parameters["fs_tooth_amplitude_mm"]
     assert amplitude.low - 2e-5 <= study.errors.fs_tooth_amplitude <= amplitude.high + 2e-5
     assert found.open_combinations  # e1 against a_CS and the small tilts are not
-
-
-def test_errors_and_cartesian_are_inverse(study):
-    there = to_cartesian(study.errors, 4.5)
-    np.testing.assert_allclose(to_drive_errors(there, 4.5).to_matrix(), study.errors.to_matrix(), atol=1e-12)
 
 
 def test_noise_model_finds_its_own_colour(study):
