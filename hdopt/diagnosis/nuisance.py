@@ -48,13 +48,14 @@ LARGEST_WARP_DEG = 15.0
 
 @dataclass(frozen=True)
 class Nuisances:
-    """Which columns are always free: one zero or one for each recording, `drift`, a curve of the `angle`, whole
-    `orders`, and a warp where the `slope` of the error by the input angle (arcmin/rad, a function of rad) is known.
+    """Which columns are always free: one zero or one for each recording, `drift`, a curve of the `angle` between two
+    angles (rad) with so many knots, whole `orders`, and a warp where the `slope` of the error by the input angle
+    (arcmin/rad, a function of rad) is known.
     """
 
     separate_zeros: bool
     drift: bool = False
-    angle: bool = False
+    angle: tuple[float, float, int] | None = None
     orders: tuple[int, ...] = ()
     slope: Callable[[Array], Array] | None = None
 
@@ -70,8 +71,8 @@ class Nuisances:
         blocks = {"zero": own.astype(float) if self.separate_zeros else np.ones((n, 1))}
         if self.drift:
             blocks["drift"] = _for_each(own, legendre(moment(samples), DRIFT_DEGREE))
-        if self.angle:
-            blocks["angle"] = hats(_to_unit(samples.theta))
+        if self.angle is not None:
+            blocks["angle"] = hats(samples.theta, *self.angle)
         if self.orders:
             blocks["orders"] = sine_columns(samples.theta, self.orders)
         if self.slope is not None:
@@ -99,7 +100,7 @@ def nuisances_for(samples: Samples, base: CartesianModel | None, asked: Sequence
     return Nuisances(
         separate_zeros=bool(np.ptp(means) >= SHARED_ZERO_ARCMIN),
         drift="drift" in asked,
-        angle=base is None and not samples.locked and samples.span_turns < 1,
+        angle=angle_range(samples) if base is None and not samples.locked and samples.span_turns < 1 else None,
         orders=tuple(k for k in range(1, highest + 1) if k * samples.span_turns >= 1),
     )
 
@@ -167,10 +168,15 @@ def legendre(x: Array, degree: int) -> Array:
     return np.polynomial.legendre.legvander(x, degree)[:, 1:]
 
 
-def hats(x: Array) -> Array:
-    """Any piecewise linear curve of `x` in -1..1 but for a zero: tent functions on even knots, (n, knots - 1)."""
-    knots = int(np.clip(len(x) / ROWS_A_KNOT, FEWEST_KNOTS, MOST_KNOTS))
-    place = (x + 1) / 2 * (knots - 1)
+def angle_range(samples: Samples) -> tuple[float, float, int]:
+    """Lowest and highest input angle (rad), and the knots of a free curve between them."""
+    knots = int(np.clip(len(samples) / ROWS_A_KNOT, FEWEST_KNOTS, MOST_KNOTS))
+    return float(np.min(samples.theta)), float(np.max(samples.theta)), knots
+
+
+def hats(angle: Array, low: float, high: float, knots: int) -> Array:
+    """Any piecewise linear curve of `angle` but for a zero: tent functions on even knots, (n, knots - 1)."""
+    place = (angle - low) / (high - low) * (knots - 1)
     return np.clip(1 - np.abs(place[:, None] - np.arange(1, knots)), 0, None)
 
 
@@ -197,7 +203,7 @@ def estimated(fit: Fit, nuisances: Nuisances) -> dict[str, Parameter]:
 def notes(fit: Fit, nuisances: Nuisances) -> list[str]:
     """What the nuisances keep from being named, in words."""
     said = []
-    if nuisances.angle:
+    if nuisances.angle is not None:
         said.append(
             f"the recording covers {fit.problem.samples.span_turns:.2g} input turns and the gear has no model: what "
             "depends on the angle alone (eccentricities, a ratio slightly off) is a free curve and gets no name"
