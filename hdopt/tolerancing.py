@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from hdopt.engine import Engine
 from hdopt.errors import HdoptError, unknown_name
+from hdopt.included import inclusion
 from hdopt.study import Study, load_study
-from hdopt.tolerance.drive_inputs import drive_problem
+from hdopt.tolerance.drive_inputs import DriveResponse, drive_problem
 from hdopt.tolerance.response import Response
 from hdopt.tolerance.sampling import SAMPLINGS
 from hdopt.tolerance.space import InputSpace
@@ -105,7 +106,25 @@ def study_problem(study: Study | str | Path | None) -> StudyProblem:
     if problem.replaced:
         notes = (f"callouts take the place of the tolerances of {', '.join(problem.replaced)}",)
     limit, required = requirement.peak_to_peak_arcmin, getattr(requirement, "yield")
-    return StudyProblem(study.name, problem.response, problem.space, limit, required, "arcmin", notes)
+    response, said = with_effects(study, problem.response)
+    return StudyProblem(study.name, response, problem.space, limit, required, "arcmin", (*notes, *said))
+
+
+def with_effects(study: Study, response: DriveResponse) -> tuple[Response, tuple[str, ...]]:
+    """`response` with the effects of the study that count, if any, and what is to be said of them.
+
+    Where [operation] does not say which count, those of the drive do: a tolerance does not answer for the bench.
+    """
+    if not study.effects:
+        return response, ()
+    chosen = inclusion(study, "drive")
+    if not chosen.counted:
+        return response, chosen.says
+    from hdopt.extended.many import tabulate
+    from hdopt.extended.response import ExtendedResponse
+
+    extended = ExtendedResponse(response, tabulate(study.drive, chosen.counted, study.operation))
+    return extended, (*chosen.says, "the effects are the same in every drive: they have no tolerance")
 
 
 def loaded_study(study: Study | str | Path | None) -> Study:

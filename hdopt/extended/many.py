@@ -1,0 +1,135 @@
+"""Converged peak-to-peak of many drives that all have the same effects: what stacks and searches evaluate."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.deviations import DriveErrors
+from hdopt.drive import Drive
+from hdopt.errors import HdoptError
+from hdopt.extended.effects import AddedEffect
+from hdopt.extended.model import ExtendedModel
+from hdopt.extended.operation import Operation
+from hdopt.kinematics.closed_form import tip_geometry
+from hdopt.kinematics.waveform import full_turn
+
+Array = NDArray[np.float64]
+
+WALK_PER_TURN, TABLE_PER_TURN = 180, 1440
+"""Angles of the first walk, and places of the table, in an input turn at least."""
+WALK_PER_PERIOD, TABLE_PER_PERIOD = 8, 32
+"""The same in a period of the highest order."""
+BLOCK = 64
+"""Drives a thread takes at a time."""
+
+
+@dataclass(frozen=True)
+class AddedTable:
+    """Effects over one full relative turn: `zones` (d, 2, m) mm of arc in both meshing zones, `beside` (d, m) arcmin at
+    the output, for each of d directions of the motion, on m even places. A first walk takes every `stride`-th."""
+
+    zones: Array
+    beside: Array
+    stride: int
+
+    @cached_property
+    def walked(self) -> tuple[Array, Array]:
+        """Both on the places of the first walk."""
+        every = slice(None, None, self.stride)
+        return np.ascontiguousarray(self.zones[..., every]), np.ascontiguousarray(self.beside[:, every])
+
+    @property
+    def widest_arcmin(self) -> float:
+        """Range of what is beside the zones, arcmin."""
+        return float(np.ptp(self.beside))
+
+    @property
+    def widest_mm(self) -> float:
+        """Range of what is in the zones, mm of arc."""
+        return float(np.ptp(self.zones))
+
+
+def tabulate(drive: Drive, effects: Sequence[AddedEffect], operation: Operation) -> AddedTable:
+    """The table of these effects for a drive's ratio and operating condition.
+
+    Raises `HdoptError` for effects that are no function of the angle alone, or too fine for the table.
+    """
+    model = ExtendedModel(drive, DriveErrors(), tuple(effects), operation)
+    if following := [effect.id for effect in effects if effect.follows_base]:
+        raise HdoptError(
+            f"{', '.join(following)} follows each drive's own waveform and speed, which only ke computes; "
+            "leave the bench out with operation.include=drive, or remove the effect"
+        )
+    if model.too_fine:
+        raise HdoptError(
+            f"{', '.join(effect.id for effect in model.too_fine)} is a ripple too fine for tolerances and searches; "
+            "leave the bench out with operation.include=drive, or remove the effect"
+        )
+    if not drive.wave_generator.profile.tip_is_smooth:
+        raise HdoptError(
+            f"effects need a profile with smooth tips here, which {drive.wave_generator.profile.name!r} has not; "
+            "leave them out with operation.include=none"
+        )
+    order = max((effect.highest_order(model.ratio) for effect in effects), default=0.0)
+    walk = max(WALK_PER_TURN, math.ceil(WALK_PER_PERIOD * order))
+    stride = math.ceil(max(TABLE_PER_TURN, TABLE_PER_PERIOD * order) / walk)
+    theta = full_turn(drive, walk * stride)
+    directions = operation.directions
+    return AddedTable(
+        np.stack([model.in_zones(theta, direction) for direction in directions]),
+        np.stack([model.beside(theta, direction) for direction in directions]),
+        stride,
+    )
+
+
+def matrix_peak_to_peak_arcmin(
+    drive: Drive, matrix: Array, added: AddedTable, homogenization: float = 1.0, workers: int | None = None
+) -> Array:
+    """Peak-to-peak (arcmin) of drives with errors as rows of `DriveErrors.to_matrix`, (n, 12) -> (n,), and effects.
+
+    `homogenization` is k_e, which evens out what the zones drive. Within 1e-3 arcmin of `extended.extremes` in the
+    closed form (a test measures it). `workers` threads, all cores if None.
+    """
+    from hdopt.extended.kernel import extended_block
+
+    matrix = np.ascontiguousarray(matrix, dtype=np.float64)
+    gear, tip = drive.geometry, tip_geometry(drive)
+    out = np.empty(len(matrix))
+    advance = gear.circular_spline_teeth / gear.flexspline_teeth
+    scale = homogenization * gear.arcmin_per_mm
+
+    coarse_zones, coarse_beside = added.walked
+
+    def fill(start: int) -> None:
+        rows = slice(start, start + BLOCK)
+        extended_block(
+            tip,
+            float(np.tan(gear.pressure_angle)),
+            advance,
+            gear.beat_phases,
+            scale,
+            matrix[rows],
+            added.zones,
+            added.beside,
+            coarse_zones,
+            coarse_beside,
+            out[rows],
+        )
+
+    starts = range(0, len(matrix), BLOCK)
+    workers = min(workers or os.cpu_count() or 1, len(starts))
+    if workers <= 1:
+        for start in starts:
+            fill(start)
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            list(pool.map(fill, starts))
+    return out
