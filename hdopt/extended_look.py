@@ -56,14 +56,15 @@ def extended_look(study: Study, model: ExtendedModel, base_peak_to_peak: float, 
         None if k_e is None else peak_to_peak_arcmin(replace(model, homogenization=k_e)),
         theta,
         waveform,
-        _driven(resolved, direction),
+        driven_waveform(resolved, direction),
         orders,
         effect_table(study, model, chosen, high - low, base_peak_to_peak),
         (*chosen.says, *remarks(model)),
     )
 
 
-def _driven(model: ExtendedModel, direction: float) -> Array:
+def driven_waveform(model: ExtendedModel, direction: float) -> Array:
+    """What the zones drive over one full relative turn, arcmin: the error without what is beside the zones."""
     theta, deviation = relative_turn_deviation(model.drive, model.errors, model.samples_per_turn, model.geometry)
     return model.driven(theta, deviation, direction)
 

@@ -57,6 +57,7 @@ MANY_DRIVES = ("drive", "tolerances", "requirement")
 
 STEPS: dict[str, StepPlace] = {
     "waveform": StepPlace("hdopt.steps.waveform:waveform", ONE_DRIVE),
+    "effects": StepPlace("hdopt.steps.waveform:effects", (*ONE_DRIVE, "effects")),
     "orders": StepPlace("hdopt.steps.waveform:orders", ONE_DRIVE),
     "lag": StepPlace("hdopt.steps.waveform:lag", ONE_DRIVE),
     "structures": StepPlace("hdopt.steps.structures:structures", ONE_DRIVE),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from effect_examples import toml
+
 from hdopt.run import run_study
 from hdopt.study import load_study
 
@@ -9,3 +11,14 @@ from hdopt.study import load_study
 def test_the_report_of_the_csf_25_80(look_at, tmp_path):
     findings = look_at(run_study(load_study("csf-25-80"), tmp_path).report)
     assert len(findings.figures) >= 13
+
+
+def test_the_report_of_a_drive_with_effects(look_at, tmp_path):
+    effects = {
+        "lost_motion": {"lost_motion_arcmin": 0.3, "crossing_arcmin": 0.3},
+        "circular_spline_lobing": {"lobes": 6, "radial_amplitude_um": 8.0, "phase_deg": 10.0},
+    }
+    text = toml(effects, {"motion": "both"}) + '[study]\nsteps = ["effects", "waveform", "orders"]\n'
+    (tmp_path / "extended.toml").write_text(text)
+    findings = look_at(run_study(load_study(tmp_path / "extended.toml"), tmp_path / "out").report)
+    assert len(findings.figures) == 6

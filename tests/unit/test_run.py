@@ -71,7 +71,7 @@ def test_a_study_lists_its_steps(tmp_path, study):
     ("steps", "message"),
     [
         ('["wavefrom"]', r"mine.toml, line 3, study.steps: unknown step 'wavefrom'; did you mean 'waveform'"),
-        ("[]", r"mine.toml, line 3, study.steps: is empty; name at least one of waveform, orders"),
+        ("[]", r"mine.toml, line 3, study.steps: is empty; name at least one of waveform, effects, orders"),
     ],
 )
 def test_steps_that_cannot_be_done_are_refused_before_anything_runs(steps, message, tmp_path):
