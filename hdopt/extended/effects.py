@@ -34,6 +34,9 @@ NEEDS = {
 }
 """Effect -> the numbers of an `Operation` that it needs, with their keys in a study file's [operation]."""
 
+RADIAL = ("circular_spline_lobing",)
+"""Effects that are radial deviations: the pressure angle makes their arc."""
+
 LASTING = {"hysteresis": 1}
 """Effect -> how many of its columns last, where others fade after the start of a recording."""
 

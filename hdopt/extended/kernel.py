@@ -64,24 +64,21 @@ def _at(drive, theta, zones, beside):
 
 
 @compiled
-def _lowest_near(drive, centre, half, sign, zones, beside):
-    """Least of sign times the kinematic error within `half` of `centre`, by golden section."""
+def _lowest_near(drive, centre, half, sign, zones, beside, steps):
+    """Least of sign times the kinematic error within `half` of `centre`, and where, by golden section."""
     low, high = centre - half, centre + half
     x, y = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
     at_x, at_y = sign * _at(drive, x, zones, beside), sign * _at(drive, y, zones, beside)
-    best = min(at_x, at_y)
-    for _ in range(STEPS):
+    for _ in range(steps):
         if at_x < at_y:
             high, y, at_y = y, x, at_x
             x = high - GOLDEN * (high - low)
             at_x = sign * _at(drive, x, zones, beside)
-            best = min(best, at_x)
         else:
             low, x, at_x = x, y, at_y
             y = low + GOLDEN * (high - low)
             at_y = sign * _at(drive, y, zones, beside)
-            best = min(best, at_y)
-    return best
+    return (at_x, x) if at_x < at_y else (at_y, y)
 
 
 @compiled
@@ -107,7 +104,8 @@ def _follow(drive, values, sign, zones, beside, best, places):
         # Within a cell a kink or a trough lies no deeper than the steeper of its sides falls.
         fall = max(sign * values[i - 1], sign * values[(i + 1) % n]) - best[k]
         if best[k] - fall < least:
-            least = min(least, best[k], _lowest_near(drive, i * step, step, sign, zones, beside))
+            found, _ = _lowest_near(drive, i * step, step, sign, zones, beside, STEPS)
+            least = min(least, best[k], found)
     return least
 
 
@@ -139,6 +137,24 @@ def _walk(drive, per_turn, turns, zones, beside, grid, values):
             values[start + g] = scale * driving + beside[start + g]
 
 
+@compiled
+def _drive_of(tip, tan_alpha, advance, turns, scale, e):
+    """All that the kinematic error at one angle needs; `e` (12) holds the errors as in ERROR_NAMES."""
+    motion = rigid_motion(
+        tip,
+        e[0] * math.sin(e[1]),
+        e[0] * math.cos(e[1]),
+        math.tan(e[3]),
+        math.tan(e[2]),
+        e[4] * math.cos(e[5]),
+        e[4] * math.sin(e[5]),
+        math.tan(e[6]),
+        math.tan(e[7]),
+    )
+    cs_cos, cs_sin = e[8] * math.sin(e[9]), e[8] * math.cos(e[9])
+    return (tip, motion, cs_cos, cs_sin, tan_alpha, e[10], e[11], advance, scale, 2 * math.pi * turns)
+
+
 @njit(cache=True, nogil=True, **OPTIONS)
 def extended_block(tip, tan_alpha, advance, turns, scale, matrix, zones, beside, coarse_zones, coarse_beside, out):
     """Fill `out` (n,) with the peak-to-peak (arcmin) of each row of `matrix` (n, 12), errors as in ERROR_NAMES.
@@ -151,23 +167,33 @@ def extended_block(tip, tan_alpha, advance, turns, scale, matrix, zones, beside,
     values, grid = np.empty(walked), np.empty((6, per_turn))
     best, places = np.empty(CANDIDATES), np.empty(CANDIDATES, np.int64)
     for row in range(matrix.shape[0]):
-        e = matrix[row]
-        motion = rigid_motion(
-            tip,
-            e[0] * math.sin(e[1]),
-            e[0] * math.cos(e[1]),
-            math.tan(e[3]),
-            math.tan(e[2]),
-            e[4] * math.cos(e[5]),
-            e[4] * math.sin(e[5]),
-            math.tan(e[6]),
-            math.tan(e[7]),
-        )
-        cs_cos, cs_sin = e[8] * math.sin(e[9]), e[8] * math.cos(e[9])
-        drive = (tip, motion, cs_cos, cs_sin, tan_alpha, e[10], e[11], advance, scale, 2 * math.pi * turns)
+        drive = _drive_of(tip, tan_alpha, advance, turns, scale, matrix[row])
         lowest, highest = math.inf, -math.inf
         for d in range(directions):
             _walk(drive, per_turn, turns, coarse_zones[d], coarse_beside[d], grid, values)
             lowest = min(lowest, _follow(drive, values, 1.0, zones[d], beside[d], best, places))
             highest = max(highest, -_follow(drive, values, -1.0, zones[d], beside[d], best, places))
         out[row] = highest - lowest
+
+
+@njit(cache=True, nogil=True, **OPTIONS)
+def extended_walk(tip, tan_alpha, advance, turns, scale, row, coarse_zones, coarse_beside):
+    """Kinematic error (arcmin) of one drive on the grid of the first walk, for each direction: shape (d, walked)."""
+    directions, walked = coarse_beside.shape
+    values, grid = np.empty((directions, walked)), np.empty((6, walked // turns))
+    drive = _drive_of(tip, tan_alpha, advance, turns, scale, row)
+    for d in range(directions):
+        _walk(drive, walked // turns, turns, coarse_zones[d], coarse_beside[d], grid, values[d])
+    return values
+
+
+@njit(cache=True, nogil=True, **OPTIONS)
+def extended_near(tip, tan_alpha, advance, turns, scale, row, zones, beside, way, theta, half, sign, steps):
+    """Least of sign times the kinematic error (arcmin) within `half` (rad) of each of `theta` (k) in the direction
+    `way` (k), and where: shape (2, k)."""
+    found = np.empty((2, len(theta)))
+    drive = _drive_of(tip, tan_alpha, advance, turns, scale, row)
+    for k in range(len(theta)):
+        d = way[k]
+        found[0, k], found[1, k] = _lowest_near(drive, theta[k], half, sign, zones[d], beside[d], steps)
+    return found

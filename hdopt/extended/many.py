@@ -101,28 +101,13 @@ def matrix_peak_to_peak_arcmin(
     from hdopt.extended.kernel import extended_block
 
     matrix = np.ascontiguousarray(matrix, dtype=np.float64)
-    gear, tip = drive.geometry, tip_geometry(drive)
     out = np.empty(len(matrix))
-    advance = gear.circular_spline_teeth / gear.flexspline_teeth
-    scale = homogenization * gear.arcmin_per_mm
-
+    constants = _constants(drive, homogenization)
     coarse_zones, coarse_beside = added.walked
 
     def fill(start: int) -> None:
         rows = slice(start, start + BLOCK)
-        extended_block(
-            tip,
-            float(np.tan(gear.pressure_angle)),
-            advance,
-            gear.beat_phases,
-            scale,
-            matrix[rows],
-            added.zones,
-            added.beside,
-            coarse_zones,
-            coarse_beside,
-            out[rows],
-        )
+        extended_block(*constants, matrix[rows], added.zones, added.beside, coarse_zones, coarse_beside, out[rows])
 
     starts = range(0, len(matrix), BLOCK)
     workers = min(workers or os.cpu_count() or 1, len(starts))
@@ -133,3 +118,73 @@ def matrix_peak_to_peak_arcmin(
         with ThreadPoolExecutor(workers) as pool:
             list(pool.map(fill, starts))
     return out
+
+
+CLOSEST = math.radians(8)
+"""Local extremes that lie nearer than this in the input turn count as one, which the best turn stands for."""
+RIVALS = 12
+"""Turns of the grid that are followed for each of them."""
+LOCAL_STEPS = 45
+"""Golden-section steps that leave rounding only: slopes are differences of such values."""
+NEAR = 1e-3
+"""How far a local extreme may move, in rad, when a drive changes a little."""
+
+
+@dataclass(frozen=True)
+class LocalExtremes:
+    """Where local extremes of one drive's kinematic error lie: input angles (rad) and directions by index, (k,) each;
+    `sign` +1 for minima, -1 for maxima."""
+
+    theta: Array
+    way: NDArray[np.int64]
+    sign: float
+
+    def values(self, drive: Drive, row: Array, added: AddedTable) -> Array:
+        """The extremes (arcmin) of a drive that differs a little from the one they were found for; shape (k,)."""
+        return self.sign * _near(drive, row, added, self, NEAR)[0]
+
+
+def local_extremes(drive: Drive, row: Array, added: AddedTable, most: int) -> tuple[LocalExtremes, LocalExtremes]:
+    """The lowest minima and the highest maxima of one drive, each at another place of the input turn, `most` of each.
+
+    `row` (12) holds its errors as in ERROR_NAMES.
+    """
+    from hdopt.extended.kernel import extended_walk
+
+    values = extended_walk(*_constants(drive), np.ascontiguousarray(row), *added.walked)
+    step = 2 * math.pi * drive.geometry.beat_phases / values.shape[1]
+    found = []
+    for sign in (1.0, -1.0):
+        signed = sign * values
+        local = (signed <= np.roll(signed, 1, axis=1)) & (signed <= np.roll(signed, -1, axis=1))
+        ways, places = np.nonzero(local)
+        order = np.argsort(signed[ways, places])
+        ways, theta = ways[order], places[order] * step
+        best = []
+        while len(theta) and len(best) < most:
+            turned = np.mod(theta - theta[0] + np.pi, 2 * np.pi) - np.pi
+            alike = np.abs(turned) < CLOSEST
+            rivals = LocalExtremes(theta[alike][:RIVALS], ways[alike][:RIVALS], sign)
+            lowest, where = _near(drive, row, added, rivals, step)
+            winner = int(np.argmin(lowest))
+            best.append((where[winner], rivals.way[winner]))
+            ways, theta = ways[~alike], theta[~alike]
+        found.append(LocalExtremes(np.array([t for t, _ in best]), np.array([way for _, way in best]), sign))
+    return found[0], found[1]
+
+
+def _near(drive: Drive, row: Array, added: AddedTable, at: LocalExtremes, half: float) -> Array:
+    from hdopt.extended.kernel import extended_near
+
+    row = np.ascontiguousarray(row)
+    return extended_near(
+        *_constants(drive), row, added.zones, added.beside, at.way, at.theta, half, at.sign, LOCAL_STEPS
+    )
+
+
+def _constants(drive: Drive, homogenization: float = 1.0):
+    """What the compiled walk knows of a drive besides its errors."""
+    gear = drive.geometry
+    advance = gear.circular_spline_teeth / gear.flexspline_teeth
+    scale = homogenization * gear.arcmin_per_mm
+    return tip_geometry(drive), math.tan(gear.pressure_angle), advance, gear.beat_phases, scale

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from hdopt.files import write_text
 from hdopt.report import Section, Text
 from hdopt.report.sections.search import trade_sections
@@ -31,6 +33,9 @@ def search(study: Study, context: Context) -> StepResult:
         "chosen_study": file.name,
     }
     sections = trade_sections(result, trade_views(result), checked, perturbed, file.name)
+    if result.notes:
+        notes = tuple(Text(f"{note[:1].upper()}{note[1:]}.") for note in result.notes)
+        sections = [replace(sections[0], items=(*notes, *sections[0].items)), *sections[1:]]
     says = (
         f"chosen wave generator: {chosen_words(result)}",
         f"study file: {file}  (hdopt export {file} --step wg.step)",

@@ -13,7 +13,18 @@ from hdopt.study import Study
 from hdopt.trade.run import SearchResult
 from hdopt.trade.space import OWN_VARIABLES
 
-KEPT = ("errors", "tolerances", "requirement", "contributors", "clearances", "material", "load", "export")
+KEPT = (
+    "errors",
+    "effects",
+    "operation",
+    "tolerances",
+    "requirement",
+    "contributors",
+    "clearances",
+    "material",
+    "load",
+    "export",
+)
 """Sections of the searched study that the chosen design keeps."""
 DECIMALS = 6
 """Of lengths in mm and angles in deg: a nanometre."""

@@ -9,8 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hdopt.drive import Drive
+from hdopt.extended import ExtendedModel
+from hdopt.extended.extremes import extremes_arcmin as extended_extremes_arcmin
+from hdopt.extended.many import matrix_peak_to_peak_arcmin
 from hdopt.kinematics.extremes import extremes_arcmin
 from hdopt.study import Study
+from hdopt.trade.added import DesignEffects
 from hdopt.trade.bearing import SOURCES
 from hdopt.trade.quantities import find_quantity
 from hdopt.trade.run import DesignRecord, SearchResult, choose, method_of, record_of
@@ -160,11 +165,15 @@ def verify(study: Study, result: SearchResult, seed: int) -> Verification:
     """The best design against the exact geometry, and its quantile over drives drawn with another seed."""
     setup = result.setup
     drive = setup.space.design(result.chosen.combination, result.chosen.values).drive
-    low, high = extremes_arcmin(drive, study.errors, "exact")
+    added = setup.trade.added
+    if added is None:
+        low, high = extremes_arcmin(drive, study.errors, "exact")
+    else:
+        low, high = extended_extremes_arcmin(ExtendedModel(drive, study.errors, added.at(drive), added.operation))
     kernel = result.best.quantities.get("peak_to_peak_arcmin", float("nan"))
     if "tolerances" not in study.sections:
         return Verification(high - low, kernel, None, None, None, None, None, 0)
-    blocks = quantile_blocks(study, drive, setup.section.quantile, seed + 1)
+    blocks = quantile_blocks(study, drive, setup.section.quantile, seed + 1, added)
     from scipy.stats import t
 
     middle = float(blocks.mean())
@@ -175,7 +184,9 @@ def verify(study: Study, result: SearchResult, seed: int) -> Verification:
     )
 
 
-def quantile_blocks(study: Study, drive, quantile: float, seed: int) -> Array:
+def quantile_blocks(
+    study: Study, drive: Drive, quantile: float, seed: int, added: DesignEffects | None = None
+) -> Array:
     """The quantile of the converged peak-to-peak in each of 16 independent scramblings."""
     from hdopt.kinematics import peak_to_peak_arcmin
     from hdopt.tolerance.sampling import ScrambledSobol
@@ -185,7 +196,12 @@ def quantile_blocks(study: Study, drive, quantile: float, seed: int) -> Array:
     values = []
     for replicate in range(BLOCKS):
         points = np.concatenate(list(sampling.blocks(seed, replicate, VERIFICATION // BLOCKS, space.dimension)))
-        values.append(np.quantile(peak_to_peak_arcmin(drive, response.errors(space.sample(points))), quantile))
+        errors = response.errors(space.sample(points))
+        if added is None:
+            spans = peak_to_peak_arcmin(drive, errors)
+        else:
+            spans = matrix_peak_to_peak_arcmin(drive, errors.to_matrix(), added.table(drive))
+        values.append(np.quantile(spans, quantile))
     return np.array(values)
 
 

@@ -23,6 +23,7 @@ from hdopt.errors import HdoptError, MissingValue, unknown_name
 from hdopt.kinematics.closed_form import tip_geometry
 from hdopt.kinematics.kernel import peak_to_peak_block
 from hdopt.kinematics.lag import cross_slide_lag_arcmin
+from hdopt.trade.added import DesignEffects
 from hdopt.trade.bearing import BearingConstants, axial_force, bearing_life_h, bearing_load, radial_force, ring_force
 from hdopt.trade.envelope import extremes_of
 from hdopt.trade.halves import in_parts
@@ -58,6 +59,8 @@ class Trade:
     k_b: float = 1.0
     sample: Array | None = None
     quantile: float = 0.9973
+    added: DesignEffects | None = None
+    """Effects that count beside the errors."""
 
     def needed(self, name: str, needed_by: str) -> float:
         value = getattr(self, name)
@@ -170,17 +173,25 @@ def _envelope(design: Design, rows: Array):
 
 @dataclass(frozen=True)
 class PeakToPeak:
-    """Peak-to-peak of the errors in the study, k_e = 1: the envelope over all FS phases (see `envelope`)."""
+    """Peak-to-peak of the errors in the study, k_e = 1: the envelope over all FS phases (see `envelope`).
+
+    With effects there is no such envelope: the relative turn is walked, and local extremes are the pieces.
+    """
 
     title: str = "Peak-to-peak"
     unit: str = "arcmin"
     small_is_good: bool = True
 
     def value(self, trade: Trade, design: Design) -> float:
+        if trade.added is not None:
+            return trade.added.peak_to_peak_arcmin(design.drive, trade.rows[0])
         found = _envelope(design, trade.rows)
         return float((found.highs.max() - found.lows.min()) * design.drive.geometry.arcmin_per_mm)
 
     def pieces(self, point: Point) -> tuple[Array, Array]:
+        if point.trade.added is not None:
+            spans = point.trade.added.spans_near(point.design.drive, point.trade.rows[0], LOWEST_USED)
+            return spans(point.design.drive), point.slopes(lambda design: spans(design.drive)).T
         found, features = _envelope(point.design, point.trade.rows), point.slopes(tip_features)
         lows, low_slopes = found.lows[0, :LOWEST_USED], found.low_slopes[0, :LOWEST_USED]
         spans = (found.highs[0][:, None] - lows[None, :]).ravel()
@@ -323,7 +334,10 @@ def ring_load(trade: Trade, drive: Drive) -> float:
 
 def evened_out(trade: Trade, design: Design) -> float:
     teeth = design.drive.geometry.circular_spline_teeth * design.mesh.contact_angle / (2 * math.pi)
-    return PeakToPeak().value(trade, design) * homogenization_coefficient(teeth, trade.k_b)
+    k_e = homogenization_coefficient(teeth, trade.k_b)
+    if trade.added is not None:
+        return trade.added.peak_to_peak_arcmin(design.drive, trade.rows[0], k_e)
+    return PeakToPeak().value(trade, design) * k_e
 
 
 def _diameter(trade: Trade, design: Design) -> float:

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from hdopt.errors import MissingValue
+from hdopt.included import inclusion
 from hdopt.study import Study
 from hdopt.trade.front import front, front_ends, hypervolume, pareto
 from hdopt.trade.minimax import GLOBAL, LOCAL
@@ -82,6 +83,7 @@ class SearchResult:
     interrupted: bool
     setup: Setup
     solutions: tuple[Solution, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def chosen(self) -> Solution:
@@ -120,6 +122,7 @@ class SearchResult:
             "impossible_designs": self.impossible,
             "algorithm": self.algorithm,
             "stopped_because": self.stopped_because,
+            "notes": list(self.notes),
         }
 
     def to_frame(self):
@@ -180,7 +183,18 @@ def search(study: Study, seed: int = 1, progress: Progress = lambda stage: None,
         interrupted=interrupted,
         setup=setup,
         solutions=tuple(solved),
+        notes=_notes(study),
     )
+
+
+def _notes(study: Study) -> tuple[str, ...]:
+    """What is to be said of the study's effects."""
+    chosen = inclusion(study, "drive")
+    carried = (
+        "the effects found on the study's drive are carried over to every design: a radial one follows the pressure "
+        "angle, the others stay; the lag is without them"
+    )
+    return (*chosen.says, carried) if chosen.counted else chosen.says
 
 
 def method_of(setup: Setup, seed: int) -> Method:
@@ -277,7 +291,7 @@ def record(setup: Setup, design: Design, solution: Solution | None = None) -> De
             found[key] = quantity.value(setup.trade, design)
         except MissingValue:
             continue
-    if isinstance(design.drive.geometry.flexspline_teeth, int):
+    if setup.trade.added is None and isinstance(design.drive.geometry.flexspline_teeth, int):
         found[NOMINAL] = float(peak_to_peak_arcmin(design.drive, setup.trade.errors))
     limits = setup.limits() if solution is None else solution.problem.limits
     broken = tuple(str(x) for x in limits if x.quantity in found and x.excess(found[x.quantity]) > 1e-5)

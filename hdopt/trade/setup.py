@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hdopt.drive import Structure
 from hdopt.errors import HdoptError, MissingValue
+from hdopt.included import inclusion
 from hdopt.study import Study
 from hdopt.study.search import (
     DEFAULT_LIMITS,
@@ -18,6 +19,7 @@ from hdopt.study.search import (
     SearchSection,
     VariableSection,
 )
+from hdopt.trade.added import DesignEffects
 from hdopt.trade.bearing import BearingConstants
 from hdopt.trade.mesh import Mesh
 from hdopt.trade.problem import DesignProblem, Limit
@@ -138,7 +140,27 @@ def _trade(study: Study, section: SearchSection, seed: int) -> Trade:
         notch_factor=given.notch_factor,
         sample=sample_rows(study, section.samples, seed) if needs_sample else None,
         quantile=section.quantile,
+        added=_effects(study, section, needs_sample),
     )
+
+
+def _effects(study: Study, section: SearchSection, needs_sample: bool) -> DesignEffects | None:
+    """The effects that count: those of the drive, unless [operation] says otherwise."""
+    chosen = inclusion(study, "drive").counted
+    if not chosen:
+        return None
+    leave = "leave the effects out with operation.include=none"
+    if needs_sample:
+        raise HdoptError(
+            "a search under the tolerances does not compute effects, whose walk takes a hundred times longer; set "
+            f"search.robust=false with a nominal search.objective, or {leave}"
+        )
+    if section.size != "fixed_tooth_counts":
+        raise HdoptError(
+            f"search.size is {section.size!r}, which changes the ratio and with it the orders of the effects found; "
+            f"set search.size=fixed_tooth_counts, or {leave}"
+        )
+    return DesignEffects.of(study.drive, chosen, study.operation)
 
 
 def tolerance_problem(study: Study):

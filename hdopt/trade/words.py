@@ -53,6 +53,8 @@ def result_lines(result: SearchResult) -> Iterator[str]:
             f"  front of {front.objective} and {front.second}: {len(front.designs)} designs, "
             f"hypervolume {front.hypervolume:.4g}"
         )
+    for note in result.notes:
+        yield f"  note: {note}"
     yield f"  not modelled: {'; '.join(NOT_MODELLED)}"
 
 
