@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from hdopt.diagnosis.samples import Samples
@@ -41,10 +42,24 @@ class Noise:
 
     def whiten(self, values: Array) -> Array:
         """`values` (n,) or (n, q), filtered and weighted along the first axis."""
-        filtered = values.copy()
-        for lag, coefficient in enumerate(self.ar, start=1):
-            filtered[lag:] -= coefficient * values[:-lag]
-        return filtered * (self.root_weight if values.ndim == 1 else self.root_weight[:, None])
+        if not len(self.ar):
+            return values * (self.root_weight if values.ndim == 1 else self.root_weight[:, None])
+        table = np.ascontiguousarray(values.reshape(len(values), -1))
+        return _filtered(table, self.ar, self.root_weight).reshape(values.shape)
+
+
+@njit(cache=True)
+def _filtered(values, ar, root_weight):
+    """(x_t - sum a_k x_{t-k}) times the weight of row t, for each column of `values` (n, q)."""
+    rows, columns = values.shape
+    result = np.empty((rows, columns))
+    for t in range(rows):
+        for q in range(columns):
+            white = values[t, q]
+            for k in range(min(len(ar), t)):
+                white -= ar[k] * values[t - 1 - k, q]
+            result[t, q] = white * root_weight[t]
+    return result
 
 
 def estimate(samples: Samples, residual: Array, highest_order: int = HIGHEST_ORDER) -> Noise:

@@ -145,7 +145,8 @@ def _evaluate(theta, tip, tan_alpha, scale, advance, p, extra):
         e_l = motion.el_cos * c + motion.el_sin * s + motion.el_0
         t_a = motion.ta_cos * c + motion.ta_sin * s + motion.ta_0
         t_l = motion.tl_cos * c + motion.tl_sin * s + motion.tl_0
-        best, z, k, o, of = -math.inf, 1.0, 1.0, 0.0, 0.0
+        best, z, k, o = -math.inf, 1.0, 1.0, 0.0
+        so = co = sof = cof = 0.0
         for z_now in (1.0, -1.0):
             depth, o_now, of_now = rim_depth(tip, e_a, e_l, t_a, t_l, z_now, 1.0)
             depth_low, o_low, of_low = rim_depth(tip, e_a, e_l, t_a, t_l, z_now, -1.0)
@@ -154,18 +155,17 @@ def _evaluate(theta, tip, tan_alpha, scale, advance, p, extra):
                 depth, o_now, of_now, k_now = depth_low, o_low, of_low, -1.0
             # Offsets o and o': forward in zone 1, backward in zone 2; a half turn away there, unscaled.
             x, xf = z_now * o_now, z_now * of_now
-            cs = p[8] * (s * math.cos(x) + c * math.sin(x)) + p[9] * (c * math.cos(x) - s * math.sin(x))
-            fs = p[10] * (sf * math.cos(xf) + cf * math.sin(xf)) + p[11] * (cf * math.cos(xf) - sf * math.sin(xf))
-            tau = depth * tan_alpha + z_now * (cs + fs)
+            cos_x, sin_x, cos_xf, sin_xf = math.cos(x), math.sin(x), math.cos(xf), math.sin(xf)
+            cs_sin, cs_cos = s * cos_x + c * sin_x, c * cos_x - s * sin_x
+            fs_sin, fs_cos = sf * cos_xf + cf * sin_xf, cf * cos_xf - sf * sin_xf
+            tau = depth * tan_alpha + z_now * (p[8] * cs_sin + p[9] * cs_cos + (p[10] * fs_sin + p[11] * fs_cos))
             if has_extra:
                 tau += extra[0 if z_now > 0 else 1, i]
             if tau > best:
-                best, z, k, o, of = tau, z_now, k_now, o_now, of_now
+                best, z, k, o = tau, z_now, k_now, o_now
+                so, co, sof, cof = cs_sin, cs_cos, fs_sin, fs_cos
         value[i] = scale * best
         zone[i] = 0 if z > 0 else 1
-        x, xf = z * o, z * of
-        so, co = s * math.cos(x) + c * math.sin(x), c * math.cos(x) - s * math.sin(x)
-        sof, cof = sf * math.cos(xf) + cf * math.sin(xf), cf * math.cos(xf) - sf * math.sin(xf)
         # d tau = tan_alpha d depth + (d tau/d o) d o + (d tau/d o') d o', where o = q/flatness and o' = o - shift/L_W.
         slope_cs = p[8] * co - p[9] * so
         slope_fs = p[10] * cof - p[11] * sof
