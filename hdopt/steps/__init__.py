@@ -70,6 +70,7 @@ STEPS: dict[str, StepPlace] = {
     "geometry": StepPlace("hdopt.steps.geometry:geometry", ("drive", "export")),
     "search": StepPlace("hdopt.steps.search:search", ("search",)),
     "concealed_physics": StepPlace("hdopt.studies.concealed_physics:concealed_physics"),
+    "real_residuals": StepPlace("hdopt.studies.real_residuals:real_residuals"),
     "paper_reproduction": StepPlace("hdopt.studies.paper_reproduction:paper_reproduction"),
 }
 """Every step, in the order of a report; a step is imported only when a study asks for it."""

@@ -30,6 +30,7 @@ SECTIONS: dict[str, str] = {
     "allocate": "hdopt.study.costs:AllocateSection",
     "export": "hdopt.study.export:ExportSection",
     "concealed": "hdopt.study.concealed:ConcealedSection",
+    "residuals": "hdopt.study.residuals:ResidualsSection",
     "search": "hdopt.study.search:SearchSection",
 }
 """Section -> where its model is; a model is imported only when a study has the section."""

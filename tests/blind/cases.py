@@ -135,7 +135,7 @@ def _attempt(spec, name, rng):
     deaf = {"reversal", "speeds"} if spec.trouble == "one way" else set()
     target = spec.severity * base_rms
     sized = [
-        (_as_if_reversed if physics.needs & deaf and hasattr(physics, "scale_for") else _scaled_to)(
+        (_as_if_reversed if physics.needs & deaf and hasattr(physics, "scale_for") else scaled_to)(
             physics, setups, target
         )
         for physics in (hidden if target else [])
@@ -188,7 +188,7 @@ def _plans(spec, hidden, rng):
     return plans
 
 
-def _scaled_to(physics, setups, target):
+def scaled_to(physics, setups, target):
     """`physics` scaled to an rms of `target` (rad), and its waves; None where it cannot be so large."""
     scale = physics.scale
     for _ in range(25):

@@ -1,0 +1,154 @@
+"""Put known physics on the residuals of real recordings, have it diagnosed, and show what was said, case by case."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from hdopt.errors import HdoptError
+from hdopt.report import Section, Table, Text
+from hdopt.steps import Context, StepResult
+from hdopt.study import Study
+
+REVERSING = "planetary-7to1-reversing.csv"
+REVERSING_COLUMNS = "time=time_s:s,input=odrive_pos_rad:rad,output=output_pos_rad:rad"
+REVERSING_RATIO = 7.2
+TRAILS = "csf-17-100-mount.csv"
+TRAIL_COLUMNS = ("altair", "trail2_V6.25", "omi_aql")
+
+
+def recordings_folder() -> Path:
+    """Where the real recordings are: $HDOPT_RECORDINGS, else ../shared/recordings."""
+    for path in (os.environ.get("HDOPT_RECORDINGS"), "../shared/recordings"):
+        if path and Path(path).is_dir():
+            return Path(path)
+    raise HdoptError(
+        "no recordings: real-residuals works on recordings of others, which are not part of hdopt; set "
+        "HDOPT_RECORDINGS to their folder"
+    )
+
+
+def real_residuals(study: Study, context: Context) -> StepResult:
+    """How often known physics is named in real noise, by severity, and how often physics that is not there.
+
+    Three kinds of cases: a reversing actuator's own motion and residual, and a simulated drive whose only noise is that
+    residual, or the difference between star trails of one exposure, scaled to a share of the drive's error.
+    """
+    import pandas as pd
+
+    size = study.section("residuals", "real-residuals")
+    cases = pd.DataFrame(list(answered_cases(study.drive, size, recordings_folder(), context.seed)))
+    table = (
+        cases.groupby(["noise", "severity"])
+        .agg(
+            cases=("hidden", "size"),
+            exact=("exact", "sum"),
+            among=("among", "sum"),
+            unknown=("unknown", "sum"),
+            wrong=("wrong", "sum"),
+        )
+        .reset_index()
+    )
+    missed = cases[~cases.exact]
+    section = Section(
+        "real-residuals",
+        "Known physics in real noise",
+        (
+            Table(
+                "residuals-summary",
+                "Answered exactly, among the explanations offered, unknown, or named wrongly",
+                table,
+            ),
+            *((Table("residuals-missed", "Every case not answered exactly", missed),) if len(missed) else ()),
+            Text(
+                "Severity is the hidden rms in units of the real residual's (real motion) or of the drive's own error."
+            ),
+        ),
+    )
+    says = [*table.to_string(index=False).splitlines(), "not answered exactly:"]
+    says += (
+        missed[["noise", "hidden", "severity", "verdict", "said"]].to_string(index=False).splitlines()
+        if len(missed)
+        else ["none"]
+    )
+    results = {"summary": table.to_dict("records"), "cases": cases.to_dict("records")}
+    return StepResult((section,), results, says=tuple(says))
+
+
+def answered_cases(drive, size, folder: Path, seed: int) -> Iterator[dict[str, object]]:
+    """Every case with what was hidden and what was said. `wrong` is a name (or `unknown`) for what is not there."""
+    if Path("tests/blind").is_dir() and str(Path.cwd()) not in sys.path:
+        sys.path.insert(0, str(Path.cwd()))
+    try:
+        from tests.blind.cases import CATALOGUE
+        from tests.blind.real_residuals import ON_REAL_MOTION, on_real_motion, on_simulated_drive
+    except ImportError as error:
+        raise HdoptError(
+            "real-residuals needs the simulated bench in tests/blind; run it in the folder of a checkout of hdopt"
+        ) from error
+    from hdopt.diagnosis import diagnose
+    from hdopt.recording import recording_from_table
+
+    rng = np.random.default_rng(size.seed)
+    real = actuator_residual(folder)
+
+    def plan(effects):
+        wanted = [name for name in effects if not size.effects or name in size.effects]
+        return [("", 0.0)] * size.nothing + [(name, severity) for name in wanted for severity in size.severities]
+
+    for effect, severity in plan(ON_REAL_MOTION):
+        recording = recording_from_table(on_real_motion(real, effect, severity, rng), real.ratio)
+        yield judged("actuator, its own motion", effect, severity, diagnose(recording, None, real.ratio, seed=seed))
+    for noise, residual in (
+        ("actuator, simulated drive", real.residual),
+        ("star trails, simulated drive", trails(folder)),
+    ):
+        for effect, severity in plan(CATALOGUE):
+            tables = on_simulated_drive(residual, effect, severity, size.noise_share, rng)
+            recordings = [recording_from_table(table, drive.geometry.ratio) for table in tables]
+            yield judged(noise, effect, severity, diagnose(recordings, drive, seed=seed))
+
+
+def judged(noise: str, hidden: str, severity: float, diagnosis) -> dict[str, object]:
+    """One case: answered exactly (nothing said where nothing is), among the explanations offered, `unknown`, or wrong:
+    a name for what is not there."""
+    said = tuple(sorted(found.id for found in diagnosis.effects))
+    truth = (hidden,) if hidden else ()
+    offered = {said, *(tuple(sorted(ids)) for ids in diagnosis.ambiguous_with)}
+    unknown = diagnosis.verdict == "unknown"
+    exact = said == truth and not unknown and diagnosis.verdict != "ambiguous"
+    return {
+        "noise": noise,
+        "hidden": hidden or "nothing",
+        "severity": severity,
+        "verdict": diagnosis.verdict,
+        "said": ", ".join(said),
+        "exact": exact,
+        "among": truth in offered and not unknown,
+        "unknown": unknown,
+        "wrong": bool(said) and truth not in offered,
+    }
+
+
+def actuator_residual(folder: Path):
+    """What the diagnosis leaves of the reversing actuator's recording, with its motion."""
+    from hdopt.diagnosis import diagnose
+    from hdopt.recording import read_recording
+    from tests.blind.real_residuals import RealResidual
+
+    recording = read_recording(folder / REVERSING, REVERSING_RATIO, REVERSING_COLUMNS)
+    fit = diagnose(recording, None, REVERSING_RATIO).evidence.selection.best.fit
+    samples = fit.problem.samples
+    return RealResidual(samples.time, samples.theta, fit.residual, REVERSING_RATIO)
+
+
+def trails(folder: Path):
+    """Reading noise of one star trail against the mean of the three, arcsec: the mount's motion is in all of them."""
+    import pandas as pd
+
+    table = pd.read_csv(folder / TRAILS)[list(TRAIL_COLUMNS)]
+    return (table[TRAIL_COLUMNS[0]] - table.mean(axis=1)).to_numpy()

@@ -1,0 +1,64 @@
+"""The study `real-residuals`: a small part of it on the real recordings, and how a case is judged."""
+
+import os
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from hdopt.errors import HdoptError
+from hdopt.steps import Context, find_step
+from hdopt.studies.real_residuals import judged, recordings_folder
+from hdopt.study import load_study
+
+
+@pytest.mark.slow
+@pytest.mark.recordings
+def test_known_physics_in_real_noise(tmp_path, monkeypatch):
+    root = Path(__file__).resolve().parents[2]
+    folder = next(
+        (p for p in (os.environ.get("HDOPT_RECORDINGS"), root / "../shared/recordings") if p and Path(p).is_dir()), None
+    )
+    if folder is None:
+        pytest.skip("no recordings: set HDOPT_RECORDINGS to their folder")
+    monkeypatch.setenv("HDOPT_RECORDINGS", str(folder))
+    size = (
+        "residuals.nothing=1",
+        "residuals.severities=[1.0]",
+        'residuals.effects=["lost_motion", "channel_delay"]',
+    )
+    result = find_step("real_residuals")(load_study("real-residuals", size), Context(tmp_path))
+    cases = result.results["cases"]
+    assert len(cases) == 3 * (1 + 2)
+    assert not [case for case in cases if case["wrong"]]
+    assert all(case["among"] for case in cases if case["hidden"] != "nothing")
+
+
+def diagnosis(verdict, effects=(), ambiguous_with=()):
+    return SimpleNamespace(
+        verdict=verdict, effects=[SimpleNamespace(id=name) for name in effects], ambiguous_with=ambiguous_with
+    )
+
+
+@pytest.mark.parametrize(
+    ("hidden", "answer", "exact", "among", "unknown", "wrong"),
+    [
+        ("", diagnosis("adequate"), True, True, False, False),
+        ("", diagnosis("unknown"), False, False, True, False),
+        ("", diagnosis("named", ["hysteresis"]), False, False, False, True),
+        ("hysteresis", diagnosis("named", ["hysteresis"]), True, True, False, False),
+        ("hysteresis", diagnosis("ambiguous", ["lost_motion"], (("hysteresis",),)), False, True, False, False),
+        ("hysteresis", diagnosis("named", ["hysteresis", "lost_motion"]), False, False, False, True),
+        ("hysteresis", diagnosis("adequate"), False, False, False, False),
+    ],
+)
+def test_how_a_case_is_judged(hidden, answer, exact, among, unknown, wrong):
+    case = judged("noise", hidden, 0.5, answer)
+    assert (case["exact"], case["among"], case["unknown"], case["wrong"]) == (exact, among, unknown, wrong)
+
+
+def test_without_recordings_it_says_where_they_should_be(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("HDOPT_RECORDINGS", raising=False)
+    with pytest.raises(HdoptError, match="set HDOPT_RECORDINGS to their folder"):
+        recordings_folder()
