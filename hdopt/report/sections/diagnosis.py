@@ -1,111 +1,142 @@
-"""The diagnosis on a page: verdict, before and after, where the residual lives, what held-out turns say."""
+"""The diagnosis on a page: the verdict, what held-out data say of it, where the mismatch lives, what cannot be told."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from hdopt.diagnosis.verdict import TIE
-from hdopt.recording import TURN
-from hdopt.recording_sync import synchronous_average
 from hdopt.report import Figure, KeyFigures, Report, Section, Table, Text
-from hdopt.report.theme import BLUE, GREY, VERMILLION, figure
+from hdopt.report.sections.diagnosis_residual import extended_name, plain_numbers, residual_section
+from hdopt.report.sections.words import in_sentence, label, listed
+from hdopt.report.theme import BLUE, GREEN, GREY, figure
 
 if TYPE_CHECKING:
+    from hdopt.diagnosis.effect import Parameter
     from hdopt.diagnosis.verdict import Diagnosis
+
+NUMBERS = {"value": ".4g", "low": ".4g", "high": ".4g"}
 
 
 def diagnosis_report(diagnosis: Diagnosis, names: Sequence[str]) -> Report:
     """One page on a diagnosis."""
-    sections = [verdict_section(diagnosis), proof_section(diagnosis), residual_section(diagnosis)]
+    sections = [
+        verdict_section(diagnosis),
+        proof_section(diagnosis),
+        residual_section(diagnosis),
+        limits_section(diagnosis),
+    ]
     return Report("Diagnosis", f"Recordings: {', '.join(names)}", tuple(sections), diagnosis.to_dict())
 
 
 def verdict_section(diagnosis: Diagnosis) -> Section:
-    """The verdict, each effect with its parameters, what to measure next, the base's errors."""
+    """The verdict, each effect with its size and parameters, what else it could be, what to measure next."""
     import pandas as pd
 
-    items = [KeyFigures({"Verdict": diagnosis.verdict} | {f.id: f"{f.confidence:.2f}" for f in diagnosis.effects})]
+    key_figures = {"Verdict": diagnosis.verdict}
     for found in diagnosis.effects:
-        items.append(Text(found.says))
+        name = f"{label(found.id)}, confidence {100 * found.confidence:.0f} %"
+        key_figures[name] = f"{found.where['rms_arcmin']:.3g} arcmin rms"
+    if diagnosis.where is not None:
+        key_figures["Size"] = f"{diagnosis.where['rms_arcmin']:.3g} arcmin rms"
+        key_figures["Lives mostly in"] = str(diagnosis.where["domain"])
+    items = [KeyFigures(key_figures)]
+    for ids in diagnosis.ambiguous_with:
+        alone = " alone" if set(ids) < {found.id for found in diagnosis.effects} else ""
+        items.append(Text(f"As good an explanation: {listed([in_sentence(label(name)) for name in ids])}{alone}."))
+    if diagnosis.where is not None and diagnosis.where["orders_per_input_turn"]:
+        orders = listed([f"{order:g}" for order in diagnosis.where["orders_per_input_turn"]])
+        items.append(Text(f"Its strongest orders are {orders} cycles per input turn."))
     if diagnosis.separating_test:
         items.append(Text(f"What to measure next: {diagnosis.separating_test}."))
     rows = [
-        {"effect": found.id, "parameter": name, "value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
+        {"effect": label(found.id)} | parameter_row("parameter", name, parameter)
         for found in diagnosis.effects
-        for name, p in found.parameters.items()
+        for name, parameter in found.parameters.items()
     ]
-    formats = {"value": ".4g", "low": ".4g", "high": ".4g"}
     if rows:
-        items.append(Table("diagnosis-parameters", "Parameters, with 95 % intervals", pd.DataFrame(rows), "", formats))
-    confounded = [
-        {
-            "found": pair.effect,
-            "could be": pair.other,
-            "imitates": pair.imitates,
-            "angle": pair.angle_deg,
-            "log evidence apart": pair.evidence_apart,
-            "what would separate them": pair.separating,
-        }
-        for pair in diagnosis.confounded
-    ]
-    if confounded:
-        caption = (
-            "Imitates: share of the found effect's power that the other could take over. "
-            f"Angle: smallest one between the two. Below a log evidence of {TIE:g} this recording does not tell them "
-            "apart by their shape."
-        )
-        items.append(
-            Table(
-                "diagnosis-confounded",
-                "What could be mistaken for it",
-                pd.DataFrame(confounded),
-                caption,
-                {"imitates": ".1%", "angle": ".1f", "log evidence apart": ".1f"},
-            )
-        )
-    base = [
-        {"error": name, "value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
-        for name, p in diagnosis.base.parameters.items()
-    ]
-    if base:
-        open_ones = "; ".join(diagnosis.base.open_combinations)
-        caption = f"The recording leaves open: {open_ones}." if open_ones else ""
-        items.append(Table("diagnosis-base", "The drive's errors as fitted", pd.DataFrame(base), caption, formats))
-    if diagnosis.warnings:
-        items.append(Text("Notes: " + "; ".join(diagnosis.warnings) + "."))
-    return Section("diagnosis", "What was left out", tuple(items), diagnosis.says)
+        items.append(Table("diagnosis-parameters", "Parameters, with 95 % intervals", pd.DataFrame(rows), "", NUMBERS))
+    if diagnosis.confounded:
+        items += confounded_items(diagnosis)
+    return Section("diagnosis", "Verdict", tuple(items), diagnosis.says)
+
+
+def parameter_row(heading: str, name: str, parameter: Parameter) -> dict[str, object]:
+    """One row of a table of parameters; a pure number has no unit to show."""
+    unit = "" if parameter.unit == "1" else parameter.unit
+    return {heading: name, "value": parameter.value, "low": parameter.low, "high": parameter.high, "unit": unit}
+
+
+def confounded_items(diagnosis: Diagnosis) -> list[Table | Text]:
+    """What could be mistaken for the effects found on this recording, and what would part them."""
+    import pandas as pd
+
+    table = Table(
+        "diagnosis-confounded",
+        "What could be mistaken for it",
+        pd.DataFrame(
+            {
+                "found": [label(pair.effect) for pair in diagnosis.confounded],
+                "could be": [label(pair.other) for pair in diagnosis.confounded],
+                "imitates": [pair.imitates for pair in diagnosis.confounded],
+                "angle [deg]": [pair.angle_deg for pair in diagnosis.confounded],
+                "log evidence apart": [pair.evidence_apart for pair in diagnosis.confounded],
+            }
+        ),
+        "Imitates: share of the found effect's power that the other could take over. Angle: the smallest between their "
+        f"columns. Where the log evidence apart is below {TIE:g}, this recording does not tell them apart by their "
+        "shape: only how likely each is beforehand speaks for the one found.",
+        {"imitates": ".1%", "angle [deg]": ".1f", "log evidence apart": ".0f"},
+    )
+    separating = {label(pair.effect): pair.separating for pair in diagnosis.confounded}
+    return [table, *(Text(f"To tell {in_sentence(name)} apart: {test}.") for name, test in separating.items())]
 
 
 def proof_section(diagnosis: Diagnosis) -> Section:
-    """Held-out error of base, explanation, placebo and generic basis."""
+    """Held-out error of base, placebo, generic basis and explanation, over turns and over whole conditions."""
     import plotly.graph_objects as go
 
     fit = diagnosis.fit
     bars = {
-        "base": fit["heldout_rms_base_arcmin"],
-        "placebo": fit["heldout_rms_placebo_arcmin"],
-        "extended": fit["heldout_rms_extended_arcmin"],
-        "generic basis": fit["heldout_rms_generic_arcmin"],
-        "noise floor": fit["noise_floor_arcmin"],
+        "drive alone": (fit["heldout_rms_base_arcmin"], GREY),
+        "placebo": (fit["heldout_rms_placebo_arcmin"], GREY),
+        "generic basis": (fit["heldout_rms_generic_arcmin"], GREY),
+        "noise floor": (fit["noise_floor_arcmin"], GREEN),
     }
-    chart = figure("", "rms error on held-out turns [arcmin]")
-    chart.add_trace(go.Bar(x=list(bars), y=list(bars.values()), marker_color=[GREY, GREY, BLUE, GREY, GREY]))
+    extended = extended_name(diagnosis)
+    if extended:
+        bars[extended] = (fit["heldout_rms_extended_arcmin"], BLUE)
+    names = sorted(bars, key=lambda name: bars[name][0])
+    lengths = [bars[name][0] for name in names]
+    chart = figure("rms error on held-out turns [arcmin]", height=280)
+    chart.add_trace(
+        go.Bar(
+            x=lengths,
+            y=names,
+            orientation="h",
+            marker_color=[bars[name][1] for name in names],
+            text=[f"{length:.3g}" for length in lengths],
+            textposition="outside",
+            cliponaxis=False,
+        )
+    )
+    chart.update_xaxes(range=[0, 1.15 * max(lengths)], exponentformat="none")
     note = (
-        "Every bar is the error on whole input turns that the fit did not see. The placebo is the best other effect "
-        "of the catalogue; the generic basis is free of physics."
+        "Every bar is the error on whole input turns that the fit did not see. Placebo: the best other effect of the "
+        "catalogue. Generic basis: smooth curves and sines without physics. Noise floor: what is left with a "
+        "generic basis beside the best explanation."
     )
     items = [Figure("diagnosis-heldout", "Held-out error", chart, note)]
     if diagnosis.each_condition:
         items.append(conditions_figure(diagnosis))
-    return Section(
-        "diagnosis-proof",
-        "Does it hold on turns the fit never saw?",
-        tuple(items),
-        f"Chance of a false alarm over the whole catalogue: {fit['false_alarm_p']:.3g}.",
+    before, after = fit["heldout_rms_base_arcmin"], fit["heldout_rms_extended_arcmin"]
+    change = (
+        f"What was found takes the held-out error from {before:.3g} to {after:.3g} arcmin rms. "
+        if diagnosis.effects and extended
+        else ""
     )
+    intro = f"{change}Chance of a false alarm over the whole catalogue: {fit['false_alarm_p']:.3g}."
+    return Section("diagnosis-proof", "Does it hold on data the fit never saw?", tuple(items), intro)
 
 
 def conditions_figure(diagnosis: Diagnosis) -> Figure:
@@ -114,84 +145,44 @@ def conditions_figure(diagnosis: Diagnosis) -> Figure:
 
     names = list(diagnosis.each_condition)
     chart = figure("condition left out", "rms error on it [arcmin]")
-    for index, (label, colour) in enumerate((("base", GREY), ("extended", BLUE))):
+    extended = extended_name(diagnosis)
+    for index, (name, colour) in enumerate([("drive alone", GREY)] + ([(extended, BLUE)] if extended else [])):
         values = [errors[index] for errors in diagnosis.each_condition.values()]
-        chart.add_trace(go.Bar(x=names, y=values, name=label, marker_color=colour))
+        chart.add_trace(go.Bar(x=names, y=values, name=name, marker_color=colour))
     chart.update_layout(barmode="group")
     note = (
         "Each condition is predicted by the model refitted to the others, which is harder than a turn among its like: "
         "a wrong explanation may fit turns and fail here. A recording that was zeroed anew keeps its own zero."
     )
-    return Figure("diagnosis-conditions", "Conditions left out", chart, note)
+    return Figure("diagnosis-conditions", "Conditions left out", plain_numbers(chart), note)
 
 
-def residual_section(diagnosis: Diagnosis) -> Section:
-    """Residual before and after, over one input turn and by order, and its size by domain."""
+def limits_section(diagnosis: Diagnosis) -> Section:
+    """The drive's errors as fitted, what the recording leaves open, and what it would not have shown."""
     import pandas as pd
-    import plotly.graph_objects as go
 
-    selection = diagnosis.evidence.selection
-    base, best = selection.base, selection.best.fit
-    samples = base.problem.samples
-    items = []
-    if not samples.locked:
-        turn = figure("input angle [deg]", "mean over turns [arcmin]")
-        for name, fit, colour in (("before", base, VERMILLION), ("after", best, BLUE)):
-            angle, mean, _ = synchronous_average(samples.theta, fit.residual, TURN)
-            turn.add_trace(go.Scatter(x=np.degrees(angle), y=mean, name=name, line={"color": colour}))
-        items.append(Figure("diagnosis-turn", "Residual over one input turn", turn, "Averaged over all turns."))
-        from hdopt.diagnosis.probe import FitProbe
-
-        orders = np.arange(0, min(20.0, 0.4 * samples.rows_per_turn), 0.25 / max(samples.span_turns, 1.0))
-        spectrum = figure("cycles per input turn", "amplitude [arcmin]")
-        for name, fit, colour in (("before", base, VERMILLION), ("after", best, BLUE)):
-            amplitude = FitProbe(fit).spectrum(orders)
-            spectrum.add_trace(go.Scatter(x=orders, y=amplitude, name=name, line={"color": colour}))
-        items.append(Figure("diagnosis-spectrum", "Residual by order", spectrum, "Before and after the explanation."))
-        path = figure("output angle since the last reversal [deg]", "residual [arcmin]")
-        if samples.reverses:
-            for direction, colour in ((1, VERMILLION), (-1, BLUE)):
-                rows = (samples.direction == direction) & ~samples.first
-                if rows.sum() > 20:
-                    order = np.argsort(samples.travel[rows])
-                    parts = np.array_split(order, min(80, len(order)))
-                    x = [samples.travel[rows][p].mean() for p in parts]
-                    y = [base.residual[rows][p].mean() for p in parts]
-                    name = "forward" if direction > 0 else "backward"
-                    path.add_trace(go.Scatter(x=x, y=y, name=name, line={"color": colour}))
-            items.append(Figure("diagnosis-reversal", "Residual after reversals", path, "Before the explanation."))
-    for name, title, values in (
-        ("torque", "torque [Nm]", samples.torque),
-        ("speed", "input speed [rad/s]", samples.speed),
-        ("temperature", "temperature [deg C]", samples.temperature),
-        ("time", "time [s]", samples.time),
-    ):
-        if values is None or np.std(values) == 0:
-            continue
-        chart = figure(title, "residual [arcmin]")
-        order = np.argsort(values)
-        parts = np.array_split(order, min(100, len(order)))
-        for label, fit, colour in (("before", base, VERMILLION), ("after", best, BLUE)):
-            chart.add_trace(
-                go.Scatter(
-                    x=[values[p].mean() for p in parts],
-                    y=[fit.residual[p].mean() for p in parts],
-                    name=label,
-                    line={"color": colour},
-                )
-            )
-        items.append(
-            Figure(f"diagnosis-{name}", f"Residual over {name}", chart, "Means of a hundredth of the rows each.")
-        )
-    located = pd.DataFrame([location.to_dict() for location in diagnosis.located])
-    if len(located):
+    items: list[Table | Text] = []
+    base = [parameter_row("error", name, parameter) for name, parameter in diagnosis.base.parameters.items()]
+    if base:
+        caption = "With 95 % intervals."
+        if diagnosis.base.open_combinations:
+            caption += f" The recording leaves open: {'; '.join(diagnosis.base.open_combinations)}."
+        items.append(Table("diagnosis-base", "The drive's errors as fitted", pd.DataFrame(base), caption, NUMBERS))
+    if diagnosis.below_detection:
+        limits = sorted(diagnosis.below_detection.items(), key=lambda item: item[1])
         items.append(
             Table(
-                "diagnosis-located",
-                "Where the residual of the base lives",
-                located,
-                "p: chance that noise alone looks like this, by sign flips of whole turns.",
-                {"rms_arcmin": ".4f", "p": ".3f"},
+                "diagnosis-detection",
+                "What would have been seen",
+                pd.DataFrame(
+                    {
+                        "effect": [label(name) for name, _ in limits],
+                        "from [arcmin rms]": [limit for _, limit in limits],
+                    }
+                ),
+                "The smallest size of each other effect that this recording would have shown.",
+                {"from [arcmin rms]": ".2g"},
             )
         )
-    return Section("diagnosis-residual", "Where the mismatch lives", tuple(items))
+    items += [Text(f"Note: {warning}.") for warning in diagnosis.warnings]
+    return Section("diagnosis-limits", "What the recording cannot tell", tuple(items))

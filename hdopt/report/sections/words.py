@@ -12,6 +12,8 @@ def label(name: str) -> str:
         "one_way_minor": "One-way, minor axis",
         "automatic": "Automatic alignment",
         "two_disk": "Two-disk",
+        "cs_tooth_harmonics": "CS tooth harmonics",
+        "fs_tooth_harmonics": "FS tooth harmonics",
     }
     return known.get(name, name.replace("_", " ")[:1].upper() + name.replace("_", " ")[1:])
 

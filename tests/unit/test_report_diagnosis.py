@@ -1,0 +1,52 @@
+"""Pieces of the diagnosis report that compute something of their own."""
+
+import numpy as np
+import pytest
+
+from hdopt.diagnosis.confounding import Confounding
+from hdopt.diagnosis.effect import Parameter
+from hdopt.report.sections.diagnosis import confounded_items, parameter_row
+from hdopt.report.sections.diagnosis_residual import FEWEST, POINTS, continued, means_along
+
+
+def test_recordings_follow_one_another_in_time():
+    """Two recordings from 5 s and from 1 s on, 2 s and 3 s long: the second goes on at 2 s."""
+    time = np.array([5.0, 6.0, 7.0, 1.0, 2.0, 4.0])
+    record = np.array([0, 0, 0, 1, 1, 1])
+    np.testing.assert_allclose(continued(time, record), [0.0, 1.0, 2.0, 2.0, 3.0, 5.0])
+
+
+def test_means_keep_the_mean_of_all_rows():
+    """As many rows in each group, so the mean of the means is that of the rows."""
+    rng = np.random.default_rng(0)
+    values, residual = rng.normal(size=POINTS * 10), rng.normal(size=POINTS * 10)
+    x, y = means_along(values, residual)
+    assert len(x) == POINTS
+    assert np.all(np.diff(x) > 0)
+    assert y.mean() == pytest.approx(residual.mean())
+
+
+def test_means_in_the_logarithm_show_the_first_degrees_and_no_lone_row():
+    values = np.linspace(0, 1000, 10_000)
+    x, y = means_along(values, np.where(values < 10, 1.0, 0.0), spread_log=True)
+    assert np.sum(x < 10) >= 5
+    assert np.all(y[x < 9] == 1.0)
+    lone = np.r_[np.full(FEWEST - 1, 1.0), np.full(100, 50.0)]
+    assert means_along(lone, lone, spread_log=True)[0].tolist() == [50.0]
+
+
+def test_a_pure_number_shows_no_unit():
+    assert parameter_row("parameter", "lobes", Parameter(6, 6, 6, "1"))["unit"] == ""
+    assert parameter_row("parameter", "delay_s", Parameter(6, 6, 6, "s"))["unit"] == "s"
+
+
+def test_what_could_be_mistaken_is_said_once_for_each_effect():
+    class Told:
+        confounded = (
+            Confounding("lost_motion", "hysteresis", 2.0, 0.99, 3.0, "reverse slowly"),
+            Confounding("lost_motion", "channel_delay", 3.0, 0.9, 300.0, "reverse slowly"),
+        )
+
+    table, *texts = confounded_items(Told)
+    assert table.frame["could be"].tolist() == ["Hysteresis", "Channel delay"]
+    assert [text.text for text in texts] == ["To tell lost motion apart: reverse slowly."]
