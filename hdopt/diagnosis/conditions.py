@@ -2,7 +2,7 @@
 
 A condition is a level of speed, torque and temperature at which passes were run. A pass belongs to one condition
 whichever way it runs: with one direction left out, play, friction and delay are nothing but an offset, and nobody could
-predict the other from it.
+predict the other from it. Where the input is locked, the torque is what is swept and no level.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def find_conditions(samples: Samples) -> Conditions:
     if samples.speed is not None and not samples.locked:
         speed = usual(runs, np.abs(samples.speed))
         channels.append((speed, LEVEL * speed.max(), lambda value: f"{value * 60 / TURN:.3g} r/min"))
-    if samples.torque is not None:
+    if samples.torque is not None and not samples.locked:
         torque = usual(runs, samples.torque)
         channels.append((torque, LEVEL * float(np.abs(samples.torque).max()), lambda value: f"{value:.3g} Nm"))
     if samples.temperature is not None:

@@ -1,5 +1,7 @@
 """Whole operating conditions left out: which there are, and what a fit of the others says of each."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -91,3 +93,12 @@ def test_the_contract_holds_the_conditions(study):
     fit = result["fit"]
     assert fit["heldout_conditions_rms_extended_arcmin"] < 0.2 * fit["heldout_conditions_rms_base_arcmin"]
     assert [each["condition"] for each in result["heldout_conditions"]] == ["9.55 r/min", "47.7 r/min"]
+
+
+def test_a_torque_sweep_at_a_locked_input_is_one_condition(study):
+    """The loading branch lies at other torques than the unloading one; both are one sweep."""
+    samples = gather(bench(study, turns=6))
+    torque = np.where(samples.direction > 0, 10.0, -10.0)
+    turning = replace(samples, torque=torque)
+    assert len(find_conditions(turning)) == 2
+    assert len(find_conditions(replace(turning, locked=True))) == 1

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from hdopt.diagnosis.verdict import TIE
 from hdopt.report import Figure, KeyFigures, Report, Section, Table, Text
 from hdopt.report.sections.diagnosis_residual import extended_name, plain_numbers, residual_section
-from hdopt.report.sections.words import in_sentence, label, listed
+from hdopt.report.sections.words import in_sentence, label, listed, short
 from hdopt.report.theme import BLUE, GREEN, GREY, figure
 
 if TYPE_CHECKING:
@@ -36,9 +36,9 @@ def verdict_section(diagnosis: Diagnosis) -> Section:
     key_figures = {"Verdict": diagnosis.verdict}
     for found in diagnosis.effects:
         name = f"{label(found.id)}, confidence {100 * found.confidence:.0f} %"
-        key_figures[name] = f"{found.where['rms_arcmin']:.3g} arcmin rms"
+        key_figures[name] = f"{short(found.where['rms_arcmin'])} arcmin rms"
     if diagnosis.where is not None:
-        key_figures["Size"] = f"{diagnosis.where['rms_arcmin']:.3g} arcmin rms"
+        key_figures["Size"] = f"{short(diagnosis.where['rms_arcmin'])} arcmin rms"
         key_figures["Lives mostly in"] = str(diagnosis.where["domain"])
     items = [KeyFigures(key_figures)]
     for ids in diagnosis.ambiguous_with:
@@ -115,7 +115,7 @@ def proof_section(diagnosis: Diagnosis) -> Section:
             y=names,
             orientation="h",
             marker_color=[bars[name][1] for name in names],
-            text=[f"{length:.3g}" for length in lengths],
+            text=[short(length) for length in lengths],
             textposition="outside",
             cliponaxis=False,
         )
@@ -131,7 +131,7 @@ def proof_section(diagnosis: Diagnosis) -> Section:
         items.append(conditions_figure(diagnosis))
     before, after = fit["heldout_rms_base_arcmin"], fit["heldout_rms_extended_arcmin"]
     change = (
-        f"What was found takes the held-out error from {before:.3g} to {after:.3g} arcmin rms. "
+        f"What was found takes the held-out error from {short(before)} to {short(after)} arcmin rms. "
         if diagnosis.effects and extended
         else ""
     )
@@ -177,12 +177,16 @@ def limits_section(diagnosis: Diagnosis) -> Section:
                 pd.DataFrame(
                     {
                         "effect": [label(name) for name, _ in limits],
-                        "from [arcmin rms]": [limit for _, limit in limits],
+                        "from [arcmin rms]": [short(limit) for _, limit in limits],
                     }
                 ),
                 "The smallest size of each other effect that this recording would have shown.",
-                {"from [arcmin rms]": ".2g"},
             )
         )
-    items += [Text(f"Note: {warning}.") for warning in diagnosis.warnings]
+    lacking = diagnosis.evidence.lacking
+    if lacking:
+        frame = pd.DataFrame({"effect": [label(name) for name in lacking], "needs": list(lacking.values())})
+        items.append(Table("diagnosis-lacking", "What could not be seen at all", frame))
+    told = tuple(f"{name} cannot" for name in lacking)
+    items += [Text(f"Note: {warning}.") for warning in diagnosis.warnings if not warning.startswith(told)]
     return Section("diagnosis-limits", "What the recording cannot tell", tuple(items))

@@ -12,7 +12,7 @@ from hdopt.diagnosis.probe import FitProbe
 from hdopt.recording import TURN
 from hdopt.recording_sync import synchronous_average
 from hdopt.report import Figure, Section, Table
-from hdopt.report.sections.words import listed
+from hdopt.report.sections.words import listed, short
 from hdopt.report.theme import BLUE, GREY, VERMILLION, figure
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def residual_section(diagnosis: Diagnosis) -> Section:
         if made is not None and made.key not in shown:
             items.append(made)
             shown.add(made.key)
-    names = listed([f"{location.domain} ({location.rms_arcmin:.2g} arcmin rms)" for location in standing_out[:3]])
+    names = listed([f"{location.domain} ({short(location.rms_arcmin)} arcmin rms)" for location in standing_out[:3]])
     if not standing_out:
         intro = "Beside the model of the drive alone nothing stands out of the noise."
     elif len(fits) == 1:
@@ -94,7 +94,7 @@ def located_table(located: tuple[Location, ...]) -> Table:
         ),
         "p: chance that noise alone looks like this, by sign flips of whole turns (0.005 is the least it can be). "
         "Asynchronous orders are the strongest that were seen, so their p is too small.",
-        {"rms [arcmin]": ".4f", "p": ".3f"},
+        {"rms [arcmin]": ".4f" if located[0].rms_arcmin < 100 else ".1f", "p": ".3f"},
     )
 
 
