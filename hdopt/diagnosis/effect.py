@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from hdopt.diagnosis.samples import Samples
@@ -144,7 +145,17 @@ class Estimate:
 
 def sine_columns(phase: Array, harmonics: Sequence[float]) -> Array:
     """sin and cos of each multiple of `phase`, shape (n, 2 len(harmonics)): sin first."""
-    return np.column_stack([f(h * phase) for h in harmonics for f in (np.sin, np.cos)])
+    return _sines(np.ascontiguousarray(phase, float), np.asarray(harmonics, float))
+
+
+@njit(cache=True)
+def _sines(phase, harmonics):
+    columns = np.empty((len(phase), 2 * len(harmonics)))
+    for i in range(len(phase)):
+        for k in range(len(harmonics)):
+            columns[i, 2 * k] = math.sin(harmonics[k] * phase[i])
+            columns[i, 2 * k + 1] = math.cos(harmonics[k] * phase[i])
+    return columns
 
 
 def best_terms(probe: Probe, terms: Sequence[Term], keep: int = 1) -> list[Term]:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from hdopt.diagnosis.effect import sine_columns
+
 Array = NDArray[np.float64]
 
 
@@ -16,6 +18,6 @@ def zone_harmonics(phase: Array, harmonics: Sequence[int]) -> Array:
     sin(h (x + pi)) = (-1)^h sin(h x): even harmonics are alike in both zones, odd ones opposite (Jia 2021,
     Eqs. (31a), (31b), carried to h > 1).
     """
-    zone_1 = np.column_stack([f(h * phase) for h in harmonics for f in (np.sin, np.cos)])
+    zone_1 = sine_columns(phase, harmonics)
     sign = np.repeat([(-1.0) ** h for h in harmonics], 2)
     return np.stack([zone_1, zone_1 * sign])
