@@ -17,8 +17,8 @@ FLIPS = 199
 
 @dataclass(frozen=True)
 class Location:
-    """Structure in one domain: rms (arcmin) of what its smooth columns explain, and its p by sign flips of whole
-    turns.
+    """Structure in one domain: rms (arcmin) of what its smooth columns explain beside the model, and its p by sign
+    flips of whole turns.
     """
 
     domain: str
@@ -37,6 +37,7 @@ def locate(probe: FitProbe, rng: np.random.Generator) -> list[Location]:
     block = probe.samples.block
     signs = rng.choice([-1.0, 1.0], size=(FLIPS, int(block[-1]) + 1))
     found = []
+    taken = probe.fit.design()
     for domain in dict.fromkeys(domains):
         raw = columns[:, [i for i, d in enumerate(domains) if d == domain]]
         white = probe.project(probe.noise.whiten(raw))
@@ -50,5 +51,8 @@ def locate(probe: FitProbe, rng: np.random.Generator) -> list[Location]:
         flipped = signs @ scores
         gains = np.einsum("ri,ri->r", flipped, np.linalg.solve(gram, flipped.T).T)
         p = float((1 + np.sum(gains >= total @ solution)) / (1 + FLIPS))
-        found.append(Location(domain, float(np.std(raw / norm @ solution)), p))
+        # Of sums of columns that base and offsets nearly absorb, only what they leave is there to be seen.
+        explained = raw / norm @ solution
+        explained -= taken @ np.linalg.lstsq(taken, explained, rcond=None)[0]
+        found.append(Location(domain, float(np.std(explained)), p))
     return sorted(found, key=lambda location: -location.rms_arcmin)
