@@ -12,6 +12,7 @@ from hdopt.drive import Structure
 from hdopt.errors import HdoptError
 from hdopt.extended import ExtendedModel
 from hdopt.extended.extremes import peak_to_peak_arcmin
+from hdopt.run import run_study
 from hdopt.study import load_study
 from hdopt.trade import search
 from hdopt.trade.chosen import chosen_study_toml
@@ -120,3 +121,19 @@ def test_without_effects_nothing_changes(study_with):
     assert setup.trade.added is None
     assert replace(setup.trade).sample is None
     assert np.isfinite(find_quantity(NOMINAL).value(setup.trade, setup.baseline))
+
+
+@pytest.mark.slow
+def test_a_run_reports_a_nominal_search_with_effects(study_with, tmp_path):
+    """Also of a study with tolerances, whose quantile is verified though the search did not look at it."""
+    text = NARROW.replace('["integral", "automatic"]', '["integral"]').replace(
+        'second_objective = "flank_pressure_mpa"\n', "front_points = 2\n"
+    )
+    study = study_with(EFFECTS, {}, text + '[study]\nsteps = ["search"]\n')
+    result = run_study(study, tmp_path / "out")
+    page = result.report.read_text()
+    assert "Computed with cs_tooth_harmonics" in page
+    checked = result.steps["search"].results["verification"]
+    assert checked["exact_arcmin"] == pytest.approx(checked["kernel_arcmin"], abs=3e-3)
+    assert checked["searched_arcmin"] is None
+    assert checked["quantile_arcmin"] > 0

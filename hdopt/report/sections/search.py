@@ -387,8 +387,9 @@ def confidence_section(
         values |= {
             f"{100 * checked.quantile:g} % quantile, fresh drives": f"{checked.quantile_arcmin:.4f} arcmin",
             "its 95 % interval": f"{checked.low:.4f} to {checked.high:.4f}",
-            "in the search": f"{checked.searched_arcmin:.4f} arcmin",
         }
+    if checked.searched_arcmin is not None:
+        values["in the search"] = f"{checked.searched_arcmin:.4f} arcmin"
     frame = pd.DataFrame(
         [
             {
