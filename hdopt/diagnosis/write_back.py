@@ -42,6 +42,11 @@ def write_study(diagnosis: Diagnosis, drive: str, path: Path) -> None:
     said = {found.id: found for found in diagnosis.effects}
     for effect in effects:
         lines += ["", *_effect_lines(effect, said[effect.id], study.drive.geometry)]
+    for left in (found for name, found in said.items() if name not in {effect.id for effect in effects}):
+        lines += [
+            "",
+            f"# {left.says} Found in a torque sweep with the input locked: not in this model of a drive that turns.",
+        ]
     for other in diagnosis.ambiguous_with:
         lines += ["", f"# The recordings cannot tell these effects from: {' and '.join(other)}."]
     if diagnosis.where is not None:
@@ -59,7 +64,12 @@ def found_effects(diagnosis: Diagnosis) -> tuple[AddedEffect, ...]:
         fit = selection.best.fit
         for term, coefficients in zip(fit.terms, fit.coefficients, strict=True):
             fitted[term.effect] = AddedEffect.fitted(term, coefficients)
-    return tuple(fitted[found.id] for found in diagnosis.effects)
+    return tuple(fitted[found.id] for found in diagnosis.effects if not of_torque_sweep(fitted[found.id]))
+
+
+def of_torque_sweep(effect: AddedEffect) -> bool:
+    """Whether an effect was described by the torque of a locked input, which says nothing of a drive that turns."""
+    return "friction_nm" in effect.shape
 
 
 def _effect_lines(effect: AddedEffect, found: Found, gear: DriveGeometry) -> list[str]:

@@ -3,6 +3,8 @@
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,10 +13,10 @@ from effect_examples import EXAMPLES, NAMES, OPERATION, toml
 from hdopt.analysis import kinematic_error
 from hdopt.cli import main
 from hdopt.diagnosis import diagnose
-from hdopt.diagnosis.base import to_cartesian
+from hdopt.diagnosis.effect import Parameter, Term
 from hdopt.diagnosis.effects import EFFECTS
 from hdopt.diagnosis.effects.resonance import relative_response
-from hdopt.diagnosis.waveform import BaseModel
+from hdopt.diagnosis.verdict import Found
 from hdopt.diagnosis.write_back import found_effects, write_study
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.extended import AddedEffect, ExtendedModel, Operation
@@ -22,6 +24,7 @@ from hdopt.extended.effects import BENCH
 from hdopt.extended.extremes import peak_to_peak_arcmin
 from hdopt.extended_look import remarks
 from hdopt.included import extended_model, inclusion
+from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.kinematics.extremes import extremes_arcmin
 from hdopt.study import load_study
 from hdopt.study.effects import EFFECT_SECTIONS, effect_keys
@@ -42,6 +45,13 @@ def test_every_effect_of_the_catalogue_can_stand_in_a_study():
     assert list(EFFECT_SECTIONS) == list(EFFECTS)
     assert {name for name, _ in EXAMPLES} == set(EFFECTS)
     assert set(BENCH) <= set(EFFECTS)
+
+
+def test_the_conventions_list_every_effect_and_where_it_belongs():
+    lines = (Path(__file__).parents[2] / "docs" / "conventions.md").read_text().splitlines()
+    for name in EFFECTS:
+        (line,) = [line for line in lines if line.startswith(f"| `{name}` |")]
+        assert line.split(" | ")[3] == ("bench" if name in BENCH else "drive")
 
 
 @ALL
@@ -65,7 +75,7 @@ def test_waveform_is_the_base_with_the_columns_of_the_diagnosis(study_with, name
     (effect,) = study.effects
     if effect.follows_base:
         return  # has no value at single angles: see the test of the resonance
-    base = BaseModel.of(study.drive)
+    base = CartesianModel.of(study.drive)
     errors = to_cartesian(study.errors, study.drive.wave_generator.width / 2)
     theta = np.linspace(3.0, 400.0, 3001)
     for direction in model.operation.directions:
@@ -316,6 +326,49 @@ def test_fitted_effects_drop_what_only_began_a_recording():
     term = EFFECTS["hysteresis"].term(samples, {"transition_deg": 1.0, "maxwell": 0.0})
     assert term.width == 2
     assert AddedEffect.fitted(term, np.array([0.2, 0.7])).coefficients == (0.2,)
+
+
+def diagnosis_of(study, term, coefficients):
+    """As much of a diagnosis as `write_study` looks at, that found one effect in a backward motion."""
+    samples = Operation("backward", 20.0, math.pi, 5.0, 0.0).rows(80, np.linspace(1, 100, 500), -1.0, 100.0)
+    found = Found(
+        term.effect, 0.9, {}, {"size": Parameter(1.0, 0.9, 1.1, "um"), "lines": Parameter(6, 6, 6, "1")}, "Says."
+    )
+    fit = SimpleNamespace(terms=(term,), coefficients=(np.array(coefficients),))
+    selection = SimpleNamespace(best=SimpleNamespace(fit=fit))
+    errors = {key: Parameter(value, 0, 0, "") for key, value in study.data["errors"].items()}
+    return SimpleNamespace(
+        base=SimpleNamespace(parameters=errors),
+        effects=(found,),
+        evidence=SimpleNamespace(samples=samples, selection=selection, high=None),
+        ambiguous_with=(("tooth_mesh", "lost_motion"),),
+        where=None,
+    )
+
+
+@ALL
+def test_every_effect_is_written_back_and_read(study_with, tmp_path, name, keys):
+    study = study_with({name: keys})
+    (effect,) = study.effects
+    write_study(diagnosis_of(study, Term(name, effect.shape), effect.coefficients), "csf-25-80", tmp_path / "w.toml")
+    again = load_study(tmp_path / "w.toml")
+    assert again.effects[0].shape == pytest.approx(effect.shape, rel=1e-7)
+    assert again.effects[0].coefficients == pytest.approx(effect.coefficients, rel=1e-6, abs=1e-9)
+    np.testing.assert_allclose(again.errors.to_matrix(), study.errors.to_matrix(), rtol=1e-7)
+    assert again.operation == Operation("backward", 20.0, pytest.approx(math.pi, rel=1e-5), 0.0, 0.0)
+    text = (tmp_path / "w.toml").read_text()
+    assert "# Says." in text
+    assert "#   size = 1 um  (0.9 to 1.1)" in text
+    assert "#   lines = 6\n" in text
+    assert "# The recordings cannot tell these effects from: tooth_mesh and lost_motion." in text
+
+
+def test_friction_of_a_torque_sweep_stays_a_comment(tmp_path):
+    """It is known by torque, against a locked input; a drive that turns crosses over by angle."""
+    term = Term("hysteresis", {"friction_nm": 2.0, "knee_nm": 5.0})
+    write_study(diagnosis_of(load_study(), term, (1.0, 0.5)), "csf-25-80", tmp_path / "w.toml")
+    assert load_study(tmp_path / "w.toml").effects == ()
+    assert "# Says. Found in a torque sweep with the input locked" in (tmp_path / "w.toml").read_text()
 
 
 @pytest.mark.slow
