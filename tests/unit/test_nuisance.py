@@ -10,6 +10,8 @@ from hdopt.diagnosis.samples import gather
 from hdopt.errors import HdoptError
 from hdopt.kinematics.waveform import kinematic_error_arcmin
 from hdopt.recording import recording_from_table
+from hdopt.report import Table
+from hdopt.report.sections.diagnosis import diagnosis_report
 from hdopt.study import load_study
 
 TURN = 2 * np.pi
@@ -42,6 +44,12 @@ def test_nuisances_are_estimated_and_not_named(study):
     assert warp.low < 4.0 < warp.high
     assert warp.high - warp.low < 1.0
     assert diagnosis.to_dict()["base"]["nuisances"]["time_warp_deg"]["unit"] == "deg"
+
+
+def test_report_shows_what_was_fitted_beside_the_model(study):
+    report = diagnosis_report(diagnose(clockless(study, turns=12), study.drive, nuisance=BOTH), ["clockless.csv"])
+    tables = {item.key: item for section in report.sections for item in section.items if isinstance(item, Table)}
+    assert list(tables["diagnosis-nuisances"].frame.iloc[:, 0]) == ["drift_arcmin", "time_warp_deg"]
 
 
 def test_without_them_something_is_claimed(study):

@@ -168,6 +168,10 @@ def limits_section(diagnosis: Diagnosis) -> Section:
         if diagnosis.base.open_combinations:
             caption += f" The recording leaves open: {'; '.join(diagnosis.base.open_combinations)}."
         items.append(Table("diagnosis-base", "The drive's errors as fitted", pd.DataFrame(base), caption, NUMBERS))
+    beside = [parameter_row("nuisance", name, parameter) for name, parameter in diagnosis.nuisances.items()]
+    if beside:
+        caption = "Fitted beside every model and never named, with 95 % intervals; drift and warp from end to end."
+        items.append(Table("diagnosis-nuisances", "Nuisances", pd.DataFrame(beside), caption, NUMBERS))
     if diagnosis.below_detection:
         limits = sorted(diagnosis.below_detection.items(), key=lambda item: item[1])
         items.append(
