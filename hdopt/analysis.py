@@ -6,17 +6,20 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hdopt.bending import max_bending_stress, max_curvature_change
 from hdopt.contact import contact_angle, homogenization_coefficient, mean_flank_pressure, meshing_teeth
 from hdopt.errors import HdoptError, MissingValue
-from hdopt.extended_look import Look, extended_look, walked_extended_arcmin
-from hdopt.included import extended_model
 from hdopt.kinematics.extremes import extremes_arcmin, walked_peak_to_peak_arcmin
 from hdopt.kinematics.lag import lag
 from hdopt.kinematics.waveform import relative_turn
 from hdopt.profiles import perimeter_error, tip_radius_of_curvature
-from hdopt.spectrum import model_orders, order_spectrum
+from hdopt.spectrum import ModelOrder, model_orders, order_spectrum
 from hdopt.study import Study
+
+Array = NDArray[np.float64]
 
 SAMPLES_PER_TURN = 720
 
@@ -96,6 +99,22 @@ class _Notes:
             return None
 
 
+@dataclass(frozen=True)
+class Look:
+    """One drive's kinematic error: extremes (arcmin), the driving deviation's part evened out, and the waveform over
+    `theta` (rad) of one relative turn with the part that the zones drive; the orders worth a look; what effects add."""
+
+    low: float
+    high: float
+    nonuniform: float | None
+    theta: Array
+    waveform: Array
+    driven: Array
+    orders: tuple[ModelOrder, ...]
+    effects: tuple[dict[str, Any], ...] = ()
+    notes: tuple[str, ...] = ()
+
+
 def kinematic_error(
     study: Study, sampling_deg: float | None = None, turns: float | None = None
 ) -> KinematicErrorResult:
@@ -111,11 +130,15 @@ def kinematic_error(
     angle = notes.value(contact_angle, gear, drive.wave_generator.profile)
     teeth = None if angle is None else meshing_teeth(gear, angle)
     k_e = None if teeth is None else homogenization_coefficient(teeth)
-    model = extended_model(study)
-    base_low, base_high = extremes_arcmin(drive, errors, "exact")
     if study.effects:
+        from hdopt.extended_look import extended_look
+        from hdopt.included import extended_model
+
+        model = extended_model(study)
+        base_low, base_high = extremes_arcmin(drive, errors, "exact")
         look = extended_look(study, model, base_high - base_low, k_e)
     else:
+        base_low, base_high = extremes_arcmin(drive, errors, "exact")
         theta, waveform = relative_turn(drive, errors, SAMPLES_PER_TURN, "exact")
         nonuniform = None if k_e is None else k_e * (base_high - base_low)
         look = Look(base_low, base_high, nonuniform, theta, waveform, waveform, model_orders(gear.ratio))
@@ -165,6 +188,9 @@ def _sampled(study: Study, sampling_deg: float | None, turns: float | None) -> f
             f"{turns:g} turns every {sampling_deg:g} deg are more than 1e7 angles; take a coarser grid or fewer turns"
         )
     if study.effects:
+        from hdopt.extended_look import walked_extended_arcmin
+        from hdopt.included import extended_model
+
         return walked_extended_arcmin(extended_model(study), math.radians(sampling_deg), turns)
     return walked_peak_to_peak_arcmin(study.drive, study.errors, math.radians(sampling_deg), turns)
 

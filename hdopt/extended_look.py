@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hdopt.analysis import Look
 from hdopt.extended import AddedEffect, ExtendedModel
 from hdopt.extended.extremes import extremes_arcmin, peak_to_peak_arcmin
 from hdopt.included import Inclusion, inclusion
@@ -23,22 +24,6 @@ Array = NDArray[np.float64]
 SAME_ORDER = 1e-9
 PER_CYCLE = 4
 """Samples in a cycle below which an order is left out of the spectrum."""
-
-
-@dataclass(frozen=True)
-class Look:
-    """One drive's kinematic error: extremes (arcmin), the driving deviation's part evened out, and the waveform over
-    `theta` (rad) of one relative turn with the part that the zones drive; the orders worth a look; what effects add."""
-
-    low: float
-    high: float
-    nonuniform: float | None
-    theta: Array
-    waveform: Array
-    driven: Array
-    orders: tuple[ModelOrder, ...]
-    effects: tuple[dict[str, Any], ...] = ()
-    notes: tuple[str, ...] = ()
 
 
 def extended_look(study: Study, model: ExtendedModel, base_peak_to_peak: float, k_e: float | None) -> Look:

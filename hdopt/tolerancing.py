@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from hdopt.engine import Engine
 from hdopt.errors import HdoptError, unknown_name
-from hdopt.included import inclusion
 from hdopt.study import Study, load_study
 from hdopt.tolerance.drive_inputs import DriveResponse, drive_problem
 from hdopt.tolerance.response import Response
@@ -117,6 +116,8 @@ def with_effects(study: Study, response: DriveResponse) -> tuple[Response, tuple
     """
     if not study.effects:
         return response, ()
+    from hdopt.included import inclusion
+
     chosen = inclusion(study, "drive")
     if not chosen.counted:
         return response, chosen.says

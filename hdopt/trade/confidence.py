@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hdopt.drive import Drive
-from hdopt.extended import ExtendedModel
-from hdopt.extended.extremes import extremes_arcmin as extended_extremes_arcmin
-from hdopt.extended.many import matrix_peak_to_peak_arcmin
 from hdopt.kinematics.extremes import extremes_arcmin
 from hdopt.study import Study
-from hdopt.trade.added import DesignEffects
 from hdopt.trade.bearing import SOURCES
 from hdopt.trade.quantities import find_quantity
 from hdopt.trade.run import DesignRecord, SearchResult, choose, method_of, record_of
 from hdopt.trade.setup import Setup, tolerance_problem, with_trade
 from hdopt.trade.solve import Solution, solve
+
+if TYPE_CHECKING:
+    from hdopt.trade.added import DesignEffects
 
 Array = NDArray[np.float64]
 
@@ -169,6 +168,9 @@ def verify(study: Study, result: SearchResult, seed: int) -> Verification:
     if added is None:
         low, high = extremes_arcmin(drive, study.errors, "exact")
     else:
+        from hdopt.extended import ExtendedModel
+        from hdopt.extended.extremes import extremes_arcmin as extended_extremes_arcmin
+
         low, high = extended_extremes_arcmin(ExtendedModel(drive, study.errors, added.at(drive), added.operation))
     kernel = result.best.quantities.get("peak_to_peak_arcmin", float("nan"))
     if "tolerances" not in study.sections:
@@ -200,6 +202,8 @@ def quantile_blocks(
         if added is None:
             spans = peak_to_peak_arcmin(drive, errors)
         else:
+            from hdopt.extended.many import matrix_peak_to_peak_arcmin
+
             spans = matrix_peak_to_peak_arcmin(drive, errors.to_matrix(), added.table(drive))
         values.append(np.quantile(spans, quantile))
     return np.array(values)

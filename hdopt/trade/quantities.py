@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +23,13 @@ from hdopt.errors import HdoptError, MissingValue, unknown_name
 from hdopt.kinematics.closed_form import tip_geometry
 from hdopt.kinematics.kernel import peak_to_peak_block
 from hdopt.kinematics.lag import cross_slide_lag_arcmin
-from hdopt.trade.added import DesignEffects
 from hdopt.trade.bearing import BearingConstants, axial_force, bearing_life_h, bearing_load, radial_force, ring_force
 from hdopt.trade.envelope import extremes_of
 from hdopt.trade.halves import in_parts
 from hdopt.trade.space import Combination, Design, DesignSpace
+
+if TYPE_CHECKING:
+    from hdopt.trade.added import DesignEffects
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from hdopt.errors import MissingValue
-from hdopt.included import inclusion
 from hdopt.study import Study
 from hdopt.trade.front import front, front_ends, hypervolume, pareto
 from hdopt.trade.minimax import GLOBAL, LOCAL
@@ -189,6 +188,10 @@ def search(study: Study, seed: int = 1, progress: Progress = lambda stage: None,
 
 def _notes(study: Study) -> tuple[str, ...]:
     """What is to be said of the study's effects."""
+    if not study.effects:
+        return ()
+    from hdopt.included import inclusion
+
     chosen = inclusion(study, "drive")
     carried = (
         "the effects found on the study's drive are carried over to every design: a radial one follows the pressure "

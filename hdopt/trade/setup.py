@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hdopt.drive import Structure
 from hdopt.errors import HdoptError, MissingValue
-from hdopt.included import inclusion
 from hdopt.study import Study
 from hdopt.study.search import (
     DEFAULT_LIMITS,
@@ -19,12 +19,14 @@ from hdopt.study.search import (
     SearchSection,
     VariableSection,
 )
-from hdopt.trade.added import DesignEffects
 from hdopt.trade.bearing import BearingConstants
 from hdopt.trade.mesh import Mesh
 from hdopt.trade.problem import DesignProblem, Limit
 from hdopt.trade.quantities import Trade, find_quantity
 from hdopt.trade.space import OWN_VARIABLES, SIZE_RULES, Combination, Design, DesignSpace, Variable
+
+if TYPE_CHECKING:
+    from hdopt.trade.added import DesignEffects
 
 RPM = 2 * math.pi / 60
 DEFAULT_WRAP_DEG = 60.0
@@ -146,6 +148,11 @@ def _trade(study: Study, section: SearchSection, seed: int) -> Trade:
 
 def _effects(study: Study, section: SearchSection, needs_sample: bool) -> DesignEffects | None:
     """The effects that count: those of the drive, unless [operation] says otherwise."""
+    if not study.effects:
+        return None
+    from hdopt.included import inclusion
+    from hdopt.trade.added import DesignEffects
+
     chosen = inclusion(study, "drive").counted
     if not chosen:
         return None
