@@ -63,6 +63,15 @@ def test_play_is_crossed_where_the_torque_changes_sign():
     assert diagnosis.effects[0].parameters["lost_motion_arcmin"].value == pytest.approx(2.0, rel=0.02)
 
 
+def test_input_that_trembles_without_torque_shows_nothing():
+    angle = 0.01 * np.random.default_rng(2).standard_normal(600)
+    error = 0.01 * np.random.default_rng(3).standard_normal(600)
+    table = pd.DataFrame({"angle": angle, "error": error})
+    diagnosis = diagnose(recording_from_table(table, 80.0, "input=angle:deg,error=error:arcmin"), None, 80.0)
+    assert diagnosis.effects == ()
+    assert any("lost_motion cannot be seen" in warning for warning in diagnosis.warnings)
+
+
 def test_model_predicts_another_sweep():
     diagnosis = diagnose(sweep(friction=8.0), None, 80.0)
     recorded, expected = predict(diagnosis, sweep(friction=8.0, seed=1))

@@ -23,7 +23,8 @@ class LostMotion:
 
     def lacks(self, samples):
         if samples.locked:
-            return None if np.min(samples.torque) < 0 < np.max(samples.torque) else "torque of both signs"
+            crossed = samples.torque is not None and np.min(samples.torque) < 0 < np.max(samples.torque)
+            return None if crossed else "torque of both signs"
         return None if samples.reverses else "a reversal"
 
     def search(self, probe):
