@@ -25,11 +25,11 @@ def test_known_physics_in_real_noise(tmp_path, monkeypatch):
     size = (
         "residuals.nothing=1",
         "residuals.severities=[1.0]",
-        'residuals.effects=["lost_motion", "channel_delay"]',
+        'residuals.effects=["lost_motion"]',
     )
     result = find_step("real_residuals")(load_study("real-residuals", size), Context(tmp_path))
     cases = result.results["cases"]
-    assert len(cases) == 3 * (1 + 2)
+    assert len(cases) == 3 * (1 + 1)
     assert not [case for case in cases if case["wrong"]]
     assert all(case["among"] for case in cases if case["hidden"] != "nothing")
 
