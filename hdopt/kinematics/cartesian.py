@@ -104,43 +104,63 @@ class CartesianModel:
         """b/2 of the wave generator, mm."""
         return self.tip.half_width
 
+    def rotation(self, theta: Array) -> Array:
+        """cos and sin of the input angle (n,) rad, and of the FS teeth's advance: (n, 4), for `evaluate_at`."""
+        advance = self.advance * np.asarray(theta, float)
+        return np.column_stack([np.cos(theta), np.sin(theta), np.cos(advance), np.sin(advance)])
+
     def evaluate(
         self, theta: Array, errors: Array, extra: Array | None = None
     ) -> tuple[Array, NDArray[np.int64], Array]:
-        """KE (arcmin, n), the driving zone (0 or 1, n) and dKE/derrors (arcmin/mm, n x 12).
+        """`evaluate_at` for input angles `theta` (n,) rad."""
+        return self.evaluate_at(self.rotation(theta), errors, extra)
 
-        `theta` (n,) rad, `errors` (12,) mm. `extra` (2, n) in mm is added to the deviation of each zone before the
+    def evaluate_at(
+        self, rotation: Array, errors: Array, extra: Array | None = None
+    ) -> tuple[Array, NDArray[np.int64], Array]:
+        """KE (arcmin, n), the driving zone (0 or 1, n) and dKE/derrors (arcmin/mm, n x 12) at a `rotation` (n, 4).
+
+        `errors` (12,) mm. `extra` (2, n) in mm is added to the deviation of each zone before the
         larger one is taken. The slope is that of the branch that drives: it jumps where the zone or the rim changes.
         """
-        theta = np.ascontiguousarray(theta, float)
         if extra is None:
             extra = np.zeros((2, 1))
         return _evaluate(
-            theta,
+            rotation,
             self.tip,
             self.tan_alpha,
             self.arcmin_per_mm,
-            self.advance,
             np.asarray(errors, float),
             np.ascontiguousarray(extra),
         )
 
 
-@njit(cache=True)
-def _evaluate(theta, tip, tan_alpha, scale, advance, p, extra):
+@njit(cache=True, error_model="numpy")
+def _sine_cosine(x):
+    """sin and cos; below 0.05 rad, where every real drive's offsets lie, by series to 1e-14."""
+    if abs(x) > 0.05:
+        return math.sin(x), math.cos(x)
+    y = x * x
+    return (
+        x * (1 - y / 6 * (1 - y / 20 * (1 - y / 42 * (1 - y / 72)))),
+        1 - y / 2 * (1 - y / 12 * (1 - y / 30 * (1 - y / 56))),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _evaluate(rotation, tip, tan_alpha, scale, p, extra):
     half_width, tilt_gain = tip.half_width, (tip.semi_major + tip.tip_radius) / 2 / tip.half_width**2
-    flatness, bow = tip.semi_major - tip.tip_radius, tip.semi_major / 2 / tip.half_width**2
+    per_flatness, bow = 1 / (tip.semi_major - tip.tip_radius), tip.semi_major / 2 / tip.half_width**2
     motion = rigid_motion(
         tip, p[0], p[1], p[2] / half_width, p[3] / half_width, p[4], p[5], p[6] / half_width, p[7] / half_width
     )
-    n = len(theta)
+    n = len(rotation)
     value = np.empty(n)
     zone = np.empty(n, np.int64)
     jacobian = np.empty((n, 12))
     has_extra = extra.shape[1] == n
     for i in range(n):
-        c, s = math.cos(theta[i]), math.sin(theta[i])
-        cf, sf = math.cos(advance * theta[i]), math.sin(advance * theta[i])
+        c, s, cf, sf = rotation[i, 0], rotation[i, 1], rotation[i, 2], rotation[i, 3]
         e_a = motion.ea_cos * c + motion.ea_sin * s + motion.ea_0
         e_l = motion.el_cos * c + motion.el_sin * s + motion.el_0
         t_a = motion.ta_cos * c + motion.ta_sin * s + motion.ta_0
@@ -154,46 +174,37 @@ def _evaluate(theta, tip, tan_alpha, scale, advance, p, extra):
             if depth_low > depth:
                 depth, o_now, of_now, k_now = depth_low, o_low, of_low, -1.0
             # Offsets o and o': forward in zone 1, backward in zone 2; a half turn away there, unscaled.
-            x, xf = z_now * o_now, z_now * of_now
-            cos_x, sin_x, cos_xf, sin_xf = math.cos(x), math.sin(x), math.cos(xf), math.sin(xf)
-            cs_sin, cs_cos = s * cos_x + c * sin_x, c * cos_x - s * sin_x
-            fs_sin, fs_cos = sf * cos_xf + cf * sin_xf, cf * cos_xf - sf * sin_xf
-            tau = depth * tan_alpha + z_now * (p[8] * cs_sin + p[9] * cs_cos + (p[10] * fs_sin + p[11] * fs_cos))
+            sin_x, cos_x = _sine_cosine(z_now * o_now)
+            sin_xf, cos_xf = _sine_cosine(z_now * of_now)
+            so_now, co_now = s * cos_x + c * sin_x, c * cos_x - s * sin_x
+            sof_now, cof_now = sf * cos_xf + cf * sin_xf, cf * cos_xf - sf * sin_xf
+            teeth = p[8] * so_now + p[9] * co_now + p[10] * sof_now + p[11] * cof_now
+            tau = depth * tan_alpha + z_now * teeth
             if has_extra:
                 tau += extra[0 if z_now > 0 else 1, i]
             if tau > best:
                 best, z, k, o = tau, z_now, k_now, o_now
-                so, co, sof, cof = cs_sin, cs_cos, fs_sin, fs_cos
+                so, co, sof, cof = so_now, co_now, sof_now, cof_now
         value[i] = scale * best
         zone[i] = 0 if z > 0 else 1
-        # d tau = tan_alpha d depth + (d tau/d o) d o + (d tau/d o') d o', where o = q/flatness and o' = o - shift/L_W.
+        # d tau = tan_alpha d depth + (d tau/d o) d o + (d tau/d o') d o', where o = q/flatness and o' = o - shift/L_W,
+        # first by the motions e_a, e_l, t_a, t_l of the rim.
         slope_cs = p[8] * co - p[9] * so
         slope_fs = p[10] * cof - p[11] * sof
-        by_q = tan_alpha * o + (slope_cs + slope_fs) / flatness
-        by_shift = -slope_fs / tip.semi_major
-        for j in range(8):
-            de_a = de_l = dt_a = dt_l = 0.0
-            if j == 0:
-                de_a, de_l = tip.passes_major * s, tip.passes_minor * c
-            elif j == 1:
-                de_a, de_l = tip.passes_major * c, -tip.passes_minor * s
-            elif j == 2:
-                dt_a, dt_l = s, c
-            elif j == 3:
-                dt_a, dt_l = c, -s
-            elif j == 4:
-                de_a = tip.passes_major
-            elif j == 5:
-                de_l = tip.passes_minor
-            elif j == 6:
-                dt_a = 1.0
-            else:
-                dt_l = 1.0
-            dshift = de_l + z * k * dt_l
-            dq = dshift - z * tilt_gain * (t_a * dt_l + dt_a * t_l)
-            jacobian[i, j] = scale * (
-                tan_alpha * (z * de_a + k * dt_a - 2 * bow * t_a * dt_a) + by_q * dq + by_shift * dshift
-            )
+        by_q = tan_alpha * o + (slope_cs + slope_fs) * per_flatness
+        by_shift = by_q - slope_fs / tip.semi_major
+        by_e_a = scale * tan_alpha * z * tip.passes_major
+        by_e_l = scale * by_shift * tip.passes_minor
+        by_t_a = scale * (tan_alpha * (k - 2 * bow * t_a) - by_q * z * tilt_gain * t_l)
+        by_t_l = scale * (by_shift * z * k - by_q * z * tilt_gain * t_a)
+        jacobian[i, 0] = by_e_a * s + by_e_l * c
+        jacobian[i, 1] = by_e_a * c - by_e_l * s
+        jacobian[i, 2] = by_t_a * s + by_t_l * c
+        jacobian[i, 3] = by_t_a * c - by_t_l * s
+        jacobian[i, 4] = by_e_a
+        jacobian[i, 5] = by_e_l
+        jacobian[i, 6] = by_t_a
+        jacobian[i, 7] = by_t_l
         jacobian[i, 8] = scale * z * so
         jacobian[i, 9] = scale * z * co
         jacobian[i, 10] = scale * z * sof
