@@ -18,6 +18,10 @@ from hdopt.diagnosis.samples import Samples
 Array = NDArray[np.float64]
 
 HIGHEST_ORDER = 4
+STEADIEST = 0.7
+"""Largest size of an oscillating pole: beyond it the noise model would swallow a narrow line (mains, a whirling shaft)
+that has to stay visible. Slow wander, a real positive pole, is noise at any size.
+"""
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,7 @@ class Noise:
         return _filtered(table, self.ar, self.root_weight).reshape(values.shape)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _filtered(values, ar, root_weight):
     """(x_t - sum a_k x_{t-k}) times the weight of row t, for each column of `values` (n, q)."""
     rows, columns = values.shape
@@ -60,6 +64,15 @@ def _filtered(values, ar, root_weight):
                 white -= ar[k] * values[t - 1 - k, q]
             result[t, q] = white * root_weight[t]
     return result
+
+
+def without_lines(ar: Array) -> Array:
+    """`ar` with its oscillating poles drawn in to `STEADIEST`: a pole near the unit circle is a line, not noise."""
+    poles = np.roots(np.r_[1.0, -ar])
+    size = np.abs(poles)
+    slow = (np.abs(poles.imag) < 1e-9) & (poles.real > 0)
+    poles = np.where(slow, poles, poles * np.minimum(1.0, STEADIEST / np.maximum(size, 1e-12)))
+    return -np.real(np.poly(poles))[1:] if len(ar) else ar
 
 
 def estimate(samples: Samples, residual: Array, highest_order: int = HIGHEST_ORDER) -> Noise:
@@ -87,6 +100,7 @@ def estimate(samples: Samples, residual: Array, highest_order: int = HIGHEST_ORD
         score = n * np.log(max(error, 1e-300)) + order * np.log(n)
         if score < best_score - 6:
             best_ar, best_score = ar, score
+    best_ar = without_lines(best_ar)
     order = len(best_ar)
     valid = np.ones(n, bool)
     valid[:order] = False
