@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -46,6 +46,8 @@ class Term:
     trials: float = 1.0
     odds: float = 0.0
     """Log prior odds of this variant against the effect's plainest one."""
+    kept: bool = False
+    """Whether the rows remember this term, so that what is computed of it may be remembered too."""
 
     @property
     def width(self) -> int:
@@ -148,7 +150,7 @@ def sine_columns(phase: Array, harmonics: Sequence[float]) -> Array:
     return _sines(np.ascontiguousarray(phase, float), np.asarray(harmonics, float))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _sines(phase, harmonics):
     columns = np.empty((len(phase), 2 * len(harmonics)))
     for i in range(len(phase)):
@@ -156,6 +158,30 @@ def _sines(phase, harmonics):
             columns[i, 2 * k] = math.sin(harmonics[k] * phase[i])
             columns[i, 2 * k + 1] = math.cos(harmonics[k] * phase[i])
     return columns
+
+
+def terms_at(effect: Effect, samples: Samples, shapes: Sequence[Mapping[str, float]]) -> list[Term]:
+    """`effect` at shapes that every search of the same rows looks at: made once, and remembered with the rows."""
+    made = []
+    for shape in shapes:
+        key = (effect.id, *sorted(shape.items()))
+        if key not in samples.remembered:
+            samples.remembered[key] = replace(effect.term(samples, shape), kept=True)
+        made.append(samples.remembered[key])
+    return made
+
+
+def widest_that_pays(probe: Probe, terms: Sequence[Term]) -> list[Term]:
+    """The best of `terms` after paying for their freedom, and the one before it; `terms` grow, and the growing stops
+    where it twice did not pay.
+    """
+    cost = math.log(max(len(probe.residual), 2))
+    ranked: list[tuple[float, int]] = []
+    for i, term in enumerate(terms):
+        ranked.append((probe.gain(term) - cost * term.freedom, i))
+        if i - max(ranked)[1] >= 2:
+            break
+    return [terms[i] for _, i in sorted(ranked, reverse=True)[:2]]
 
 
 def best_terms(probe: Probe, terms: Sequence[Term], keep: int = 1) -> list[Term]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,10 @@ them its second-order terms would imitate physics that is not there.
 """
 
 
+LAGS_TURNS = 10
+"""Input turns over which neighbouring turns' residuals are taken to hang together in the parameters' intervals."""
+
+
 @dataclass(frozen=True)
 class Problem:
     """What is fitted: rows, base model (None for a gear without one), columns that are always free (offsets), noise."""
@@ -38,6 +43,16 @@ class Problem:
     nuisance: Array
     noise: Noise
     prior_scale: float = 1.0
+
+    @cached_property
+    def whitened(self) -> dict:
+        """Whitened columns and their inner products of the terms that the rows remember, by identity."""
+        return {}
+
+    @cached_property
+    def rotation(self) -> Array:
+        """The rows' angles as the base takes them."""
+        return self.base.rotation(self.samples.theta)
 
     @property
     def base_width(self) -> int:
@@ -83,6 +98,11 @@ class Fit:
         """What term `index` adds to the prediction, arcmin: with its zones' driving switched as fitted."""
         return term_columns(self.terms[index], self.zone, self.problem.base) @ self.coefficients[index]
 
+    @property
+    def contributions(self) -> Array:
+        """What all terms add, arcmin."""
+        return sum((self.contribution(i) for i in range(len(self.terms))), np.zeros(len(self.problem.samples)))
+
     def design(self) -> Array:
         """Columns: base errors, offsets, then for each term its coefficients and free shape parameters; (n, q)."""
         return np.column_stack(
@@ -114,7 +134,13 @@ class Fit:
         block = self.problem.samples.block
         scores = np.zeros((block[-1] + 1, design.shape[1]))
         np.add.at(scores, block, design * residual[:, None] / sigma2)
-        sandwich = inverse @ (scores.T @ scores) @ inverse
+        # Wander outlasts a turn: neighbouring turns' scores count too, with falling weight (Newey, West 1987).
+        meat = scores.T @ scores
+        lags = min(LAGS_TURNS, len(scores) // 5)
+        for lag in range(1, lags + 1):
+            across = scores[lag:].T @ scores[:-lag]
+            meat += (1 - lag / (lags + 1)) * (across + across.T)
+        sandwich = inverse @ meat @ inverse
         blocks = block[-1] + 1
         sandwich *= blocks / max(blocks - 1, 1)
         ratio = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(inverse), 1e-300), 1.0))
@@ -163,7 +189,7 @@ def evaluate(
         if term.zones is not None:
             extra = term.zones @ c if extra is None else extra + term.zones @ c
     if problem.base is not None:
-        base_value, zone, jacobian = problem.base.evaluate(samples.theta, errors, extra)
+        base_value, zone, jacobian = problem.base.evaluate_at(problem.rotation, errors, extra)
     else:
         base_value, zone, jacobian = (
             np.zeros(len(samples)),

@@ -1,6 +1,6 @@
 """Explanations without physics that compete with the catalogue: where one of them wins, the verdict is `unknown`.
 
-A sine at any order, a sine at any frequency in time, a jump, a trend, an order whose size changes with time, an even
+A sine at any order, a sine at any frequency in time, a jump, a bump, an order whose size changes with time, an even
 function of torque or speed: each is a plain description of structure, searched over all its shapes like an effect and
 priced like one. A catalogue effect that merely resembles such a structure loses against it.
 """
@@ -8,10 +8,15 @@ priced like one. A catalogue effect that merely resembles such a structure loses
 from __future__ import annotations
 
 import numpy as np
+from scipy.signal import fftconvolve
 
-from hdopt.diagnosis.effect import Term, best_terms, sine_columns, strongest_orders
+from hdopt.diagnosis.effect import Term, best_terms, sine_columns, strongest_orders, terms_at
 from hdopt.recording import TURN
 
+JUMPS = (1, 2, 3, 4, 6, 9, 13, 20, 30)
+"""How many jumps a search tries."""
+A_FEW = 8
+"""Rows on either side from which a jump is told."""
 ODDS = -3.0
 """Log prior odds against the catalogue's explanations at equal fit."""
 
@@ -112,7 +117,7 @@ class AnyFrequency:
 
 
 class Jump:
-    """One or two jumps at a moment of the recording, as of something that slipped."""
+    """One jump or several, each at its moment of the recording, as of something that slipped."""
 
     id = "_jump"
     domain = "time"
@@ -123,21 +128,70 @@ class Jump:
 
     def search(self, probe):
         samples = probe.samples
-        running = np.cumsum(probe.white_residual)
-        count = np.arange(1, len(running) + 1)
-        n = len(running)
-        score = np.abs(running - running[-1] * count / n) / np.sqrt(np.maximum(count * (n - count) / n, 1.0))
+        n = len(samples)
         edge = max(10, n // 200)
-        score[:edge] = score[-edge:] = 0
-        grid = np.unique(np.r_[np.argmax(score) + 1, np.linspace(edge, n - edge, 60).astype(int)])
-        first = best_terms(probe, [self.term(samples, {"row": float(i)}) for i in grid])[0]
+        grid = np.linspace(edge, n - edge, 60).astype(int)
+        first = best_terms(probe, terms_at(self, samples, [{"row": float(i)} for i in grid]))[0]
         near = np.unique(np.clip(first.shape["row"] + np.linspace(-n / 60, n / 60, 41), edge, n - edge).astype(int))
         first = best_terms(probe, [self.term(samples, {"row": float(i)}) for i in near])[0]
-        return [first]
+        # Many jumps look like slow wander, but each is sudden: the largest differences between a few rows and the next.
+        total = np.r_[0.0, np.cumsum(probe.residual)]
+        left = np.zeros(n)
+        left[A_FEW : n - A_FEW] = np.abs(
+            total[2 * A_FEW : n] - 2 * total[A_FEW : n - A_FEW] + total[: n - 2 * A_FEW]
+        )
+        rows = []
+        for _ in range(JUMPS[-1]):
+            at = int(np.argmax(left))
+            near = slice(max(at - A_FEW // 2, 0), at + A_FEW // 2 + 1)
+            rows.append(near.start + int(np.argmax(np.abs(probe.white_residual[near]))))
+            left[max(at - 2 * A_FEW, 0) : at + 2 * A_FEW] = 0.0
+        several = [
+            self.term(samples, {f"row_{i}" if i else "row": float(row) for i, row in enumerate(rows[:count])})
+            for count in JUMPS
+        ]
+        return best_terms(probe, [first, *several])
 
     def term(self, samples, shape, base_value=None):
-        column = (np.arange(len(samples)) >= shape["row"]).astype(float)
-        return Term(self.id, dict(shape), columns=column[:, None], trials=float(len(samples)), odds=ODDS)
+        columns = [(np.arange(len(samples)) >= row).astype(float) for row in shape.values()]
+        trials = float(len(samples)) ** len(columns)
+        return Term(self.id, dict(shape), columns=np.column_stack(columns), trials=trials, odds=ODDS)
+
+
+class Bump:
+    """One bump at one moment of the recording."""
+
+    id = "_bump"
+    domain = "time"
+    needs_base = False
+
+    def lacks(self, samples):
+        return None if not samples.locked else "an input that turns"
+
+    def search(self, probe):
+        samples = probe.samples
+        shapes = []
+        for width in np.geomspace(0.01, 3.0, 8) * samples.rows_per_turn:
+            if not 1.0 <= width <= len(samples) / 12:
+                continue
+            reach = int(4 * width) + 1
+            kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+            score = np.abs(fftconvolve(probe.residual, kernel, "same"))
+            shapes.append({"row": float(np.argmax(score)), "width": float(width)})
+        return best_terms(probe, [self.term(samples, shape) for shape in shapes])
+
+    def term(self, samples, shape, base_value=None):
+        width = min(max(shape["width"], 1.0), len(samples) / 6)
+        row = min(max(shape["row"], 0.0), len(samples) - 1.0)
+        column = np.exp(-0.5 * ((np.arange(len(samples)) - row) / width) ** 2)
+        return Term(
+            self.id,
+            {"row": row, "width": width},
+            columns=column[:, None],
+            steps={"row": 0.05 * width, "width": 0.05 * width},
+            trials=8.0 * len(samples),
+            odds=ODDS,
+        )
 
 
 class ChangingOrder:
@@ -153,7 +207,7 @@ class ChangingOrder:
     def search(self, probe):
         ratio = probe.samples.ratio
         orders = [k * f for k in (1, 2, 3, 4) for f in (1.0, 1 + 1 / ratio)]
-        return best_terms(probe, [self.term(probe.samples, {"order": o}) for o in orders])
+        return best_terms(probe, terms_at(self, probe.samples, [{"order": o} for o in orders]))
 
     def term(self, samples, shape, base_value=None):
         along = np.linspace(-1, 1, len(samples))[:, None]
@@ -173,7 +227,7 @@ class EvenLoad:
         return None if samples.torque is not None and np.std(samples.torque) > 0 else "torque that varies"
 
     def search(self, probe):
-        return best_terms(probe, [self.term(probe.samples, {"kind": float(k)}) for k in range(4)])
+        return best_terms(probe, terms_at(self, probe.samples, [{"kind": float(k)} for k in range(4)]))
 
     def term(self, samples, shape, base_value=None):
         torque = samples.torque / np.max(np.abs(samples.torque))
@@ -202,12 +256,12 @@ class EvenSpeed:
         return None
 
     def search(self, probe):
-        return best_terms(probe, [self.term(probe.samples, {"power": p}) for p in (1.0, 2.0)])
+        return best_terms(probe, terms_at(self, probe.samples, [{"power": p} for p in (1.0, 2.0)]))
 
     def term(self, samples, shape, base_value=None):
         speed = np.abs(samples.speed) / np.max(np.abs(samples.speed))
         return Term(self.id, dict(shape), columns=(speed ** shape["power"])[:, None], trials=2.0, odds=ODDS)
 
 
-OUTSIDE = {e.id: e for e in (AnyOrder(), AnyFrequency(), Jump(), ChangingOrder(), EvenLoad(), EvenSpeed())}
+OUTSIDE = {e.id: e for e in (AnyOrder(), AnyFrequency(), Jump(), Bump(), ChangingOrder(), EvenLoad(), EvenSpeed())}
 """Descriptions that compete with the catalogue."""

@@ -13,16 +13,18 @@ from hdopt.diagnosis import noise as noise_model
 from hdopt.diagnosis.base import fit_base
 from hdopt.diagnosis.catalogue import EXPLANATIONS, STRAIN_WAVE_ONLY
 from hdopt.diagnosis.conditions import AcrossConditions, across_conditions
-from hdopt.diagnosis.effect import sine_columns, strongest_orders
+from hdopt.diagnosis.effect import Term, sine_columns, strongest_orders
 from hdopt.diagnosis.effects import EFFECTS, HIGH_ORDER
 from hdopt.diagnosis.fit import Fit, Problem, evaluate, refine, term_columns
 from hdopt.diagnosis.generic import generic_columns, useful_columns
 from hdopt.diagnosis.heldout import HeldOut, family_wise_p, held_out, paired_t, turn_folds
 from hdopt.diagnosis.noise import Noise
 from hdopt.diagnosis.nuisance import Nuisances, nuisances_for, with_time_warp
+from hdopt.diagnosis.outside import AnyOrder
 from hdopt.diagnosis.probe import FitProbe
 from hdopt.diagnosis.samples import Samples, gather, neighbours_for
-from hdopt.diagnosis.select import Selection, highest_order, price, search_terms, select
+from hdopt.diagnosis.select import Beside, Selection, highest_order, price, search_terms, select
+from hdopt.diagnosis.zone_ripple import fit_in_zones
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recording import Recording
 
@@ -89,12 +91,15 @@ def gather_evidence(
     if selection.best.fit.terms and not (0.7 < noise_2.sigma / noise.sigma < 1.4):
         problem_2 = problem.with_noise(noise_2)
         base_fit = refine(_rebase(base_fit, problem_2), iterations=8)
-        clean_2 = _rebase(clean, problem_2) if clean is not None else None
-        selection = select(base_fit, inflation_2, rng, skip=ruled_out, clean=clean_2)
+        selection = select(base_fit, inflation_2, rng, skip=ruled_out, known=_rebase(best, problem_2))
         noise, inflation = noise_2, inflation_2
     high = high_order_selection(recordings, selection.best.fit, nuisances, ruled_out, rng)
     if high is not None and high.best.fit.terms:
-        cleaned = subtract(recordings, high.best.fit)
+        inside = fit_in_zones(gather(recordings), selection.best.fit, nuisances, high.best.fit)
+        if inside is not None:
+            high = high.with_best_fit(inside.fit)
+        ripple = inside.adds if inside is not None else high.best.fit.contributions
+        cleaned = subtract(recordings, ripple)
         samples = gather(cleaned, neighbours_for(cleaned))
         problem = replace(problem, samples=samples, nuisance=nuisances.columns(samples), noise=noise)
         base_fit = refine(_rebase(base_fit, problem), iterations=8)
@@ -102,9 +107,9 @@ def gather_evidence(
             base_fit if not selection.best.fit.terms else _rebase(selection.best.fit, problem)
         )
         base_fit = refine(_rebase(base_fit, problem.with_noise(noise)), iterations=4)
-        clean = _rebase(clean, problem.with_noise(noise)) if clean is not None else None
-        said = [*ruled_out, *(t.effect for t in high.best.fit.terms)]
-        selection = select(base_fit, inflation, rng, skip=said, clean=clean)
+        taken = beside(base_fit, float(np.var(ripple)), high.best.fit.terms)
+        known = _rebase(selection.best.fit, base_fit.problem)
+        selection = select(base_fit, inflation, rng, skip=ruled_out, known=known, beside=taken)
     return assess(samples, selection, high, nuisances, inflation, rng)
 
 
@@ -185,7 +190,9 @@ def high_order_selection(
     lowest = highest_order(averaged)
     problem = Problem(raw, low.problem.base, nuisances.columns(raw), Noise.white(raw, 1.0), low.problem.prior_scale)
     base_value = (
-        low.problem.base.evaluate(raw.theta, low.errors)[0] if low.problem.base is not None else np.zeros(len(raw))
+        low.problem.base.evaluate_at(problem.rotation, low.errors)[0]
+        if low.problem.base is not None
+        else np.zeros(len(raw))
     )
     terms = [EXPLANATIONS[t.effect].term(raw, t.shape, base_value) for t in low.terms]
     residual = evaluate(problem, low.errors, low.offsets, terms, low.coefficients).residual
@@ -200,8 +207,7 @@ def high_order_selection(
         clean = bare.residual - columns @ np.linalg.lstsq(columns, bare.residual, rcond=None)[0]
         noise = noise_model.estimate(raw, clean)
     bare = evaluate(problem.with_noise(noise), np.zeros(0), bare.offsets, (), ())
-    low_effects = [*ruled_out, "_sine_in_time", "_jump", "_changing_order", "_even_in_torque", "_even_in_speed"]
-    low_effects += [e for e in EFFECTS if e not in HIGH_ORDER]
+    low_effects = [*ruled_out, *(e for e in EXPLANATIONS if e not in HIGH_ORDER and e != AnyOrder.id)]
     return select(bare, 1.0, rng, skip=low_effects, rounds=2, order_range=ripple_orders(averaged, raw))
 
 
@@ -210,9 +216,14 @@ def ripple_orders(averaged: Samples, raw: Samples) -> tuple[float, float]:
     return highest_order(averaged), 0.49 * raw.rows_per_turn
 
 
-def subtract(recordings: Sequence[Recording], fit: Fit) -> list[Recording]:
-    """Recordings without the contributions of `fit`'s terms (which stands on their rows as recorded)."""
-    total = sum(fit.contribution(i) for i in range(len(fit.terms)))
+def beside(base: Fit, power: float, terms: Sequence[Term]) -> Beside:
+    """`terms` of so much power (arcmin^2) that were taken out of the rows of `base`."""
+    rows = float((base.problem.noise.root_weight > 0).sum())
+    return Beside(tuple(terms), power * rows / base.problem.noise.sigma**2)
+
+
+def subtract(recordings: Sequence[Recording], total: Array) -> list[Recording]:
+    """Recordings without what `total` (arcmin, on their rows as recorded) adds to their errors."""
     bounds = np.cumsum([0, *(len(r) for r in recordings)])
     return [
         replace(r, error_arcmin=r.error_arcmin - total[a:b])

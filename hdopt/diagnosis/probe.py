@@ -62,11 +62,22 @@ class FitProbe:
         """The term's columns, whitened and projected."""
         return self.project(self.white_columns(term))
 
-    def solve(self, term: Term) -> tuple[float, Array]:
+    def _whitened(self, term: Term) -> tuple[Array, Array]:
+        """The term's whitened columns and their inner products."""
+        known = self.fit.problem.whitened
+        if term.kept and id(term) in known:
+            return known[id(term)][1:]
         white = self.white_columns(term)
+        gram = white.T @ white
+        if term.kept and term.zones is None:
+            known[id(term)] = (term, white, gram)
+        return white, gram
+
+    def solve(self, term: Term) -> tuple[float, Array]:
+        white, gram = self._whitened(term)
         absorbed = self.basis.T @ white
-        gram, moment = white.T @ white - absorbed.T @ absorbed, white.T @ self.white_residual
-        scale = np.sqrt(np.maximum((white**2).sum(0), 1e-300))
+        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        gram, moment = gram - absorbed.T @ absorbed, white.T @ self.white_residual
         # A column that the base absorbs to a millionth has nothing left to say.
         gram = gram / np.outer(scale, scale) + 1e-6 * np.eye(len(gram))
         coefficients = np.linalg.solve(gram, moment / scale) / scale
@@ -76,8 +87,15 @@ class FitProbe:
         return self.solve(term)[0]
 
     @cached_property
-    def _fft(self) -> tuple[Array, float]:
-        theta = self.samples.theta - self.samples.theta.min()
+    def _by_input(self) -> tuple[Array, float]:
+        return self._fourier(self.samples.theta)
+
+    @cached_property
+    def _by_output(self) -> tuple[Array, float]:
+        return self._fourier(self.samples.output * self.samples.ratio)
+
+    def _fourier(self, theta: Array) -> tuple[Array, float]:
+        theta = theta - theta.min()
         per_turn = 8 * 2 ** int(np.ceil(np.log2(max(self.samples.rows_per_turn, 16))))
         span = theta.max() / TURN + 1
         length = 1 << int(np.ceil(np.log2(4 * span * per_turn)))
@@ -87,8 +105,11 @@ class FitProbe:
         signal = np.bincount(cell, self.residual - self.residual.mean(), minlength=length)[:length]
         return 2 * np.abs(np.fft.rfft(signal)) / len(theta), length / per_turn
 
-    def spectrum(self, orders: Array) -> Array:
-        """Amplitude (arcmin) of the residual at each order, by the Fourier sum at the nearest quarter resolution."""
-        amplitude, periods = self._fft
+    def spectrum(self, orders: Array, of_output: bool = False) -> Array:
+        """Amplitude (arcmin) of the residual at each order, by the Fourier sum at the nearest quarter resolution.
+
+        Orders count cycles of the input, or, with `of_output`, of N times the output angle as its encoder read it.
+        """
+        amplitude, periods = self._by_output if of_output else self._by_input
         index = np.round(np.asarray(orders) * periods).astype(np.int64)
         return amplitude[np.clip(index, 0, len(amplitude) - 1)]

@@ -9,22 +9,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hdopt.drive import ARCMIN
 from hdopt.recording import TURN, Recording
 from hdopt.recording_sync import find_passes
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-MOST_ROWS = 14_000
+MOST_ROWS = 10_000
 FEWEST_ROWS_PER_TURN = 64
 
 
 def neighbours_for(recordings: Sequence[Recording]) -> int:
-    """How many neighbouring samples to average: as few as keep the rows at 14 000 or so, and 64 of them a turn."""
+    """How many neighbouring samples to average: as few as keep the rows at 10 000 or so, and 64 of them a turn."""
     rows = sum(len(recording) for recording in recordings)
     turns = sum(float(np.abs(np.diff(recording.input_angle)).sum()) / TURN for recording in recordings)
     return max(1, min(round(rows / MOST_ROWS), int(rows / max(turns, 1.0) / FEWEST_ROWS_PER_TURN)))
@@ -56,11 +58,18 @@ class Samples:
     temperature: Array | None
     locked: bool
     quantum: float
+    output: Array
+    """Output angle as the encoder read it, rad (its count zero is arbitrary)."""
     averaged: float = 1.0
     """Samples as recorded behind a row, on average."""
 
     def __len__(self) -> int:
         return len(self.theta)
+
+    @cached_property
+    def remembered(self) -> dict:
+        """Terms made for these rows at shapes that every search looks at."""
+        return {}
 
     @property
     def records(self) -> int:
@@ -144,6 +153,7 @@ def _one_record(recording: Recording, neighbours: int) -> dict[str, Array | None
     return {
         "theta": theta,
         "error": mean(recording.error_arcmin),
+        "output": mean(recording.input_angle / recording.ratio - recording.error_arcmin * ARCMIN),
         "direction": passes.direction[starts],
         "travel": mean(passes.since_reversal) * scale,
         "first": passes.first[starts],

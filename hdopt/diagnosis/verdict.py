@@ -36,6 +36,9 @@ TIE = 5.0
 """Log evidence within which two explanations cannot be told apart."""
 FEWEST_BLOCKS = 6
 """Turns (or parts of turns between reversals) below which nothing is claimed."""
+MOMENTARY = {"_jump", "_bump"}
+MOMENTARY_EVIDENCE = 30.0
+"""Log evidence from which an event that no other turn repeats is believed."""
 SMALLEST_SHARE = 0.02
 """An effect that takes less than this share of the held-out error's power is not worth a name."""
 
@@ -117,7 +120,7 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
     if high is not None and (few or not _stands_out(high, evidence)):
         high = None
     named = not few and bool(best.fit.terms) and evidence.false_alarm_p <= SIGNIFICANCE and _worth_naming(evidence)
-    outside = (named and outside_share(best) > REMAINDER_SHARE) or (
+    outside = (not few and momentary(evidence)) or (named and outside_share(best) > REMAINDER_SHARE) or (
         high is not None and outside_share(high) > REMAINDER_SHARE
     )
     unexplained = outside or (not few and clearly_unexplained(evidence))
@@ -127,7 +130,8 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
     elif named:
         effects += describe(best, evidence)
     if high is not None:
-        effects += describe(high, evidence, high=True)
+        said = {found.id for found in effects}
+        effects += [found for found in describe(high, evidence, high=True) if found.id not in said]
     effects.sort(key=lambda found: -float(found.where["rms_arcmin"]))
     ambiguous: tuple[tuple[str, ...], ...] = ()
     confounded: tuple[Confounding, ...] = ()
@@ -214,6 +218,18 @@ def _worth_naming(evidence: Evidence) -> bool:
     return base - extended > SMALLEST_SHARE * extended
 
 
+def momentary(evidence: Evidence) -> bool:
+    """Whether something happened at one moment only, which no held-out turn can show again."""
+    best = evidence.selection.best
+    power = sum(float(np.var(best.fit.contribution(i))) for i in range(len(best.fit.terms)))
+    return (
+        bool(best.effects)
+        and set(best.effects) <= MOMENTARY
+        and best.evidence > MOMENTARY_EVIDENCE
+        and power > SMALLEST_SHARE * float(np.var(best.fit.residual))
+    )
+
+
 def outside_share(candidate: Candidate) -> float:
     """Share of what a set explains that its descriptions without physics carry."""
     fit = candidate.fit
@@ -241,6 +257,8 @@ def clearly_unexplained(evidence: Evidence) -> bool:
     explainable = evidence.base_held_out.variance - min(
         evidence.remainder.held_out.variance, evidence.generic_held_out.variance
     )
+    if evidence.high is not None:
+        explainable += float(np.var(evidence.high.best.fit.contributions))
     base_power = float(np.var(evidence.selection.base.base_value))
     floor = max(REMAINDER_FLOOR * evidence.remainder.held_out.variance, 0.0025 * base_power)
     return evidence.remainder.t > REMAINDER_T and left > REMAINDER_SHARE * explainable and left > floor

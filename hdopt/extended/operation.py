@@ -74,6 +74,7 @@ class Operation:
             temperature=_constant(self.temperature_difference, n),
             locked=False,
             quantum=0.0,
+            output=theta / ratio,
         )
 
     def rows_of_pass(self, values: Array) -> Array:

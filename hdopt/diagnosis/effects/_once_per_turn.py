@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hdopt.diagnosis.effect import Term, sine_columns
+from hdopt.diagnosis.effect import Term, sine_columns, terms_at
 
 
 class ShaftSine:
@@ -25,7 +25,7 @@ class ShaftSine:
         return f"at least {need:.0f} input turns (there are {samples.span_turns:.1f})"
 
     def search(self, probe):
-        return [self.term(probe.samples, {"variant": float(i)}) for i in range(len(self.variants))]
+        return terms_at(self, probe.samples, [{"variant": float(i)} for i in range(len(self.variants))])
 
     def term(self, samples, shape, base_value=None):
         index = int(shape["variant"])

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hdopt.diagnosis.effect import Parameter, Term, best_terms, sine_columns
+from hdopt.diagnosis.effect import Parameter, Term, best_terms, sine_columns, widest_that_pays
 from hdopt.diagnosis.effects._zone_harmonics import zone_harmonics
 
 BALLS = np.arange(7, 41)
@@ -32,14 +32,27 @@ def bearing_orders(ball_ratio, balls, gear_ratio):
     )
 
 
-ZONE_HARMONICS = ((2,), (2, 4), (1, 2), (1, 2, 3, 4), (1, 2, 3, 4, 5, 6))
+ZONE_HARMONICS = ((2,), (2, 4), (1, 2), *(tuple(range(1, k + 1)) for k in (4, 6, 10, 16, 28)))
 """Balls of unequal diameter or spacing: harmonics of the balls' place under the lobes, (1 + r)(1 + 1/N)/2, met by one
 lobe and, half a turn of the ring of balls on, by the other: even ones act directly, odd ones through the change of
 the driving zone.
 """
 
+COUNTED = 2.0
+"""Size of the wave of n balls over the usual wave of balls unlike in place, from which it counts the balls."""
+STANDS_OUT = 10.0
+"""Power over the median from which a line may be more than noise (whose largest of thousands is about 14 times it):
+below it no bearing is looked for.
+"""
+
 LINES = ((0, 1, 2, 3, 4), (0, 3), (0, 2), (0, 1, 2), (3, 4), (0, 3, 4), (0, 2, 3), (1, 2), (2, 3), (1, 2, 3))
 """Which of the five orders a variant shows."""
+
+
+def zone_orders(shape) -> tuple[int, ...]:
+    """Harmonics of the balls' place under the lobes that a zone variant holds: its set, and n where n is counted."""
+    balls = (int(shape["balls"]),) if shape["balls"] else ()
+    return (*ZONE_HARMONICS[int(shape["zones"])], *balls)
 
 
 class BearingPass:
@@ -62,6 +75,9 @@ class BearingPass:
         power = probe.spectrum(grid) ** 2
         # Orders that other effects own (multiples of 1/N close to whole ones) say nothing for a bearing.
         power[np.abs(grid - np.round(grid)) < max(3 / samples.ratio, 2 * resolution)] = 0.0
+        seen = power[power > 0]
+        if not len(seen) or seen.max() < STANDS_OUT * np.median(seen):
+            return []
         slow = [self._power(power, grid, bearing_orders(ratios, 0, samples.ratio)[i], samples) for i in range(3)]
         best = []
         for balls in BALLS:
@@ -123,17 +139,21 @@ class BearingPass:
             {"ball_to_pitch_ratio": r + d / probe.samples.span_turns, "balls": 0.0, "zones": float(v)}
             for r in tops
             for d in (-0.4, -0.2, 0.0, 0.2, 0.4)
-            for v in (1, 3)
+            for v in ((0,) if d else (0, 2))
         ]
         best = best_terms(probe, [self.term(probe.samples, s, trials=trials) for s in shapes])[0].shape
+        sets = [{**best, "zones": float(v)} for v in range(len(ZONE_HARMONICS))]
+        best = widest_that_pays(probe, [self.term(probe.samples, s, trials=trials) for s in sets])[0].shape
+        # All balls alike in load, unlike in place: the ring's own wave of n balls under each lobe as well.
+        half = (1 + best["ball_to_pitch_ratio"]) * (1 + 1 / probe.samples.ratio) / 2
+        waves = [np.interp([n * half, abs(n * half - n % 2)], grid, power, left=0.0, right=0.0).max() for n in BALLS]
+        counted = [{**best, "balls": float(BALLS[i])} for i in np.argsort(waves)[-2:]]
+        terms = [self.term(probe.samples, s, trials=trials * len(BALLS)) for s in counted]
+        best = best_terms(probe, [self.term(probe.samples, best, trials=trials), *terms])[0].shape
+        trials *= len(BALLS) if best["balls"] else 1
         fine = [
-            {
-                **best,
-                "ball_to_pitch_ratio": best["ball_to_pitch_ratio"] + d / probe.samples.span_turns,
-                "zones": float(v),
-            }
+            {**best, "ball_to_pitch_ratio": best["ball_to_pitch_ratio"] + d / probe.samples.span_turns}
             for d in (-0.1, -0.05, 0.0, 0.05, 0.1)
-            for v in range(len(ZONE_HARMONICS))
         ]
         return best_terms(probe, [self.term(probe.samples, s, trials=trials) for s in fine])
 
@@ -154,7 +174,7 @@ class BearingPass:
             return Term(
                 self.id,
                 dict(shape),
-                zones=zone_harmonics(phase, ZONE_HARMONICS[int(shape["zones"])]),
+                zones=zone_harmonics(phase, zone_orders(shape)),
                 steps={"ball_to_pitch_ratio": 1e-3 / samples.span_turns},
                 trials=trials / len(BALLS) * len(ZONE_HARMONICS),
             )
@@ -173,7 +193,7 @@ class BearingPass:
             half = (1 + term.shape["ball_to_pitch_ratio"]) * (1 + 1 / ratio) / 2
             return [
                 o
-                for h in ZONE_HARMONICS[int(term.shape["zones"])]
+                for h in zone_orders(term.shape)
                 for o in ([h * half] if h % 2 == 0 else [1 + h * half])
             ]
         orders = bearing_orders(term.shape["ball_to_pitch_ratio"], term.shape["balls"], ratio)
@@ -181,10 +201,14 @@ class BearingPass:
 
     def parameters(self, term, estimate):
         if "zones" in term.shape:
-            return {
+            found = {
                 "ball_to_pitch_ratio": estimate.parameter(term.width, "1"),
                 "unequal_um": estimate.derived(lambda v: 1e3 * float(np.hypot(v[0], v[1])), "um"),
             }
+            size = np.hypot(estimate.values[0 : term.width : 2], estimate.values[1 : term.width : 2])
+            if term.shape["balls"] and size[-1] > COUNTED * np.median(size[:-1]):
+                found["balls"] = Parameter(term.shape["balls"], term.shape["balls"], term.shape["balls"], "1")
+            return found
         n = term.shape["balls"]
         found = {"ball_to_pitch_ratio": estimate.parameter(term.width, "1")}
         if any(i >= 3 for i in LINES[int(term.shape["lines"])]):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from hdopt.diagnosis.effect import Parameter, Term, best_terms
+from hdopt.diagnosis.effect import Parameter, Term, best_terms, terms_at
 from hdopt.diagnosis.effects._zone_harmonics import zone_harmonics
 
 LOBES = range(2, 17)
@@ -29,7 +29,7 @@ class CircularSplineLobing:
 
     def search(self, probe):
         limit = 0.4 * probe.samples.rows_per_turn
-        return best_terms(probe, [self.term(probe.samples, {"lobes": float(n)}) for n in LOBES if n < limit], 2)
+        return best_terms(probe, terms_at(self, probe.samples, [{"lobes": float(n)} for n in LOBES if n < limit]), 2)
 
     def term(self, samples, shape, base_value=None):
         n = int(shape["lobes"])

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from hdopt.diagnosis.effect import Term, best_terms
+from hdopt.diagnosis.effect import Term, terms_at, widest_that_pays
 from hdopt.diagnosis.effects._zone_harmonics import zone_harmonics
 
-SETS = ((2,), (3,), (2, 3), (2, 3, 4), (2, 3, 4, 5), tuple(range(2, 9)), tuple(range(2, 15)))
+SETS = ((2,), (3,), *(tuple(range(2, k + 1)) for k in (3, 4, 5, 8, 14, 24, 40)))
 
 
 class CircularSplineToothHarmonics:
@@ -33,8 +33,8 @@ class CircularSplineToothHarmonics:
         return samples.theta
 
     def search(self, probe):
-        terms = [self.term(probe.samples, {"harmonics": float(i)}) for i in range(len(SETS))]
-        return best_terms(probe, terms, 2)
+        terms = terms_at(self, probe.samples, [{"harmonics": float(i)} for i in range(len(SETS))])
+        return widest_that_pays(probe, [term for term in terms if term.width <= probe.samples.rows_per_turn])
 
     def term(self, samples, shape, base_value=None):
         harmonics = SETS[int(shape["harmonics"])]

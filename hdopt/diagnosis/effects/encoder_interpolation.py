@@ -2,8 +2,9 @@
 
 Offsets of the sine and cosine signals make an error of one cycle a line, unequal amplitudes and a wrong phase two
 cycles (Heydemann, Applied Optics 20 (1981) 3382). With L lines a turn the orders are L and 2 L of the input (divided
-by N), or L/N and 2 L/N of the output encoder. Units: arcmin at the output; lines a whole number. Prior: 8 to 20000
-lines.
+by N), or L/N and 2 L/N of the output encoder, whose phase follows the angle that it reads itself: with thousands of
+lines an arcmin of kinematic error or drift moves it by a radian. Units: arcmin at the output; lines a whole number.
+Prior: 8 to 20000 lines; fewer than 17 are rare (two to eight poles of a resolver).
 """
 
 from __future__ import annotations
@@ -13,6 +14,14 @@ import numpy as np
 from hdopt.diagnosis.effect import Parameter, Term, best_terms, sine_columns
 
 LOWEST_ORDER = 8.0
+LOWEST_PAIR = 3.0
+"""Lowest order of an output encoder's lines where both L and 2 L show: one line alone could be anything."""
+HARMONICS = {1.0: (1,), 2.0: (1, 2), 4.0: (1, 2, 3, 4)}
+"""Cycles a line of each variant; distorted signals (no pure sines) add the third and fourth."""
+SHOWS = 0.01
+"""Power over that of its double or triple from which a line is taken for the encoder's own."""
+FEW_LINES, FEW_LINES_ODDS = 17, -8.0
+"""Below so many lines a turn bolts and teeth are likelier than an encoder; log odds."""
 
 
 class EncoderInterpolation:
@@ -33,42 +42,47 @@ class EncoderInterpolation:
 
     def search(self, probe):
         samples = probe.samples
-        lowest, highest = probe.order_range
-        lowest, highest = max(lowest, LOWEST_ORDER), min(highest, 0.49 * samples.rows_per_turn)
+        highest = probe.order_range[1]
+        highest = min(highest, 0.49 * samples.rows_per_turn)
         found = []
         for output in (0.0, 1.0):
             per = samples.ratio if output else 1.0
+            lowest = max(probe.order_range[0], LOWEST_PAIR if output else LOWEST_ORDER)
             lines = np.arange(np.ceil(lowest * per), np.floor(highest * per) + 1)
             if output:
                 if samples.span_turns < 0.5 * samples.ratio:
                     continue
-                # Orders that whole input turns share belong to the input side.
-                lines = lines[np.abs(lines / per - np.round(lines / per)) > 1e-9]
             if not len(lines):
                 continue
-            power = probe.spectrum(lines / per) ** 2
-            double = np.where(2 * lines / per < highest, probe.spectrum(np.minimum(2 * lines / per, highest)) ** 2, 0.0)
-            for score in (power, power + double):
-                for best in np.argsort(score)[-2:]:
-                    for harmonics in (1.0, 2.0, 3.0):
-                        found.append(
-                            self.term(
-                                samples,
-                                {"lines": float(lines[best]), "output": output, "harmonics": harmonics},
-                                trials=float(len(lines)),
-                            )
-                        )
+            power = probe.spectrum(lines / per, bool(output)) ** 2
+            second = probe.spectrum(np.minimum(2 * lines / per, highest), bool(output)) ** 2
+            double = np.where(2 * lines / per < highest, second, 0.0)
+            strongest = {float(lines[i]) for score in (power, power + double) for i in np.argsort(score)[-2:]}
+            # The strongest line may be the second or third cycle of the encoder's own, which then shows too.
+            seen = dict(zip(lines, power, strict=True))
+            strongest |= {
+                line // k for line in strongest for k in (2, 3) if seen.get(line / k, 0.0) > SHOWS * seen[line]
+            }
+            found += [
+                self.term(
+                    samples, {"lines": line, "output": output, "harmonics": harmonics}, trials=float(len(lines))
+                )
+                for line in sorted(strongest)
+                for harmonics, cycles in HARMONICS.items()
+                if cycles[-1] * line <= highest * per and (line >= LOWEST_ORDER * per or cycles[:2] == (1, 2))
+            ]
         return best_terms(probe, found, 2) if found else []
 
     def term(self, samples, shape, base_value=None, trials=1000.0):
-        order = shape["lines"] / (samples.ratio if shape["output"] else 1.0)
-        multiples = {1.0: (1,), 2.0: (1, 2), 3.0: (2,)}[shape["harmonics"]]
-        columns = sine_columns(samples.theta, [m * order for m in multiples])
-        return Term(self.id, dict(shape), columns=columns, trials=trials)
+        angle = samples.output if shape["output"] else samples.theta
+        multiples = HARMONICS[shape["harmonics"]]
+        columns = sine_columns(angle, [m * shape["lines"] for m in multiples])
+        odds = FEW_LINES_ODDS if shape["lines"] < FEW_LINES else 0.0
+        return Term(self.id, dict(shape), columns=columns, trials=trials, odds=odds)
 
     def orders(self, term, ratio):
         order = term.shape["lines"] / (ratio if term.shape["output"] else 1.0)
-        return [m * order for m in {1.0: (1,), 2.0: (1, 2), 3.0: (2,)}[term.shape["harmonics"]]]
+        return [m * order for m in HARMONICS[term.shape["harmonics"]]]
 
     def parameters(self, term, estimate):
         lines = term.shape["lines"]

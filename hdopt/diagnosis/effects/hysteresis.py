@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hdopt.diagnosis.effect import Term, best_terms
+from hdopt.diagnosis.effect import Term, best_terms, terms_at
 from hdopt.diagnosis.effects._friction_torque import friction_columns, half_loop
 
 SHARES = (0.02, 0.05, 0.1, 0.15, 0.25, 0.4)
@@ -41,8 +41,8 @@ class Hysteresis:
         lengths = np.geomspace(shortest, 0.2 * longest, 14)
         kinds = {}
         for kind in (0.0, 1.0):
-            terms = [self.term(samples, {"transition_deg": d * (1 + 2 * kind), "maxwell": kind}) for d in lengths]
-            kinds[kind] = best_terms(probe, terms)[0]
+            shapes = [{"transition_deg": d * (1 + 2 * kind), "maxwell": kind} for d in lengths]
+            kinds[kind] = best_terms(probe, terms_at(self, samples, shapes))[0]
         return list(kinds.values())
 
     def term(self, samples, shape, base_value=None):

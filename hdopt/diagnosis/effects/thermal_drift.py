@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hdopt.diagnosis.effect import Term, best_terms
+from hdopt.diagnosis.effect import Term, best_terms, terms_at
 
 
 class ThermalDrift:
@@ -30,8 +30,8 @@ class ThermalDrift:
             found.append(self.term(samples, {}))
         if samples.time is not None:
             duration = float(np.ptp(elapsed(samples)))
-            terms = [self.term(samples, {"time_constant_s": f * duration}) for f in np.geomspace(0.05, 5, 12)]
-            found += best_terms(probe, terms)
+            shapes = [{"time_constant_s": f * duration} for f in np.geomspace(0.05, 5, 12)]
+            found += best_terms(probe, terms_at(self, samples, shapes))
         return found
 
     def term(self, samples, shape, base_value=None):

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hdopt.diagnosis.effect import Term, best_terms
+from hdopt.diagnosis.effect import Term, best_terms, terms_at
 from hdopt.drive import ARCMIN
 
 COMPLIANCE = 1e-5
@@ -37,16 +37,16 @@ class TorsionalWindup:
     def search(self, probe):
         samples = probe.samples
         reached = float(np.quantile(np.abs(samples.torque), 0.99))
-        terms = [self.term(samples, {}), self.term(samples, {"angle": 1.0})]
-        one = [self.term(samples, {"knee_1": f * reached}) for f in np.linspace(0.1, 0.9, 9)]
+        terms = terms_at(self, samples, [{}, {"angle": 1.0}])
+        one = terms_at(self, samples, [{"knee_1": f * reached} for f in np.linspace(0.1, 0.9, 9)])
         best_one = best_terms(probe, one)[0]
         two = [
-            self.term(samples, {"knee_1": a * reached, "knee_2": b * reached})
+            {"knee_1": a * reached, "knee_2": b * reached}
             for a in (0.1, 0.2, 0.3, 0.45)
             for b in (0.4, 0.55, 0.7, 0.85)
             if b > a + 0.1
         ]
-        return [*best_terms(probe, terms), best_one, *best_terms(probe, two)]
+        return [*best_terms(probe, terms), best_one, *best_terms(probe, terms_at(self, samples, two))]
 
     def term(self, samples, shape, base_value=None):
         reached = float(np.max(np.abs(samples.torque)))

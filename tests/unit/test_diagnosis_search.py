@@ -1,0 +1,166 @@
+"""What the search of the diagnosis rests on: noise that hides no line, an encoder's phase, events, mesh in zones."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hdopt.diagnosis import diagnose
+from hdopt.diagnosis.effect import Term
+from hdopt.diagnosis.effects import EFFECTS
+from hdopt.diagnosis.fit import Problem, evaluate, refine
+from hdopt.diagnosis.noise import STEADIEST, Noise, estimate, without_lines
+from hdopt.diagnosis.outside import A_FEW, OUTSIDE
+from hdopt.diagnosis.parallel import each
+from hdopt.diagnosis.probe import FitProbe
+from hdopt.diagnosis.samples import gather
+from hdopt.diagnosis.select import DISCREPANCY, OTHER_KIND, Beside, discrepancy, price
+from hdopt.diagnosis.zone_ripple import fit_in_zones
+from hdopt.drive import ARCMIN
+from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
+from hdopt.kinematics.waveform import kinematic_error_arcmin
+from hdopt.recording import recording_from_table
+from hdopt.study import load_study
+
+TURN = 2 * np.pi
+RATIO = 80.0
+
+
+@pytest.fixture(scope="module")
+def study():
+    return load_study(drive="csf-25-80")
+
+
+def record(theta, error):
+    """A recording of `error` (arcmin) at input angles `theta` (rad), one reading a hundredth of a second."""
+    output = theta / RATIO - error * ARCMIN
+    table = {
+        "time_s": 0.01 * np.arange(len(theta)),
+        "input_angle_deg": np.degrees(theta),
+        "output_angle_deg": np.degrees(output),
+    }
+    return recording_from_table(pd.DataFrame(table), RATIO, name="record")
+
+
+def bare(recording, sigma=0.02):
+    """The recording's rows fitted by nothing but an offset."""
+    samples = gather([recording])
+    problem = Problem(samples, None, np.ones((len(samples), 1)), Noise.white(samples, sigma))
+    return refine(evaluate(problem, np.zeros(0), np.zeros(1), (), ()))
+
+
+def test_noise_model_keeps_slow_wander_and_draws_lines_in():
+    slow, line = 0.98, 0.999 * np.exp(0.7j)
+    ar = -np.real(np.poly([slow, line, np.conj(line)]))[1:]
+    poles = np.roots(np.r_[1.0, -without_lines(ar)])
+    assert max(poles.real) == pytest.approx(slow, abs=1e-9)
+    oscillating = np.abs(poles[np.abs(poles.imag) > 1e-9])
+    np.testing.assert_allclose(oscillating, STEADIEST, rtol=1e-9)
+    assert len(without_lines(np.zeros(0))) == 0
+
+
+def test_a_line_stays_visible_beside_its_noise_model(study):
+    theta = np.linspace(0, 60 * TURN, 6000)
+    line = 0.3 * np.sin(13.37 * theta)
+    fit = bare(record(theta, line + np.random.default_rng(1).normal(0, 0.02, len(theta))))
+    samples = fit.problem.samples
+    noise = estimate(samples, fit.residual)
+    left = noise.whiten(fit.residual)
+    # White noise of the innovations' size would be all that an unbounded model left of a pure line.
+    assert left.std() > 5 * 0.02
+
+
+def test_interpolation_follows_the_angle_that_its_encoder_read():
+    """With 5000 lines a drift of 3 arcmin moves the ripple by four radians: one sine of theta/N misses it."""
+    rng = np.random.default_rng(2)
+    theta = np.linspace(0, 60 * TURN, 12_000)
+    drift = 3.0 * np.linspace(0, 1, len(theta)) ** 2
+    ripple = 0.1 * np.sin(5000 * (theta / RATIO - drift * ARCMIN) + 0.4)
+    samples = gather([record(theta, drift + ripple + rng.normal(0, 0.01, len(theta)))])
+    columns = EFFECTS["encoder_interpolation"].term(samples, {"lines": 5000.0, "output": 1.0, "harmonics": 1.0}).columns
+    plain = np.column_stack([np.sin(5000 * samples.theta / RATIO), np.cos(5000 * samples.theta / RATIO)])
+    for design, most in ((columns, 0.02), (plain, None)):
+        left = ripple - design @ np.linalg.lstsq(design, ripple, rcond=None)[0]
+        share = float(np.var(left) / np.var(ripple))
+        assert share < most if most is not None else share > 0.5
+
+
+def test_events_are_described_where_they_happen():
+    rng = np.random.default_rng(3)
+    theta = np.linspace(0, 60 * TURN, 6000)
+    rows = np.arange(len(theta))
+    noise = rng.normal(0, 0.02, len(theta))
+    bump = 0.3 * np.exp(-0.5 * ((rows - 2500) / 40) ** 2)
+    found = OUTSIDE["_bump"].search(FitProbe(bare(record(theta, bump + noise))))[0]
+    assert abs(found.shape["row"] - 2500) < 20
+    jumps = 0.2 * ((rows > 1000).astype(float) - (rows > 2200) + (rows > 4000) - (rows > 5100))
+    found = OUTSIDE["_jump"].search(FitProbe(bare(record(theta, jumps + noise))))[0]
+    for row in (1001, 2201, 4001, 5101):
+        assert min(abs(at - row) for at in found.shape.values()) <= A_FEW // 2
+
+
+@pytest.mark.slow
+def test_one_bump_is_unknown_and_no_tooth(study):
+    rng = np.random.default_rng(4)
+    theta = np.linspace(0, 30 * TURN, 3000)
+    bump = 0.6 * np.exp(-0.5 * ((np.arange(len(theta)) - 1700) / 25) ** 2)
+    error = kinematic_error_arcmin(study.drive, study.errors, theta) + bump + rng.normal(0, 0.01, len(theta))
+    diagnosis = diagnose(record(theta, error), study.drive)
+    assert diagnosis.verdict == "unknown"
+    assert diagnosis.where["domain"] == "time"
+
+
+def test_mesh_inside_the_zones_comes_back(study):
+    """A ripple of both zones, put through the larger-zone rule by the model: the fit in zones explains it to the noise,
+    and better than sines beside the base.
+    """
+    rng = np.random.default_rng(5)
+    base = CartesianModel.of(study.drive)
+    theta = np.linspace(0, 8 * TURN, 8 * 500)
+    errors = to_cartesian(study.errors, base.half_width)
+    mesh = EFFECTS["tooth_mesh"]
+    first = np.sin(162 * theta + 0.3)
+    second = np.sin(162 * theta + 2.0)
+    value, _, _ = base.evaluate(theta, errors, 1.5e-3 * np.stack([first, second]))
+    recording = record(theta, value + rng.normal(0, 0.01, len(theta)))
+    samples = gather([recording])
+    problem = Problem(samples, base, np.ones((len(samples), 1)), Noise.white(samples, 0.01))
+    low = evaluate(problem, errors, np.zeros(1), (), ())
+    sines = mesh.term(samples, {"sidebands": 6.0})
+    start = np.linalg.lstsq(sines.columns, low.residual, rcond=None)[0]
+    without_base = Problem(samples, None, problem.nuisance, problem.noise)
+    plain = evaluate(without_base, np.zeros(0), np.zeros(1), [sines], [start])
+    inside = fit_in_zones(samples, low, _OneZero(), plain)
+    assert inside is not None
+    assert np.std(inside.fit.residual) < 1.1 * 0.01
+    assert np.std(low.residual - start @ sines.columns.T) > 1.5 * 0.01
+    np.testing.assert_allclose(inside.adds, value - base.evaluate(theta, errors)[0], atol=0.02)
+
+
+class _OneZero:
+    """Nuisances of a single recording: its zero."""
+
+    @staticmethod
+    def columns(samples):
+        return np.ones((len(samples), 1))
+
+
+def test_second_effects_pay_by_kind_and_flexible_ones_like_two():
+    def term(effect, width):
+        return Term(effect, {}, columns=np.zeros((4, width)))
+
+    order, loop = term("output_coupling", 2), term("hysteresis", 2)
+    other_order = term("encoder_input_eccentricity", 2)
+    assert discrepancy([order]) == 0.0
+    assert discrepancy([order, loop]) == pytest.approx(OTHER_KIND)
+    assert discrepancy([order, other_order]) == pytest.approx(DISCREPANCY)
+    assert discrepancy([term("cs_tooth_harmonics", 46)]) == pytest.approx(DISCREPANCY)
+    # A description without physics could be the misfit of anything.
+    assert discrepancy([loop, term("_sine_in_time", 2)]) == pytest.approx(DISCREPANCY)
+    taken = Beside((term("tooth_mesh", 2),), gain=1000.0)
+    extra = price([order], 100.0, 0.0, 1.0, taken) - price([order], 100.0, 0.0, 1.0)
+    assert extra == pytest.approx(0.5 * DISCREPANCY * 1000.0)
+
+
+def test_pieces_keep_their_order_on_any_number_of_threads():
+    assert each(lambda x: x * x, range(50)) == [x * x for x in range(50)]
+    assert each(abs, []) == []
