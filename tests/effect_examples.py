@@ -26,6 +26,17 @@ EXAMPLES: list[tuple[str, dict]] = [
         },
     ),
     (
+        "tooth_mesh",
+        {
+            "zone_1_amplitude_um": 1.0,
+            "zone_1_phase_deg": 10.0,
+            "zone_2_amplitude_um": 1.5,
+            "zone_2_phase_deg": 20.0,
+            "zone_2_amplitude_minus_1_um": 0.2,
+            "zone_2_phase_minus_1_deg": 30.0,
+        },
+    ),
+    (
         "torsional_windup",
         {
             "stiffness_1_nm_per_rad": 31000.0,
@@ -65,8 +76,30 @@ EXAMPLES: list[tuple[str, dict]] = [
     ),
     ("encoder_interpolation", {"shaft": "input", "lines": 25, "amplitude_arcmin": 0.05, "phase_deg": 5.0}),
     ("encoder_interpolation", {"shaft": "output", "lines": 4001, "amplitude_2_arcmin": 0.05, "phase_2_deg": 5.0}),
+    (
+        "encoder_interpolation",
+        {
+            "shaft": "output",
+            "lines": 500,
+            "amplitude_arcmin": 0.05,
+            "phase_deg": 5.0,
+            "amplitude_4_arcmin": 0.01,
+            "phase_4_deg": 15.0,
+        },
+    ),
     ("output_coupling", {"shaft": "output", "amplitude_arcmin": 0.1, "phase_deg": 15.0}),
     ("output_coupling", {"shaft": "input", "amplitude_arcmin": 0.1, "phase_deg": 15.0}),
+    (
+        "bearing_pass",
+        {
+            "ball_to_pitch_ratio": 0.14,
+            "balls": 31,
+            "unequal_2_um": 0.5,
+            "unequal_2_phase_deg": 25.0,
+            "unequal_31_um": 0.3,
+            "unequal_31_phase_deg": 35.0,
+        },
+    ),
     (
         "bearing_pass",
         {
@@ -85,6 +118,16 @@ EXAMPLES: list[tuple[str, dict]] = [
     ("resonance", {"frequency_hz": 3.0, "damping_ratio": 0.05, "gain": 0.9}),
     ("local_tooth_defect", {"on": "flexspline", "angle_deg": 115.0, "width_deg": 5.0, "height_um": 4.0}),
     ("local_tooth_defect", {"on": "output", "angle_deg": 2000.0, "width_deg": 5.0, "height_arcmin": 0.3}),
+    (
+        "local_tooth_defect",
+        {
+            "on": "circular_spline_twice",
+            "angle_deg": 100.0,
+            "width_deg": 3.0,
+            "height_arcmin": 0.2,
+            "height_2_arcmin": 0.1,
+        },
+    ),
     ("channel_delay", {"delay_s": 0.002}),
 ]
 

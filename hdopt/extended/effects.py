@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hdopt.diagnosis.effect import Effect, Term
 from hdopt.diagnosis.effects import EFFECTS
-from hdopt.diagnosis.effects.tooth_mesh import SIDEBANDS
+from hdopt.diagnosis.effects.tooth_mesh import SIDEBANDS, ZONE_SIDEBANDS
 from hdopt.diagnosis.samples import Samples
 
 Array = NDArray[np.float64]
@@ -86,7 +86,7 @@ class AddedEffect:
     def highest_order(self, ratio: float) -> float:
         """The highest order (cycles an input turn) that a sampling of this effect must resolve."""
         if self.id == "tooth_mesh":
-            return 2 * round(ratio + 1) + max(SIDEBANDS[int(self.shape["sidebands"])])
+            return max(self.orders(ratio))
         if self.id == "local_tooth_defect":
             return 360 / self.shape["width_deg"] / 4  # a Gaussian of this standard deviation rises within a quarter
         return max(self.orders(ratio), default=self.shape.get("order", 0.0))
@@ -94,7 +94,8 @@ class AddedEffect:
     def orders(self, ratio: float) -> list[float]:
         """Orders that this effect adds to the spectrum, where it is made of sines."""
         if self.id == "tooth_mesh":
-            return [2.0 * round(ratio + 1) + k for k in SIDEBANDS[int(self.shape["sidebands"])]]
+            sides = ZONE_SIDEBANDS if "zones" in self.shape else SIDEBANDS
+            return [2.0 * round(ratio + 1) + k for k in sides[int(self.shape["sidebands"])]]
         if self.id == "torsional_windup":
             return [2.0] if "angle" in self.shape else []
         named = getattr(self.effect, "orders", None)

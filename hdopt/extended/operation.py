@@ -74,7 +74,7 @@ class Operation:
             temperature=_constant(self.temperature_difference, n),
             locked=False,
             quantum=0.0,
-            output=theta / ratio,
+            output=theta / ratio,  # its reading lacks the error itself, a phase of the encoder's lines
         )
 
     def rows_of_pass(self, values: Array) -> Array:

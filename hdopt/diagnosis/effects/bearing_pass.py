@@ -51,8 +51,8 @@ LINES = ((0, 1, 2, 3, 4), (0, 3), (0, 2), (0, 1, 2), (3, 4), (0, 3, 4), (0, 2, 3
 
 def zone_orders(shape) -> tuple[int, ...]:
     """Harmonics of the balls' place under the lobes that a zone variant holds: its set, and n where n is counted."""
-    balls = (int(shape["balls"]),) if shape["balls"] else ()
-    return (*ZONE_HARMONICS[int(shape["zones"])], *balls)
+    members, balls = ZONE_HARMONICS[int(shape["zones"])], int(shape["balls"])
+    return (*members, balls) if balls and balls not in members else members
 
 
 class BearingPass:

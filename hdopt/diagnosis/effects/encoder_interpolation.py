@@ -16,8 +16,10 @@ from hdopt.diagnosis.effect import Parameter, Term, best_terms, sine_columns
 LOWEST_ORDER = 8.0
 LOWEST_PAIR = 3.0
 """Lowest order of an output encoder's lines where both L and 2 L show: one line alone could be anything."""
-HARMONICS = {1.0: (1,), 2.0: (1, 2), 4.0: (1, 2, 3, 4)}
+HARMONICS = {1.0: (1,), 2.0: (1, 2), 3.0: (2,), 4.0: (1, 2, 3, 4)}
 """Cycles a line of each variant; distorted signals (no pure sines) add the third and fourth."""
+SEARCHED = (1.0, 2.0, 4.0)
+"""Two cycles a line without the first cannot be told from one cycle of twice as many lines."""
 SHOWS = 0.01
 """Power over that of its double or triple from which a line is taken for the encoder's own."""
 FEW_LINES, FEW_LINES_ODDS = 17, -8.0
@@ -68,8 +70,9 @@ class EncoderInterpolation:
                     samples, {"lines": line, "output": output, "harmonics": harmonics}, trials=float(len(lines))
                 )
                 for line in sorted(strongest)
-                for harmonics, cycles in HARMONICS.items()
-                if cycles[-1] * line <= highest * per and (line >= LOWEST_ORDER * per or cycles[:2] == (1, 2))
+                for harmonics in SEARCHED
+                if HARMONICS[harmonics][-1] * line <= highest * per
+                and (line >= LOWEST_ORDER * per or HARMONICS[harmonics][:2] == (1, 2))
             ]
         return best_terms(probe, found, 2) if found else []
 

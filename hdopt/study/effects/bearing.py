@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from hdopt.diagnosis.effects.bearing_pass import LINES, ZONE_HARMONICS
+from hdopt.diagnosis.effects.bearing_pass import BALLS, LINES, ZONE_HARMONICS, zone_orders
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.extended import AddedEffect
 from hdopt.study.effects.base import UM, SineSet, smallest_set, with_sine_keys
@@ -24,20 +24,27 @@ class BearingPass(SineSet):
     id = "bearing_pass"
     sines: ClassVar = {i: (f"{name}_arcmin", f"{name}_phase_deg") for i, name in enumerate(LINE_NAMES)} | {
         UNEQUAL + h: (f"unequal_{h}_um", f"unequal_{h}_phase_deg")
-        for h in sorted({h for group in ZONE_HARMONICS for h in group})
+        for h in sorted({int(n) for n in BALLS} | {h for group in ZONE_HARMONICS for h in group})
     }
     ball_to_pitch_ratio: float = Field(gt=0, lt=1)
     balls: int | None = Field(default=None, ge=3, le=200)
-    """Where a pass over the outer or the inner ring is given."""
+    """Where a pass over the outer or the inner ring is given, or the wave of as many unequal balls."""
 
     def build(self, gear):
         given = self.given()
         unequal = [name - UNEQUAL for name in given if name >= UNEQUAL]
         shape = {"ball_to_pitch_ratio": self.ball_to_pitch_ratio}
         if len(unequal) == len(given):
-            index = smallest_set(ZONE_HARMONICS, unequal)
-            arc = self.coefficients([UNEQUAL + h for h in ZONE_HARMONICS[index]])
-            return AddedEffect(self.id, {**shape, "balls": 0.0, "zones": float(index)}, tuple(UM * c for c in arc))
+            widest = max(ZONE_HARMONICS, key=len)
+            if missing := [h for h in unequal if h not in widest and h != self.balls]:
+                raise HdoptError(
+                    f"effects.{self.id}.unequal_{missing[0]}_um: harmonics go from 1 to {len(widest)}, and beyond only "
+                    "to that of as many balls; give balls, or leave it out"
+                )
+            index = smallest_set(ZONE_HARMONICS, [h for h in unequal if h != self.balls])
+            shape |= {"balls": float(self.balls or 0), "zones": float(index)}
+            arc = self.coefficients([UNEQUAL + h for h in zone_orders(shape)])
+            return AddedEffect(self.id, shape, tuple(UM * c for c in arc))
         if unequal:
             raise HdoptError(
                 f"effects.{self.id} has both sines at the output and unequal balls; give those in _arcmin or in _um"
@@ -52,8 +59,9 @@ class BearingPass(SineSet):
     def keys(cls, effect, gear):
         ratio = {"ball_to_pitch_ratio": effect.shape["ball_to_pitch_ratio"]}
         if "zones" in effect.shape:
-            harmonics = ZONE_HARMONICS[int(effect.shape["zones"])]
-            return ratio | cls.written([UNEQUAL + h for h in harmonics], [c / UM for c in effect.coefficients])
+            names = [UNEQUAL + h for h in zone_orders(effect.shape)]
+            balls = {"balls": int(effect.shape["balls"])} if effect.shape["balls"] else {}
+            return ratio | balls | cls.written(names, [c / UM for c in effect.coefficients])
         lines = LINES[int(effect.shape["lines"])]
         balls = {"balls": int(effect.shape["balls"])} if max(lines) >= 3 else {}
         return ratio | balls | cls.written(lines, effect.coefficients)

@@ -6,9 +6,10 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
+from hdopt.diagnosis.effects.encoder_interpolation import HARMONICS
 from hdopt.extended import AddedEffect
 from hdopt.study.base import NotNegative
-from hdopt.study.effects.base import EffectSection, SineSet, polar, with_sine_keys
+from hdopt.study.effects.base import EffectSection, SineSet, polar, smallest_set, with_sine_keys
 
 
 class EncoderInputEccentricity(EffectSection):
@@ -61,27 +62,27 @@ class OutputCoupling(EffectSection):
         return {"shaft": shaft, "amplitude_arcmin": amplitude, "phase_deg": phase}
 
 
-HARMONICS = {(1,): 1.0, (1, 2): 2.0, (2,): 3.0}
-"""Cycles a line -> what the effect calls that choice."""
-
-
 @with_sine_keys
 class EncoderInterpolation(SineSet):
-    """[effects.encoder_interpolation]: once a line (`amplitude_arcmin`), twice a line (`amplitude_2_arcmin`)."""
+    """[effects.encoder_interpolation]: once a line (`amplitude_arcmin`), up to four times (`amplitude_4_arcmin`)."""
 
     id = "encoder_interpolation"
-    sines: ClassVar = {1: ("amplitude_arcmin", "phase_deg"), 2: ("amplitude_2_arcmin", "phase_2_deg")}
+    sines: ClassVar = {1: ("amplitude_arcmin", "phase_deg")} | {
+        k: (f"amplitude_{k}_arcmin", f"phase_{k}_deg") for k in (2, 3, 4)
+    }
     shaft: Literal["input", "output"]
     lines: int = Field(ge=1, le=1_000_000)
 
     def build(self, gear):
-        members = tuple(sorted(self.given()))
-        shape = {"lines": float(self.lines), "output": float(self.shaft == "output"), "harmonics": HARMONICS[members]}
+        names = list(HARMONICS)
+        name = names[smallest_set([HARMONICS[name] for name in names], list(self.given()))]
+        members = HARMONICS[name]
+        shape = {"lines": float(self.lines), "output": float(self.shaft == "output"), "harmonics": name}
         return AddedEffect(self.id, shape, self.coefficients(members))
 
     @classmethod
     def keys(cls, effect, gear):
-        members = next(m for m, name in HARMONICS.items() if name == effect.shape["harmonics"])
+        members = HARMONICS[effect.shape["harmonics"]]
         shaft = "output" if effect.shape["output"] else "input"
         lines = int(effect.shape["lines"])
         return {"shaft": shaft, "lines": lines, **cls.written(members, effect.coefficients)}
