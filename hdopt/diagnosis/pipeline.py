@@ -23,7 +23,7 @@ from hdopt.diagnosis.nuisance import Nuisances, nuisances_for, with_time_warp
 from hdopt.diagnosis.outside import AnyOrder
 from hdopt.diagnosis.probe import FitProbe
 from hdopt.diagnosis.samples import Samples, gather, neighbours_for
-from hdopt.diagnosis.select import Beside, Selection, highest_order, price, search_terms, select
+from hdopt.diagnosis.select import Beside, Selection, has_exact_shape, highest_order, price, search_terms, select
 from hdopt.diagnosis.zone_ripple import fit_in_zones
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recording import Recording
@@ -208,7 +208,13 @@ def high_order_selection(
         noise = noise_model.estimate(raw, clean)
     bare = evaluate(problem.with_noise(noise), np.zeros(0), bare.offsets, (), ())
     low_effects = [*ruled_out, *(e for e in EXPLANATIONS if e not in HIGH_ORDER and e != AnyOrder.id)]
-    return select(bare, 1.0, rng, skip=low_effects, rounds=2, order_range=ripple_orders(averaged, raw))
+    # What a pulse or a loop leaves where its shape is not quite right reaches into these orders too.
+    rough = [i for i, term in enumerate(low.terms) if not has_exact_shape(term)]
+    left = float(np.var(sum((low.contribution(i) for i in rough), np.zeros(len(averaged)))))
+    taken = beside(bare, left, [low.terms[i] for i in rough])
+    return select(
+        bare, 1.0, rng, skip=low_effects, rounds=2, order_range=ripple_orders(averaged, raw), beside=taken
+    )
 
 
 def ripple_orders(averaged: Samples, raw: Samples) -> tuple[float, float]:

@@ -130,8 +130,16 @@ def discrepancy(terms: Sequence[Term]) -> float:
     physics could be the misfit of anything.
     """
     kinds = {kind_of(term) for term in terms if not is_outside(term.effect)}
-    alike = max(len(terms) - max(len(kinds), 1), 0) + sum(flexibility(term) for term in terms)
-    return max(len(kinds) - 1, 0) * OTHER_KIND + alike * DISCREPANCY
+    alike = max(len(terms) - max(len(kinds), 1), 0)
+    # Sines of known orders leave nothing for each other: their shape is exact.
+    each_alike = OTHER_KIND if all(has_exact_shape(term) for term in terms) else DISCREPANCY
+    flexible = sum(flexibility(term) for term in terms)
+    return max(len(kinds) - 1, 0) * OTHER_KIND + alike * each_alike + flexible * DISCREPANCY
+
+
+def has_exact_shape(term: Term) -> bool:
+    """Whether a term's columns are known to the last digit, so that its fit leaves nothing."""
+    return getattr(EXPLANATIONS[term.effect], "exact_shape", False)
 
 
 def flexibility(term: Term) -> float:

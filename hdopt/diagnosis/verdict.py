@@ -39,6 +39,10 @@ FEWEST_BLOCKS = 6
 MOMENTARY = {"_jump", "_bump"}
 MOMENTARY_EVIDENCE = 30.0
 """Log evidence from which an event that no other turn repeats is believed."""
+MOST_CONFIDENT = 0.95
+"""No name is surer: what all shapes of the catalogue miss is in no evidence. In the blind runs about nine names of ten
+that the evidence alone called certain were right.
+"""
 SMALLEST_SHARE = 0.02
 """An effect that takes less than this share of the held-out error's power is not worth a name."""
 
@@ -342,7 +346,7 @@ def confidences(evidence: Evidence) -> dict[str, float]:
     result = {}
     for effect in candidates[0].effects:
         share = float(sum(w for w, c in zip(weights, candidates, strict=True) if effect in c.effects))
-        result[effect] = float(np.clip(share * (1 - evidence.false_alarm_p), 0.0, 0.99))
+        result[effect] = float(np.clip(share * (1 - evidence.false_alarm_p), 0.0, MOST_CONFIDENT))
     return result
 
 
@@ -362,7 +366,7 @@ def describe(candidate: Candidate, evidence: Evidence, high: bool = False) -> li
         found.append(
             Found(
                 term.effect,
-                confidence.get(term.effect, 0.95),
+                confidence.get(term.effect, MOST_CONFIDENT),
                 {
                     "domain": effect.domain,
                     "orders_per_input_turn": exact_orders(term, fit) or main_orders(fit, contribution),

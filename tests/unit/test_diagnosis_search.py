@@ -149,10 +149,12 @@ def test_second_effects_pay_by_kind_and_flexible_ones_like_two():
         return Term(effect, {}, columns=np.zeros((4, width)))
 
     order, loop = term("output_coupling", 2), term("hysteresis", 2)
-    other_order = term("encoder_input_eccentricity", 2)
+    exact, lobes = term("encoder_input_eccentricity", 2), term("circular_spline_lobing", 2)
     assert discrepancy([order]) == 0.0
     assert discrepancy([order, loop]) == pytest.approx(OTHER_KIND)
-    assert discrepancy([order, other_order]) == pytest.approx(DISCREPANCY)
+    assert discrepancy([order, lobes]) == pytest.approx(DISCREPANCY)
+    # Two sines of known orders leave nothing for each other.
+    assert discrepancy([order, exact]) == pytest.approx(OTHER_KIND)
     assert discrepancy([term("cs_tooth_harmonics", 46)]) == pytest.approx(DISCREPANCY)
     # A description without physics could be the misfit of anything.
     assert discrepancy([loop, term("_sine_in_time", 2)]) == pytest.approx(DISCREPANCY)

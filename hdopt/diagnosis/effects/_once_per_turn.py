@@ -11,6 +11,8 @@ class ShaftSine:
     id = ""
     domain = "order"
     needs_base = False
+    exact_shape = True
+    """Its orders are known: nothing of it is left for another effect to explain."""
     separating = ""
     variants: tuple[tuple[tuple[str, int], ...], ...] = ()
     odds: tuple[float, ...] = ()

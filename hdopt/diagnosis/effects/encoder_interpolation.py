@@ -16,6 +16,8 @@ from hdopt.diagnosis.effect import Parameter, Term, best_terms, sine_columns
 LOWEST_ORDER = 8.0
 LOWEST_PAIR = 3.0
 """Lowest order of an output encoder's lines where both L and 2 L show: one line alone could be anything."""
+MODULATION_PER_OUTPUT_TURN, SIDEBAND_REACH = 3.5, 12.0
+"""Orders that the teeth own: within so many 1/N of a whole sideband, up to so far from the mesh order."""
 HARMONICS = {1.0: (1,), 2.0: (1, 2), 3.0: (2,), 4.0: (1, 2, 3, 4)}
 """Cycles a line of each variant; distorted signals (no pure sines) add the third and fourth."""
 SEARCHED = (1.0, 2.0, 4.0)
@@ -24,6 +26,13 @@ SHOWS = 0.01
 """Power over that of its double or triple from which a line is taken for the encoder's own."""
 FEW_LINES, FEW_LINES_ODDS = 17, -8.0
 """Below so many lines a turn bolts and teeth are likelier than an encoder; log odds."""
+
+
+def beside_the_mesh(orders, ratio):
+    """Where an order is the tooth mesh or a sideband of it, drawn aside by a few output turns' worth of modulation."""
+    mesh = 2 * round(ratio + 1)
+    near = np.abs(orders - np.round(orders)) < MODULATION_PER_OUTPUT_TURN / ratio
+    return near & (np.abs(orders - mesh) < SIDEBAND_REACH)
 
 
 class EncoderInterpolation:
@@ -54,6 +63,7 @@ class EncoderInterpolation:
             if output:
                 if samples.span_turns < 0.5 * samples.ratio:
                     continue
+                lines = lines[~beside_the_mesh(lines / per, samples.ratio)]
             if not len(lines):
                 continue
             power = probe.spectrum(lines / per, bool(output)) ** 2
