@@ -55,6 +55,8 @@ class EncoderInterpolation:
         samples = probe.samples
         highest = probe.order_range[1]
         highest = min(highest, 0.49 * samples.rows_per_turn)
+        # Rows that are no averages hold every cycle up to half their number.
+        finest = highest if samples.averaged > 1.15 else 0.5 * samples.rows_per_turn * (1 + 1e-6)
         found = []
         for output in (0.0, 1.0):
             per = samples.ratio if output else 1.0
@@ -81,7 +83,7 @@ class EncoderInterpolation:
                 )
                 for line in sorted(strongest)
                 for harmonics in SEARCHED
-                if HARMONICS[harmonics][-1] * line <= highest * per
+                if HARMONICS[harmonics][-1] * line <= finest * per
                 and (line >= LOWEST_ORDER * per or HARMONICS[harmonics][:2] == (1, 2))
             ]
         return best_terms(probe, found, 2) if found else []
