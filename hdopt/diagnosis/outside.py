@@ -116,15 +116,20 @@ class AnyFrequency:
         )
 
 
-class Jump:
-    """One jump or several, each at its moment of the recording, as of something that slipped."""
+class Event:
+    """Something that happened at moments of the recording, whatever the angle."""
 
-    id = "_jump"
     domain = "time"
     needs_base = False
 
     def lacks(self, samples):
         return None if not samples.locked else "an input that turns"
+
+
+class Jump(Event):
+    """One jump or several, each at its moment of the recording, as of something that slipped."""
+
+    id = "_jump"
 
     def search(self, probe):
         samples = probe.samples
@@ -158,15 +163,10 @@ class Jump:
         return Term(self.id, dict(shape), columns=np.column_stack(columns), trials=trials, odds=ODDS)
 
 
-class Bump:
+class Bump(Event):
     """One bump at one moment of the recording."""
 
     id = "_bump"
-    domain = "time"
-    needs_base = False
-
-    def lacks(self, samples):
-        return None if not samples.locked else "an input that turns"
 
     def search(self, probe):
         samples = probe.samples
