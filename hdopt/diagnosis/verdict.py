@@ -222,10 +222,15 @@ def _worth_naming(evidence: Evidence) -> bool:
     return base - extended > SMALLEST_SHARE * extended
 
 
+def term_powers(fit: Fit) -> list[float]:
+    """Power of each term's contribution, arcmin^2."""
+    return [float(np.var(fit.contribution(i))) for i in range(len(fit.terms))]
+
+
 def momentary(evidence: Evidence) -> bool:
     """Whether something happened at one moment only, which no held-out turn can show again."""
     best = evidence.selection.best
-    power = sum(float(np.var(best.fit.contribution(i))) for i in range(len(best.fit.terms)))
+    power = sum(term_powers(best.fit))
     return (
         bool(best.effects)
         and set(best.effects) <= MOMENTARY
@@ -237,7 +242,7 @@ def momentary(evidence: Evidence) -> bool:
 def outside_share(candidate: Candidate) -> float:
     """Share of what a set explains that its descriptions without physics carry."""
     fit = candidate.fit
-    power = [float(np.var(fit.contribution(i))) for i in range(len(fit.terms))]
+    power = term_powers(fit)
     outside = sum(p for p, term in zip(power, fit.terms, strict=True) if is_outside(term.effect))
     return outside / max(sum(power), 1e-300)
 
@@ -246,7 +251,7 @@ def _stands_out(high: Candidate, evidence: Evidence) -> bool:
     """A ripple counts if it carries a share of the raw rows' power, and is more than what another shape may leave
     there.
     """
-    power = sum(float(np.var(high.fit.contribution(i))) for i in range(len(high.fit.terms)))
+    power = sum(term_powers(high.fit))
     explained = max(evidence.base_held_out.variance - evidence.extended_held_out.variance, 0.0)
     return power > SMALLEST_SHARE * float(np.var(high.fit.residual)) and power > 0.01 * explained
 
