@@ -23,7 +23,7 @@ from hdopt.diagnosis.nuisance import Nuisances, nuisances_for, with_time_warp
 from hdopt.diagnosis.outside import AnyOrder
 from hdopt.diagnosis.probe import FitProbe
 from hdopt.diagnosis.samples import Samples, gather, neighbours_for
-from hdopt.diagnosis.select import Beside, Selection, has_exact_shape, highest_order, price, search_terms, select
+from hdopt.diagnosis.select import Beside, Selection, has_exact_shape, price, search_terms, select
 from hdopt.diagnosis.zone_ripple import fit_in_zones
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recording import Recording
@@ -184,10 +184,10 @@ def high_order_selection(
 ) -> Selection | None:
     """Effects of orders above what the averaged rows hold, looked for on the rows as recorded."""
     averaged = low.problem.samples
-    if averaged.locked or averaged.averaged <= 1.15:
+    if averaged.locked or not averaged.are_averages:
         return None
     raw = gather(recordings)
-    lowest = highest_order(averaged)
+    lowest = averaged.highest_order
     problem = Problem(raw, low.problem.base, nuisances.columns(raw), Noise.white(raw, 1.0), low.problem.prior_scale)
     base_value = (
         low.problem.base.evaluate_at(problem.rotation, low.errors)[0]
@@ -219,7 +219,7 @@ def high_order_selection(
 
 def ripple_orders(averaged: Samples, raw: Samples) -> tuple[float, float]:
     """Orders that the rows as recorded hold and their averages do not."""
-    return highest_order(averaged), 0.49 * raw.rows_per_turn
+    return averaged.highest_order, 0.49 * raw.rows_per_turn
 
 
 def beside(base: Fit, power: float, terms: Sequence[Term]) -> Beside:

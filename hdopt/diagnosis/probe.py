@@ -27,10 +27,7 @@ class FitProbe:
         self.fit = fit
         self.samples = fit.problem.samples
         self.base_value = fit.base_value
-        self.order_range = order_range or (
-            0.0,
-            self.samples.rows_per_turn * (0.45 if self.samples.averaged <= 1.15 else 0.35),
-        )
+        self.order_range = order_range or (0.0, self.samples.highest_order)
         self.noise = fit.problem.noise
         self.residual = fit.residual + sum(
             (fit.contribution(i) for i in range(len(fit.terms)) if i not in keep), np.zeros(len(self.samples))

@@ -97,6 +97,16 @@ class Samples:
         step = step[(np.diff(self.piece) == 0) & (step > 0)]
         return TURN / float(np.median(step)) if len(step) else 1.0
 
+    @property
+    def are_averages(self) -> bool:
+        """Whether neighbouring samples were averaged into the rows."""
+        return self.averaged > 1.15
+
+    @property
+    def highest_order(self) -> float:
+        """Orders up to which the rows can be trusted: the mean of a few neighbours dims what lies higher."""
+        return self.rows_per_turn * (0.35 if self.are_averages else 0.45)
+
     def rows(self, mask: NDArray) -> Samples:
         """Only the rows in `mask`."""
         changes = {name: value[mask] for name, value in vars(self).items() if isinstance(value, np.ndarray)}

@@ -246,11 +246,6 @@ def weigh(
     return Candidate(fit, gain / inflation / 2 - price(fit.terms, rows, max(top, 0.0), inflation, beside), gain)
 
 
-def highest_order(samples) -> float:
-    """Orders up to which averaged rows can be trusted: the mean of a few neighbours dims what lies higher."""
-    return samples.rows_per_turn * (0.45 if samples.averaged <= 1.15 else 0.35)
-
-
 def select(
     base: Fit,
     inflation: float,
@@ -269,7 +264,7 @@ def select(
     taken out of the rows before.
     """
     if order_range is None:
-        order_range = (0.0, highest_order(base.problem.samples))
+        order_range = (0.0, base.problem.samples.highest_order)
     fits: dict[frozenset[str], Fit] = {}
 
     def explore(centre: Fit, pool: Sequence[Term], leaders: int) -> bool:

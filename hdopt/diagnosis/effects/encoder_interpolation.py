@@ -53,10 +53,9 @@ class EncoderInterpolation:
 
     def search(self, probe):
         samples = probe.samples
-        highest = probe.order_range[1]
-        highest = min(highest, 0.49 * samples.rows_per_turn)
+        highest = min(probe.order_range[1], 0.49 * samples.rows_per_turn)
         # Rows that are no averages hold every cycle up to half their number.
-        finest = highest if samples.averaged > 1.15 else 0.5 * samples.rows_per_turn * (1 + 1e-6)
+        finest = highest if samples.are_averages else 0.5 * samples.rows_per_turn * (1 + 1e-6)
         found = []
         for output in (0.0, 1.0):
             per = samples.ratio if output else 1.0
