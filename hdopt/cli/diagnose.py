@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import click
@@ -35,9 +34,6 @@ def command(recordings, drive, ratio, columns, nuisance, report_file, study_file
 
     REC are .csv, .parquet or .mat files of one drive, fitted jointly. Exit status 0 whenever a verdict was reached.
     """
-    # Many small matrices: threads of the linear algebra would only wait for each other. Before NumPy is imported.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     from hdopt.diagnosis import diagnose
 
     asked = tuple(name.strip() for name in nuisance.split(",") if name.strip())

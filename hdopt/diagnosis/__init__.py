@@ -28,6 +28,8 @@ def diagnose(
     `ratio` without a harmonic-drive model. `nuisance` ("drift", "time-warp") is fitted beside every model and never
     named: for recordings without a sensor at the input. The same seed gives the same answer.
     """
+    from threadpoolctl import threadpool_limits
+
     from hdopt.diagnosis.pipeline import gather_evidence
     from hdopt.diagnosis.verdict import draw_verdict
     from hdopt.kinematics.cartesian import CartesianModel
@@ -49,5 +51,7 @@ def diagnose(
     read = [r if isinstance(r, Recording) else read_recording(r, ratio, columns) for r in recordings]
     if any(abs(r.ratio - ratio) > 1e-9 for r in read):
         raise HdoptError("the recordings were read with different ratios; all must be of one drive")
-    evidence = gather_evidence(read, None if drive is None else CartesianModel.of(drive), seed, nuisance)
-    return draw_verdict(evidence, tuple(w for r in read for w in r.warnings))
+    # Many small matrices: threads of the linear algebra would only wait for each other.
+    with threadpool_limits(1, user_api="blas"):
+        evidence = gather_evidence(read, None if drive is None else CartesianModel.of(drive), seed, nuisance)
+        return draw_verdict(evidence, tuple(w for r in read for w in r.warnings))
