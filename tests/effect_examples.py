@@ -52,6 +52,7 @@ EXAMPLES: list[tuple[str, dict]] = [
     ),
     ("hysteresis", {"half_loop_arcmin": 0.2, "transition_deg": 1.5, "model": "dahl"}),
     ("hysteresis", {"half_loop_arcmin": 0.2, "transition_deg": 1.5, "model": "maxwell_slip"}),
+    ("hysteresis", {"half_loop_arcmin": 0.2, "transition_deg": 1.5, "model": "bouc_wen_square"}),
     ("lost_motion", {"lost_motion_arcmin": 0.3, "crossing_arcmin": 0.3}),
     (
         "lost_motion",
@@ -115,7 +116,7 @@ EXAMPLES: list[tuple[str, dict]] = [
     ("circular_spline_lobing", {"lobes": 6, "radial_amplitude_um": 5.0, "phase_deg": 17.0}),
     ("thermal_drift", {"coefficient_arcmin_per_k": 0.03}),
     ("thermal_drift", {"amplitude_arcmin": 0.5, "time_constant_s": 60.0}),
-    ("resonance", {"frequency_hz": 3.0, "damping_ratio": 0.05, "gain": 0.9}),
+    ("resonance", {"frequency_hz": 3.0, "damping_ratio": 0.05, "gain": 0.9, "output_share_of_damping": 0.4}),
     ("local_tooth_defect", {"on": "flexspline", "angle_deg": 115.0, "width_deg": 5.0, "height_um": 4.0}),
     ("local_tooth_defect", {"on": "output", "angle_deg": 2000.0, "width_deg": 5.0, "height_arcmin": 0.3}),
     (

@@ -15,8 +15,8 @@ from hdopt.cli import main
 from hdopt.diagnosis import diagnose
 from hdopt.diagnosis.effect import Parameter, Term
 from hdopt.diagnosis.effects import EFFECTS
-from hdopt.diagnosis.effects.resonance import relative_response
-from hdopt.diagnosis.verdict import Found
+from hdopt.diagnosis.effects.resonance import relative_responses
+from hdopt.diagnosis.found import Found
 from hdopt.diagnosis.write_back import found_effects, write_study
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.extended import AddedEffect, ExtendedModel, Operation
@@ -119,15 +119,17 @@ def test_warming_goes_on_through_both_passes(study_with):
     assert back[0] == pytest.approx(0.5 * (1 - math.exp(-320 / 60)))
 
 
-def test_steady_resonance_is_what_the_integration_in_time_settles_to(study_with):
+@pytest.mark.parametrize("share", [0.0, 0.6])
+def test_steady_resonance_is_what_the_integration_in_time_settles_to(study_with, share):
     """Tustin's rule at 1/12 of a period is within 2 % of the exact response; the start dies away within half a turn of
     the output (exp(-0.05 2 pi 3 Hz 80 s) < 1e-30)."""
-    study = study_with({"resonance": {"frequency_hz": 3.0, "damping_ratio": 0.05}}, {"speed_rpm": 60.0})
+    keys = {"frequency_hz": 3.0, "damping_ratio": 0.05, "output_share_of_damping": share}
+    study = study_with({"resonance": keys}, {"speed_rpm": 60.0})
     model = extended_model(study)
     theta, settled = model._settled[1.0][0]
     rows = Operation(speed=2 * math.pi).rows(80, theta, 1.0, model.span)
     _, excitation = model.with_effects([]).relative_turn()
-    integrated = relative_response(rows, excitation, 3.0, 0.05)
+    integrated = relative_responses(rows, excitation, 3.0, 0.05) @ [1.0, share]
     half = len(theta) // 2
     assert np.std(settled) > 0.05
     assert np.std((settled - integrated)[half:]) < 0.02 * np.std(settled)
@@ -323,7 +325,7 @@ def test_set_reaches_effects_and_leaves_the_load_unambiguous(study_with):
 
 def test_fitted_effects_drop_what_only_began_a_recording():
     samples = Operation(motion="forward").rows(80, np.linspace(0, 100, 500), 1.0, 100.0)
-    term = EFFECTS["hysteresis"].term(samples, {"transition_deg": 1.0, "maxwell": 0.0})
+    term = EFFECTS["hysteresis"].term(samples, {"transition_deg": 1.0, "law": 0.0})
     assert term.width == 2
     assert AddedEffect.fitted(term, np.array([0.2, 0.7])).coefficients == (0.2,)
 

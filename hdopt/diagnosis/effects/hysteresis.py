@@ -1,11 +1,10 @@
 """Pre-sliding friction: after each reversal the error crosses over gradually, and not at all with speed.
 
-Dahl's model (P. Dahl, "A solid friction model", Aerospace Corp. TOR-158, 1968) with exponent 1: the friction state z
-obeys dz/ds = (d - z)/delta, with s the output travel and d the direction, so z = d - (d - z_rev) exp(-s/delta) after
-a reversal at z_rev. Maxwell-slip elements whose break-away distances are evenly spread up to a length delta
-(Lampaert, Al-Bender, Swevers, 2003) give z = z_rev + (d - z_rev)(2 u - u^2), u = min(s/delta, 1). Rate-independent.
+The friction state z follows the output travel s alone, whatever the speed: from z_rev at a reversal towards the
+direction d, within a length delta, by one of the laws of `_friction_law` (Dahl, Maxwell-slip, Bouc-Wen).
 The error takes half_loop times z. Units: half_loop arcmin, delta deg of output angle. Prior: 0 to 5 arcmin, delta from
-a sample to a pass. Where the input is locked the loop is one of torque and windup: `_friction_torque`.
+a sample to 10 deg, far more than the windup by which a drive's friction is overcome. Where the input is locked the loop
+is one of torque and windup: `_friction_torque`.
 """
 
 from __future__ import annotations
@@ -13,10 +12,13 @@ from __future__ import annotations
 import numpy as np
 
 from hdopt.diagnosis.effect import Term, best_terms, terms_at
+from hdopt.diagnosis.effects._friction_law import LAWS, NAMES
 from hdopt.diagnosis.effects._friction_torque import friction_columns, half_loop
 
 SHARES = (0.02, 0.05, 0.1, 0.15, 0.25, 0.4)
 """Friction torques and knees that a search tries, as shares of the torque reached."""
+LONGEST_DEG = 10.0
+"""Longest crossing, deg of output: friction that takes longer to turn over would be a drift of something else."""
 
 
 class Hysteresis:
@@ -38,12 +40,17 @@ class Hysteresis:
             return best_terms(probe, [self.term(samples, size) for size in sizes])
         longest = float(np.max(samples.travel))
         shortest = max(3 * float(np.median(np.abs(np.diff(samples.travel)))), 1e-4 * longest)
-        lengths = np.geomspace(shortest, 0.2 * longest, 14)
-        kinds = {}
-        for kind in (0.0, 1.0):
-            shapes = [{"transition_deg": d * (1 + 2 * kind), "maxwell": kind} for d in lengths]
-            kinds[kind] = best_terms(probe, terms_at(self, samples, shapes))[0]
-        return list(kinds.values())
+        lengths = np.geomspace(0.7 * shortest, max(0.14 * min(longest, 5 * LONGEST_DEG), shortest), 14)
+        dahl, maxwell, *others = (
+            best_terms(probe, terms_at(self, samples, [self._shape(law, half) for half in lengths]))[0]
+            for law in NAMES
+        )
+        return [dahl, maxwell, *best_terms(probe, others)]
+
+    @staticmethod
+    def _shape(law, half):
+        """Shape by the name of the law, with full reversals half crossed after `half` (deg)."""
+        return {"transition_deg": float(half / LAWS[law].half), "law": float(NAMES.index(law))}
 
     def term(self, samples, shape, base_value=None):
         if samples.locked:
@@ -54,23 +61,22 @@ class Hysteresis:
             return Term(self.id, shape, columns=columns, steps=steps, trials=float(len(SHARES) ** 2))
         # A crossing faster than a few rows cannot be told from play.
         longest, row = float(np.max(samples.travel)), float(np.median(np.abs(np.diff(samples.travel))))
-        delta = min(max(shape["transition_deg"], 2 * row), 0.25 * longest)
-        state = friction_state(samples, delta, bool(shape["maxwell"]))
-        columns = [state]
+        delta = min(max(shape["transition_deg"], 2 * row), 0.25 * longest, max(LONGEST_DEG, 2 * row))
+        columns = [friction_state(samples, delta, int(shape["law"]))]
         if samples.first.any():
             # The state at the start of a recording is unknown: it fades over the same length.
             columns.append(np.where(samples.first, np.exp(-samples.travel / delta), 0.0))
         return Term(
             self.id,
-            {"transition_deg": delta, "maxwell": shape["maxwell"]},
+            {"transition_deg": delta, "law": shape["law"]},
             columns=np.column_stack(columns),
             steps={"transition_deg": 0.02 * delta},
-            trials=10.0,
+            trials=14.0 * len(LAWS),
         )
 
     def unbounded(self, samples, shape, base_value=None):
         """The term of a drive that has run in: no limits by a record, no unknown start."""
-        state = friction_state(samples, shape["transition_deg"], bool(shape["maxwell"]))
+        state = friction_state(samples, shape["transition_deg"], int(shape["law"]))
         return Term(self.id, dict(shape), columns=state[:, None])
 
     def parameters(self, term, estimate):
@@ -97,12 +103,11 @@ class Hysteresis:
         )
 
 
-def friction_state(samples, delta, maxwell):
-    """Friction state z in -1..1, row by row; each pass starts from where the one before it ended."""
-    progress = 1 - np.exp(-samples.travel / delta)
-    if maxwell:
-        u = np.minimum(samples.travel / delta, 1)
-        progress = 2 * u - u**2
+def friction_state(samples, delta, law):
+    """Friction state z in -1..1, row by row, by the `law` of that number; each pass starts from where the one before it
+    ended.
+    """
+    cross = LAWS[NAMES[law]].cross
     state = np.empty(len(samples))
     starts = np.r_[0, np.flatnonzero((np.diff(samples.direction) != 0) | (np.diff(samples.record) != 0)) + 1]
     ends = np.r_[starts[1:], len(samples)]
@@ -112,6 +117,6 @@ def friction_state(samples, delta, maxwell):
         if samples.first[start]:
             state[start:end] = direction
         else:
-            state[start:end] = last + (direction - last) * progress[start:end]
+            state[start:end] = direction * cross(direction * last, samples.travel[start:end] / delta)
         last = state[end - 1]
     return state

@@ -1,10 +1,12 @@
 """Torsional resonance, excited by the drive's own kinematic error.
 
 Output inertia on the drive's torsional spring, base-excited by the pure kinematic error y (Tuttle and Seering, IEEE
-Trans. Robotics and Automation 12 (1996) 368; any text on vibration, e.g. Den Hartog, ch. 2): the recorded error is x
-= (2 zeta w s + w^2)/(s^2 + 2 zeta w s + w^2) y, so what is missing is x - y, whose amplitude and phase at every order
-follow speed through one frequency. Units: frequency Hz, damping ratio 1, gain 1 (1 where the whole inertia takes
-part). Prior: frequency within reach of orders 1 to 20 at the recorded speeds, zeta 0.005 to 0.5.
+Trans. Robotics and Automation 12 (1996) 368; any text on vibration, e.g. Den Hartog, ch. 2). A share b of the damping
+acts on the output's speed (bearing, load), the rest across the spring: the recorded error is x = (2 zeta (1 - b) w s +
+w^2)/(s^2 + 2 zeta w s + w^2) y, so what is missing is x - y = -(s^2 + b 2 zeta w s)/(s^2 + 2 zeta w s + w^2) y, whose
+amplitude and phase at every order follow speed through one frequency. Units: frequency Hz, damping ratio 1, gain 1 (1
+where the whole inertia takes part), share of the damping 1. Prior: frequency within reach of orders 1 to 20 at the
+recorded speeds, zeta 0.005 to 0.5.
 """
 
 from __future__ import annotations
@@ -53,25 +55,25 @@ class Resonance:
 
     def term(self, samples, shape, base_value=None):
         frequency, damping = max(shape["frequency_hz"], 1e-3), min(max(shape["damping_ratio"], 2e-3), 0.9)
-        column = relative_response(samples, base_value, frequency, damping)
         return Term(
             self.id,
             {"frequency_hz": frequency, "damping_ratio": damping},
-            columns=column[:, None],
+            columns=relative_responses(samples, base_value, frequency, damping),
             steps={"frequency_hz": 0.003 * frequency, "damping_ratio": 0.05 * damping},
             trials=40.0,
         )
 
     def steady_state(self, samples, shape, base_value):
         """The term at constant speed once the start has died away; the rows are one whole period, even in time."""
-        column = settled_response(samples.time, base_value, shape["frequency_hz"], shape["damping_ratio"])
-        return Term(self.id, dict(shape), columns=column[:, None])
+        columns = settled_responses(samples.time, base_value, shape["frequency_hz"], shape["damping_ratio"])
+        return Term(self.id, dict(shape), columns=columns)
 
     def parameters(self, term, estimate):
         return {
             "gain": estimate.parameter(0, "1"),
-            "frequency_hz": estimate.parameter(1, "Hz"),
-            "damping_ratio": estimate.parameter(2, "1"),
+            "output_share_of_damping": estimate.derived(lambda v: v[1] / v[0], "1"),
+            "frequency_hz": estimate.parameter(2, "Hz"),
+            "damping_ratio": estimate.parameter(3, "1"),
         }
 
     def sentence(self, parameters, rms_arcmin):
@@ -81,14 +83,15 @@ class Resonance:
         )
 
 
-def relative_response(samples, excitation, frequency, damping):
-    """x - y for excitation y (arcmin) along the rows' times: e'' + 2 zeta w e' + w^2 e = -y''.
+def relative_responses(samples, excitation, frequency, damping):
+    """x - y for excitation y (arcmin) along the rows' times, (n, 2): e'' + 2 zeta w e' + w^2 e = -y'' with all damping
+    across the spring, and = -2 zeta w y', what is added where all of it acts on the output.
 
     Integrated on an even clock in each contiguous piece by Tustin's rule, prewarped at the resonance.
     """
     from scipy.signal import lfilter
 
-    result = np.zeros(len(samples))
+    result = np.zeros((len(samples), 2))
     w = TURN * frequency
     bounds = np.r_[0, np.flatnonzero(np.diff(samples.piece)) + 1, len(samples)]
     for start, end in itertools.pairwise(bounds):
@@ -107,17 +110,20 @@ def relative_response(samples, excitation, frequency, damping):
         denominator = np.array(
             [k * k + 2 * damping * w * k + w * w, 2 * w * w - 2 * k * k, k * k - 2 * damping * w * k + w * w]
         )
-        numerator = -np.array([k * k, -2 * k * k, k * k])
-        e = lfilter(numerator / denominator[0], denominator / denominator[0], y - y[0])
-        result[start:end] = np.interp(time, even, e)
+        forces = k * k * np.array([1.0, -2.0, 1.0]), 2 * damping * w * k * np.array([1.0, 0.0, -1.0])
+        for column, force in enumerate(forces):
+            e = lfilter(-force / denominator[0], denominator / denominator[0], y - y[0])
+            result[start:end, column] = np.interp(time, even, e)
     return result
 
 
-def settled_response(time, excitation, frequency, damping):
-    """x - y as in `relative_response`, for an excitation (arcmin, n) that repeats after these n even times, s.
+def settled_responses(time, excitation, frequency, damping):
+    """x - y as in `relative_responses`, for an excitation (arcmin, n) that repeats after these n even times, s.
 
-    The same equation for a sine of the circular frequency s: E = s^2/(w^2 - s^2 + 2 i zeta w s) Y.
+    The same equations for a sine of the circular frequency s: E = s^2/(w^2 - s^2 + 2 i zeta w s) Y, and -2 i zeta w s
+    in place of s^2.
     """
     n, w = len(time), TURN * frequency
     s = TURN * np.fft.rfftfreq(n, time[1] - time[0])
-    return np.fft.irfft(s**2 / (w**2 - s**2 + 2j * damping * w * s) * np.fft.rfft(excitation), n)
+    response = np.fft.rfft(excitation) / (w**2 - s**2 + 2j * damping * w * s)
+    return np.column_stack([np.fft.irfft(force * response, n) for force in (s**2, -2j * damping * w * s)])

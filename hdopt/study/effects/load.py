@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
+from hdopt.diagnosis.effects._friction_law import NAMES
 from hdopt.diagnosis.effects.torsional_windup import COMPLIANCE
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.extended import AddedEffect
@@ -85,10 +86,10 @@ class Hysteresis(EffectSection):
     id = "hysteresis"
     half_loop_arcmin: float
     transition_deg: Positive
-    model: Literal["dahl", "maxwell_slip"] = "dahl"
+    model: Literal[NAMES] = "dahl"
 
     def build(self, gear):
-        shape = {"transition_deg": self.transition_deg, "maxwell": float(self.model == "maxwell_slip")}
+        shape = {"transition_deg": self.transition_deg, "law": float(NAMES.index(self.model))}
         return AddedEffect(self.id, shape, (self.half_loop_arcmin,))
 
     @classmethod
@@ -96,7 +97,7 @@ class Hysteresis(EffectSection):
         return {
             "half_loop_arcmin": effect.coefficients[0],
             "transition_deg": effect.shape["transition_deg"],
-            "model": "maxwell_slip" if effect.shape["maxwell"] else "dahl",
+            "model": NAMES[int(effect.shape["law"])],
         }
 
 
@@ -162,16 +163,20 @@ class ThermalDrift(EffectSection):
 
 
 class Resonance(EffectSection):
-    """[effects.resonance]: one torsional resonance that the drive's own error excites; gain 1: the whole inertia."""
+    """[effects.resonance]: one torsional resonance that the drive's own error excites; gain 1: the whole inertia.
+
+    A share of the damping acts on the output, the rest across the drive's spring.
+    """
 
     id = "resonance"
     frequency_hz: Positive
     damping_ratio: float = Field(gt=0, lt=1)
     gain: float = 1.0
+    output_share_of_damping: float = 0.0
 
     def build(self, gear):
         shape = {"frequency_hz": self.frequency_hz, "damping_ratio": self.damping_ratio}
-        return AddedEffect(self.id, shape, (self.gain,))
+        return AddedEffect(self.id, shape, (self.gain, self.gain * self.output_share_of_damping))
 
     @classmethod
     def keys(cls, effect, gear):
@@ -180,6 +185,7 @@ class Resonance(EffectSection):
             "frequency_hz": shape["frequency_hz"],
             "damping_ratio": shape["damping_ratio"],
             "gain": effect.coefficients[0],
+            "output_share_of_damping": effect.coefficients[1] / effect.coefficients[0],
         }
 
 
