@@ -46,6 +46,8 @@ class Term:
     trials: float = 1.0
     odds: float = 0.0
     """Log prior odds of this variant against the effect's plainest one."""
+    doubtful: bool = False
+    """Whether it must beat all others clearly: it has no physics, or stands at the orders of another effect."""
     kept: bool = False
     """Whether the rows remember this term, so that what is computed of it may be remembered too."""
 
@@ -71,12 +73,20 @@ class Probe(Protocol):
     def gain(self, term: Term) -> float:
         """Drop of the weighted sum of squares, in units of the noise variance, when `term` joins the fit."""
 
+    def table(self, term: Term) -> tuple[Array, Array]:
+        """Inner products of the term's columns with each other and with the residual, the refitted base taken out."""
+
     def spectrum(self, orders: Array) -> Array:
         """Amplitude (arcmin) of the residual at each order, by least squares."""
 
 
 class Effect(Protocol):
-    """One physics left out of the base model."""
+    """One physics left out of the base model.
+
+    Where it applies, an effect also has: `exact_shape`, True where nothing of it is left for another to explain;
+    `leaves_nothing`, True where it reaches no orders but its own; `every_part_shows(term, estimate)`, whether a fit has
+    all that the term stands for (`credible`); `trimmed(term, coefficients)`, the shape of what shows, or None.
+    """
 
     id: str
     domain: str
@@ -147,7 +157,11 @@ class Estimate:
 
 def sine_columns(phase: Array, harmonics: Sequence[float]) -> Array:
     """sin and cos of each multiple of `phase`, shape (n, 2 len(harmonics)): sin first."""
-    return _sines(np.ascontiguousarray(phase, float), np.asarray(harmonics, float))
+    phase, harmonics = np.ascontiguousarray(phase, float), np.asarray(harmonics, float)
+    whole = harmonics.astype(np.int64)
+    if len(whole) > 1 and np.all(whole == harmonics) and 0 < whole.min() and whole.max() <= 4 * len(whole):
+        return _whole_sines(phase, whole)
+    return _sines(phase, harmonics)
 
 
 @njit(cache=True, nogil=True)
@@ -157,6 +171,24 @@ def _sines(phase, harmonics):
         for k in range(len(harmonics)):
             columns[i, 2 * k] = math.sin(harmonics[k] * phase[i])
             columns[i, 2 * k + 1] = math.cos(harmonics[k] * phase[i])
+    return columns
+
+
+@njit(cache=True, nogil=True)
+def _whole_sines(phase, harmonics):
+    """The same for whole multiples, each from the one before by the sine's and cosine's addition theorems."""
+    columns = np.empty((len(phase), 2 * len(harmonics)))
+    place = np.full(harmonics.max() + 1, -1)
+    for k in range(len(harmonics)):
+        place[harmonics[k]] = k
+    for i in range(len(phase)):
+        sine, cosine = math.sin(phase[i]), math.cos(phase[i])
+        s, c = 0.0, 1.0
+        for h in range(1, len(place)):
+            s, c = s * cosine + c * sine, c * cosine - s * sine
+            if place[h] >= 0:
+                columns[i, 2 * place[h]] = s
+                columns[i, 2 * place[h] + 1] = c
     return columns
 
 
@@ -185,9 +217,11 @@ def widest_that_pays(probe: Probe, terms: Sequence[Term]) -> list[Term]:
 
 
 def best_terms(probe: Probe, terms: Sequence[Term], keep: int = 1) -> list[Term]:
-    """The `keep` terms with the largest gain after paying for their freedom."""
+    """The `keep` terms with the largest gain after paying for their freedom and their odds."""
     cost = math.log(max(len(probe.residual), 2))
-    ranked = sorted(terms, key=lambda term: probe.gain(term) - cost * term.freedom, reverse=True)
+    ranked = sorted(
+        terms, key=lambda term: probe.gain(term) - cost * term.freedom + 2 * term.odds, reverse=True
+    )
     return ranked[:keep]
 
 

@@ -16,7 +16,11 @@ from hdopt.diagnosis.samples import Samples
 Array = NDArray[np.float64]
 
 
-def generic_columns(samples: Samples, probe: FitProbe | None = None, lines: int = 6) -> tuple[Array, list[str]]:
+ROWS_A_LINE, FEWEST_LINES, MOST_LINES = 800, 6, 16
+"""Rows for each of the residual's strongest other orders, and how many of these there are."""
+
+
+def generic_columns(samples: Samples, probe: FitProbe | None = None) -> tuple[Array, list[str]]:
     """Columns (n, q) and the domain each stands for; with a `probe` also sines at the residual's strongest other
     orders.
     """
@@ -64,7 +68,7 @@ def generic_columns(samples: Samples, probe: FitProbe | None = None, lines: int 
         if not samples.locked:
             add(direction[:, None] * sine_columns(n, [1, 2]), "direction")
     if probe is not None and not samples.locked:
-        found = strongest_orders(probe, lines)
+        found = strongest_orders(probe, int(np.clip(len(samples) // ROWS_A_LINE, FEWEST_LINES, MOST_LINES)))
         if len(found):
             add(sine_columns(n, found), "asynchronous order")
     return np.column_stack(columns), domains

@@ -11,12 +11,13 @@ import numpy as np
 from scipy.signal import fftconvolve
 
 from hdopt.diagnosis.effect import Term, best_terms, sine_columns, strongest_orders, terms_at
+from hdopt.diagnosis.steps import find_steps, step_columns
 from hdopt.recording import TURN
 
-JUMPS = (1, 2, 3, 4, 6, 9, 13, 20, 30)
+JUMPS = (1, 2, 3, 4, 5, 6, 7, 9, 11, 13, 16, 20, 25, 30)
 """How many jumps a search tries."""
-A_FEW = 8
-"""Rows on either side from which a jump is told."""
+AT_A_REVERSAL = 0.5
+"""Part of a turn about a reversal in which a jump may be what a loop leaves."""
 ODDS = -3.0
 """Log prior odds against the catalogue's explanations at equal fit."""
 
@@ -63,6 +64,7 @@ class AnyOrder:
             steps={"order": 0.01 / span},
             trials=trials,
             odds=ODDS,
+            doubtful=True,
         )
 
 
@@ -113,6 +115,7 @@ class AnyFrequency:
             steps={"frequency_hz": 0.01 / duration},
             trials=float(len(samples)),
             odds=ODDS,
+            doubtful=True,
         )
 
 
@@ -139,28 +142,22 @@ class Jump(Event):
         first = best_terms(probe, terms_at(self, samples, [{"row": float(i)} for i in grid]))[0]
         near = np.unique(np.clip(first.shape["row"] + np.linspace(-n / 60, n / 60, 41), edge, n - edge).astype(int))
         first = best_terms(probe, [self.term(samples, {"row": float(i)}) for i in near])[0]
-        # Many jumps look like slow wander, but each is sudden: the largest differences between a few rows and the next.
-        total = np.r_[0.0, np.cumsum(probe.residual)]
-        left = np.zeros(n)
-        left[A_FEW : n - A_FEW] = np.abs(
-            total[2 * A_FEW : n] - 2 * total[A_FEW : n - A_FEW] + total[: n - 2 * A_FEW]
-        )
-        rows = []
-        for _ in range(JUMPS[-1]):
-            at = int(np.argmax(left))
-            near = slice(max(at - A_FEW // 2, 0), at + A_FEW // 2 + 1)
-            rows.append(near.start + int(np.argmax(np.abs(probe.white_residual[near]))))
-            left[max(at - 2 * A_FEW, 0) : at + 2 * A_FEW] = 0.0
+        rows, _ = find_steps(probe.residual, most=JUMPS[-1])
         several = [
             self.term(samples, {f"row_{i}" if i else "row": float(row) for i, row in enumerate(rows[:count])})
             for count in JUMPS
+            if count <= len(rows)
         ]
         return best_terms(probe, [first, *several])
 
     def term(self, samples, shape, base_value=None):
-        columns = [(np.arange(len(samples)) >= row).astype(float) for row in shape.values()]
-        trials = float(len(samples)) ** len(columns)
-        return Term(self.id, dict(shape), columns=np.column_stack(columns), trials=trials, odds=ODDS)
+        rows = np.array(list(shape.values()))
+        trials = float(len(samples)) ** len(rows)
+        # A jump at a reversal could be the misfit of any loop; elsewhere nothing of the catalogue jumps.
+        reversals = np.flatnonzero(np.diff(samples.direction) != 0) + 1
+        near = np.abs(rows[:, None] - reversals[None, :]) < AT_A_REVERSAL * samples.rows_per_turn
+        columns = step_columns(len(samples), rows)
+        return Term(self.id, dict(shape), columns=columns, trials=trials, odds=ODDS, doubtful=bool(near.any()))
 
 
 class Bump(Event):
@@ -191,6 +188,7 @@ class Bump(Event):
             steps={"row": 0.05 * width, "width": 0.05 * width},
             trials=8.0 * len(samples),
             odds=ODDS,
+            doubtful=True,
         )
 
 
@@ -211,9 +209,8 @@ class ChangingOrder:
 
     def term(self, samples, shape, base_value=None):
         along = np.linspace(-1, 1, len(samples))[:, None]
-        return Term(
-            self.id, dict(shape), columns=along * sine_columns(samples.theta, [shape["order"]]), trials=8.0, odds=ODDS
-        )
+        columns = along * sine_columns(samples.theta, [shape["order"]])
+        return Term(self.id, dict(shape), columns=columns, trials=8.0, odds=ODDS, doubtful=True)
 
 
 class EvenLoad:
@@ -236,7 +233,7 @@ class EvenLoad:
             columns = (np.abs(torque) if kind == 0 else torque**2)[:, None]
         else:
             columns = torque[:, None] * sine_columns(samples.theta, [1.0 if kind == 2 else 2.0])
-        return Term(self.id, dict(shape), columns=columns, trials=4.0, odds=ODDS)
+        return Term(self.id, dict(shape), columns=columns, trials=4.0, odds=ODDS, doubtful=True)
 
 
 class EvenSpeed:
@@ -260,7 +257,8 @@ class EvenSpeed:
 
     def term(self, samples, shape, base_value=None):
         speed = np.abs(samples.speed) / np.max(np.abs(samples.speed))
-        return Term(self.id, dict(shape), columns=(speed ** shape["power"])[:, None], trials=2.0, odds=ODDS)
+        columns = (speed ** shape["power"])[:, None]
+        return Term(self.id, dict(shape), columns=columns, trials=2.0, odds=ODDS, doubtful=True)
 
 
 OUTSIDE = {e.id: e for e in (AnyOrder(), AnyFrequency(), Jump(), Bump(), ChangingOrder(), EvenLoad(), EvenSpeed())}

@@ -70,13 +70,23 @@ class FitProbe:
             known[id(term)] = (term, white, gram)
         return white, gram
 
-    def solve(self, term: Term) -> tuple[float, Array]:
+    def table(self, term: Term) -> tuple[Array, Array]:
+        """Inner products of the term's columns, with the fit projected out, with each other and with the residual."""
+        gram, absorbed, moment = self._products(term)
+        return gram - absorbed, moment
+
+    def _products(self, term: Term) -> tuple[Array, Array, Array]:
+        """Of the term's columns with each other, the part of it that the fit absorbs, and with the residual."""
         white, gram = self._whitened(term)
         absorbed = self.basis.T @ white
+        return gram, absorbed.T @ absorbed, white.T @ self.white_residual
+
+    def solve(self, term: Term) -> tuple[float, Array]:
+        """Drop of the weighted sum of squares, in noise variances, and the coefficients that bring it."""
+        gram, absorbed, moment = self._products(term)
         scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-        gram, moment = gram - absorbed.T @ absorbed, white.T @ self.white_residual
         # A column that the base absorbs to a millionth has nothing left to say.
-        gram = gram / np.outer(scale, scale) + 1e-6 * np.eye(len(gram))
+        gram = (gram - absorbed) / np.outer(scale, scale) + 1e-6 * np.eye(len(gram))
         coefficients = np.linalg.solve(gram, moment / scale) / scale
         return float(moment @ coefficients) / self.noise.sigma**2, coefficients
 

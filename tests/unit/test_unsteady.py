@@ -1,0 +1,154 @@
+"""What changes in time as no noise does: steps, slips, slow waves; and slow effects against slow wander."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.signal import lfilter
+
+from hdopt.diagnosis import diagnose
+from hdopt.diagnosis import noise as noise_model
+from hdopt.diagnosis.candidates import joint_fit
+from hdopt.diagnosis.credible import PRICE
+from hdopt.diagnosis.effects import EFFECTS
+from hdopt.diagnosis.fit import Problem, evaluate, refine
+from hdopt.diagnosis.noise import Noise
+from hdopt.diagnosis.samples import gather
+from hdopt.diagnosis.steps import find_steps
+from hdopt.diagnosis.suddenness import sudden_steps
+from hdopt.diagnosis.wander import lost_in_wander, slow_wave
+from hdopt.drive import ARCMIN
+from hdopt.kinematics.waveform import kinematic_error_arcmin
+from hdopt.recording import recording_from_table
+from hdopt.study import load_study
+
+TURN = 2 * np.pi
+RATIO = 80.0
+ROWS = 6000
+TURNS = 60
+THETA = np.linspace(0, TURNS * TURN, ROWS)
+"""60 turns forward, 100 rows a turn, a hundredth of a second apart."""
+SEEDS = [0, 1, 2]
+
+
+@pytest.fixture(scope="module")
+def study():
+    return load_study(drive="csf-25-80")
+
+
+def record(error, theta=THETA):
+    table = {
+        "time_s": 0.01 * np.arange(len(theta)),
+        "input_angle_deg": np.degrees(theta),
+        "output_angle_deg": np.degrees(theta / RATIO - error * ARCMIN),
+    }
+    return recording_from_table(pd.DataFrame(table), RATIO, name="record")
+
+
+def fit_of(error):
+    """An offset fitted to `error`, with the noise that an autoregression makes of the rest."""
+    samples = gather([record(error)])
+    problem = Problem(samples, None, np.ones((len(samples), 1)), Noise.white(samples, float(np.std(error))))
+    bare = refine(evaluate(problem, np.zeros(0), np.zeros(1), (), ()))
+    return evaluate(
+        problem.with_noise(noise_model.estimate(samples, bare.residual)), np.zeros(0), bare.offsets, (), ()
+    )
+
+
+def coloured(rng, pole=0.6, size=0.02):
+    return lfilter([1.0], [1.0, -pole], rng.normal(0, size, ROWS))
+
+
+def stick_slip(rng, size=0.3):
+    """Creeps up at a steady rate and slips back after irregular distances."""
+    error, level = np.empty(ROWS), 0.0
+    for i in range(ROWS):
+        level += size / 150
+        if level > size * rng.uniform(0.7, 1.3):
+            level = 0.0
+        error[i] = level
+    return error
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_steps_are_found_where_and_as_high_as_they_are(seed):
+    rng = np.random.default_rng(seed)
+    rows, heights = [900, 2500, 4200, 5200], [0.15, -0.2, 0.12, 0.3]
+    stairs = sum(h * (np.arange(ROWS) >= r) for r, h in zip(rows, heights, strict=True))
+    found, without = find_steps(stairs + coloured(rng))
+    assert len(found) == 4
+    assert max(min(abs(f - r) for f in found) for r in rows) <= 8
+    assert np.std(without) < 1.15 * np.std(coloured(np.random.default_rng(seed)))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_neither_a_walk_nor_a_slope_nor_a_wave_has_steps(seed):
+    rng = np.random.default_rng(seed)
+    along = np.linspace(0, 1, ROWS)
+    for smooth in (np.cumsum(rng.normal(0, 0.003, ROWS)), 2 * along, 0.3 * np.sin(20 * along), np.zeros(ROWS)):
+        found, without = find_steps(smooth + coloured(rng))
+        assert found == []
+        assert np.ptp(without) > 0
+
+
+def test_slips_give_themselves_away_and_noise_does_not():
+    rng = np.random.default_rng(3)
+    noise = coloured(rng)
+    steps = sudden_steps(fit_of(stick_slip(rng) + noise))
+    assert len(steps.rows) > 20
+    assert steps.rms > 0.03
+    assert not sudden_steps(fit_of(noise)).any
+    assert not sudden_steps(fit_of(np.cumsum(rng.normal(0, 0.01, ROWS)))).any
+
+
+def test_a_glitch_of_the_readout_or_a_pulse_at_an_angle_is_no_slip():
+    rng = np.random.default_rng(4)
+    glitches = np.zeros(ROWS)
+    glitches[rng.choice(ROWS, 40, replace=False)] = 0.5
+    assert not sudden_steps(fit_of(coloured(rng) + glitches)).any
+    at_an_angle = 0.5 * (np.mod(THETA, TURN) < 0.2)
+    assert not sudden_steps(fit_of(coloured(rng) + at_an_angle)).any
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_slow_wave_is_told_from_wander(seed):
+    rng = np.random.default_rng(seed)
+    wander = lfilter([1.0], [1.0, -0.998], rng.normal(0, 0.004, ROWS))
+    noise = rng.normal(0, 0.02, ROWS)
+    assert slow_wave(fit_of(wander + noise)) is None
+    wave = slow_wave(fit_of(0.2 * np.sin(TURN * np.arange(ROWS) * 0.01 / 5.3) + wander + noise))
+    assert wave.period == pytest.approx(5.3, rel=0.05)
+    assert wave.rms == pytest.approx(0.2 / np.sqrt(2), rel=0.15)
+
+
+def warmed(error):
+    """A drift fitted to `error` beside an offset."""
+    start = fit_of(error)
+    return joint_fit(start, [EFFECTS["thermal_drift"].term(start.problem.samples, {"time_constant_s": 20.0})])
+
+
+def test_a_drift_stands_in_noise_and_is_lost_in_a_walk():
+    """Of ten walks, whose drift as fitted takes half their power and more, a few may pass for one; no drift is lost."""
+    lost = []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        drift = 0.2 * (1 - np.exp(-np.arange(ROWS) * 0.01 / 20.0))
+        assert not lost_in_wander(warmed(drift + coloured(rng)), 0, PRICE)
+        lost.append(lost_in_wander(warmed(np.cumsum(rng.normal(0, 0.006, ROWS)) + coloured(rng)), 0, PRICE))
+    assert sum(lost) >= 8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["slips", "steps", "wave"])
+def test_what_changes_in_time_is_unknown(study, kind):
+    rng = np.random.default_rng(5)
+    rows = np.arange(ROWS)
+    hidden = {
+        "slips": stick_slip(rng),
+        "steps": 0.25 * ((rows > 800).astype(float) - (rows > 2100) + (rows > 2900) + (rows > 4700)),
+        "wave": 0.25 * np.sin(TURN * rows * 0.01 / 7.1),
+    }[kind]
+    error = kinematic_error_arcmin(study.drive, study.errors, THETA) + hidden + rng.normal(0, 0.015, ROWS)
+    diagnosis = diagnose(record(error), study.drive)
+    assert diagnosis.verdict == "unknown"
+    assert diagnosis.where["domain"] == "time"
+    assert diagnosis.effects == ()
