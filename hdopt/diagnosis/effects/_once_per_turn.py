@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from hdopt.diagnosis.effect import Term, sine_columns, terms_at
+
+LEAST_PART = 0.1
+"""Size of the smaller of two orders over the larger from which both are there."""
 
 
 class ShaftSine:
@@ -39,6 +44,12 @@ class ShaftSine:
             trials=float(len(self.variants)),
             odds=self.odds[index],
         )
+
+    @staticmethod
+    def every_part_shows(term, estimate):
+        """Of two orders both must be there: one alone is another variant's, or another effect's."""
+        size = np.hypot(estimate.values[0 : term.width : 2], estimate.values[1 : term.width : 2])
+        return bool(size.min() > LEAST_PART * size.max())
 
     def orders(self, term, ratio):
         return [k if shaft == "input" else k / ratio for shaft, k in self.variants[int(term.shape["variant"])]]

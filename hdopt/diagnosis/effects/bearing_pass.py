@@ -45,6 +45,11 @@ STANDS_OUT = 10.0
 below it no bearing is looked for.
 """
 
+LINE_SHOWS, LEAST_LINE = 4.0, 0.1
+"""Standard deviations, and part of the strongest, from which a line is there."""
+FEW_WAVES, MANY_SHOW = 3, 0.5
+"""Sets of so few waves must show all of them, larger ones this part."""
+
 LINES = ((0, 1, 2, 3, 4), (0, 3), (0, 2), (0, 1, 2), (3, 4), (0, 3, 4), (0, 2, 3), (1, 2), (2, 3), (1, 2, 3))
 """Which of the five orders a variant shows."""
 
@@ -125,31 +130,41 @@ class BearingPass:
         if probe.fit.problem.base is None:
             return []
         half = (1 + ratios) * (1 + 1 / probe.samples.ratio) / 2
-        lines = [2 * half, 4 * half, 1 + half, np.abs(1 - half), 1 + 3 * half, np.abs(3 * half - 1)]
-        lines = [np.interp(line, grid, power, left=0.0, right=0.0) for line in lines]
-        score = sum(lines)
+        waves = [self._wave(power, grid, h, half) for h in ZONE_HARMONICS[-1]]
         tops = []
-        for weight in (score, lines[0]):
+        # Any strong line is some wave of some bearing: over all waves it counts how many show, not how strongly.
+        usual = STANDS_OUT * float(np.median(power[power > 0]))
+        for weight in (sum(waves[:4]), waves[1], sum(np.log1p(wave / usual) for wave in waves)):
             weight = weight.copy()
             for _ in range(2):
                 at = int(np.argmax(weight))
                 tops.append(float(ratios[at]))
                 weight[np.abs(ratios - ratios[at]) < 1 / probe.samples.span_turns] = 0
-        shapes = [
-            {"ball_to_pitch_ratio": r + d / probe.samples.span_turns, "balls": 0.0, "zones": float(v)}
+
+        def best_of(shapes):
+            shapes = list(shapes)
+            counts = [trials * (len(BALLS) if shape["balls"] else 1) for shape in shapes]
+            terms = [self.term(probe.samples, s, trials=n) for s, n in zip(shapes, counts, strict=True)]
+            return best_terms(probe, terms)[0].shape
+
+        def likely_balls(ratio):
+            """Numbers of balls whose own wave shows most: all alike in load, unlike in place."""
+            half = (1 + ratio) * (1 + 1 / probe.samples.ratio) / 2
+            size = [float(self._wave(power, grid, int(n), np.array([half]))[0]) for n in BALLS]
+            return [float(BALLS[i]) for i in np.argsort(size)[-2:]]
+
+        best = best_of(
+            {"ball_to_pitch_ratio": r, "balls": n, "zones": v}
             for r in tops
+            for n, v in ((0.0, 0.0), (0.0, 2.0), (0.0, 5.0), (likely_balls(r)[-1], 2.0))
+        )
+        best = best_of(
+            {**best, "ball_to_pitch_ratio": best["ball_to_pitch_ratio"] + d / probe.samples.span_turns}
             for d in (-0.4, -0.2, 0.0, 0.2, 0.4)
-            for v in ((0,) if d else (0, 2))
-        ]
-        best = best_terms(probe, [self.term(probe.samples, s, trials=trials) for s in shapes])[0].shape
+        )
         sets = [{**best, "zones": float(v)} for v in range(len(ZONE_HARMONICS))]
         best = widest_that_pays(probe, [self.term(probe.samples, s, trials=trials) for s in sets])[0].shape
-        # All balls alike in load, unlike in place: the ring's own wave of n balls under each lobe as well.
-        half = (1 + best["ball_to_pitch_ratio"]) * (1 + 1 / probe.samples.ratio) / 2
-        waves = [np.interp([n * half, abs(n * half - n % 2)], grid, power, left=0.0, right=0.0).max() for n in BALLS]
-        counted = [{**best, "balls": float(BALLS[i])} for i in np.argsort(waves)[-2:]]
-        terms = [self.term(probe.samples, s, trials=trials * len(BALLS)) for s in counted]
-        best = best_terms(probe, [self.term(probe.samples, best, trials=trials), *terms])[0].shape
+        best = best_of({**best, "balls": n} for n in {0.0, best["balls"], *likely_balls(best["ball_to_pitch_ratio"])})
         trials *= len(BALLS) if best["balls"] else 1
         fine = [
             {**best, "ball_to_pitch_ratio": best["ball_to_pitch_ratio"] + d / probe.samples.span_turns}
@@ -165,8 +180,28 @@ class BearingPass:
         return bool(power.min() * gain / power.sum() > 20.0)
 
     @staticmethod
+    def every_part_shows(term, estimate):
+        """Any line, and any line with its double, is an order of some bearing: named lines must all be there, as must a
+        few waves of unequal balls, and of many waves a good part.
+        """
+        sines = 2 * (term.width // 2)
+        size = np.hypot(estimate.values[0:sines:2], estimate.values[1:sines:2])
+        variance = np.diag(estimate.covariance)[:sines]
+        certain = size > LINE_SHOWS * np.sqrt(0.5 * (variance[0::2] + variance[1::2]))
+        if "zones" not in term.shape:
+            return bool(np.all(certain & (size > LEAST_LINE * size.max())))
+        if len(ZONE_HARMONICS[int(term.shape["zones"])]) <= FEW_WAVES:
+            return bool(np.all(certain & (size > LEAST_LINE * size.max())))
+        return bool(np.mean(certain) >= MANY_SHOW)
+
+    @staticmethod
     def _power(power, grid, orders, samples):
         return np.interp(orders, grid, power, left=0.0, right=0.0)
+
+    def _wave(self, power, grid, harmonic, half):
+        """Power at the orders of one wave of the balls' place: direct if even, through the change of zone if odd."""
+        orders = [harmonic * half] if harmonic % 2 == 0 else [1 + harmonic * half, np.abs(harmonic * half - 1)]
+        return sum(np.interp(order, grid, power, left=0.0, right=0.0) for order in orders)
 
     def term(self, samples, shape, base_value=None, trials=1e4):
         if "zones" in shape:

@@ -8,12 +8,32 @@ this as a cause of the mismatch with its own rig. Units: amplitude um of arc at 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from hdopt.diagnosis.effect import Term, terms_at, widest_that_pays
-from hdopt.diagnosis.effects._zone_harmonics import zone_harmonics
+from hdopt.diagnosis.effects._zone_harmonics import strongest_few, zone_harmonics
 
-SETS = ((2,), (3,), *(tuple(range(2, k + 1)) for k in (3, 4, 5, 8, 14, 24, 40)))
+RUNS = ((2,), (3,), *(tuple(range(2, k + 1)) for k in (3, 4, 5, 8, 14, 24, 40)))
+"""Sets of harmonics without a gap, as of a pitch deviation of any shape, the first alone among them."""
+FEW, MOST_OF_FEW = tuple(range(2, 13)), 3
+"""Harmonics of which also a few may stand out alone, as of cutter, chuck and machine table, and how many."""
+
+LEAST_OF_FEW = 0.15
+"""Size of the smallest of a few harmonics over the largest: less is what another shape leaves."""
+SHORT_RUN, SHOWN_OF_A_RUN = 4, 0.5
+"""Harmonics of a short run, and the part of them that must be of such a size."""
+
+
+def members_of(shape) -> tuple[int, ...]:
+    """The harmonics that a shape holds: it counts them as bits."""
+    bits = int(shape["members"])
+    return tuple(h for h in range(bits.bit_length()) if bits >> h & 1)
+
+
+def shape_of(members) -> dict[str, float]:
+    return {"members": float(sum(1 << h for h in set(members)))}
 
 
 class CircularSplineToothHarmonics:
@@ -33,19 +53,56 @@ class CircularSplineToothHarmonics:
         return samples.theta
 
     def search(self, probe):
-        terms = terms_at(self, probe.samples, [{"harmonics": float(i)} for i in range(len(SETS))])
-        return widest_that_pays(probe, [term for term in terms if term.width <= probe.samples.rows_per_turn])
+        limit = min(0.5 * probe.samples.rows_per_turn, 1.5 * probe.samples.highest_order)
+        runs = [run for run in RUNS if run[-1] <= limit]
+        terms = widest_that_pays(probe, terms_at(self, probe.samples, [shape_of(run) for run in runs]))
+        few = [members for members in self._strongest_few(probe, limit) if self.stands_alone(members)]
+        return [*terms, *terms_at(self, probe.samples, [shape_of(members) for members in few if members not in RUNS])]
+
+    def _strongest_few(self, probe, limit):
+        members = tuple(h for h in FEW if h <= limit)
+        if len(members) < 2:
+            return []
+        (wide,) = terms_at(self, probe.samples, [shape_of(members)])
+        return strongest_few(*probe.table(wide), members, MOST_OF_FEW)
+
+    @staticmethod
+    def stands_alone(members):
+        """One wave alone beyond the first two would be a lobe of the clamping."""
+        return len(members) > 1
+
+    @staticmethod
+    def every_part_shows(term, estimate):
+        """A few harmonics that stand out are all there; of a short run without a gap some may be missing, and of a long
+        one, as of segments, the high ones are small.
+        """
+        members = members_of(term.shape)
+        size = np.hypot(estimate.values[0 : term.width : 2], estimate.values[1 : term.width : 2])
+        shown = size > LEAST_OF_FEW * size.max()
+        if members not in RUNS:
+            return bool(np.all(shown))
+        return len(members) > SHORT_RUN or bool(np.mean(shown) >= SHOWN_OF_A_RUN)
+
+    def trimmed(self, term, coefficients):
+        """The shape without the harmonics that do not show, or None where that leaves too few."""
+        members = members_of(term.shape)
+        size = np.hypot(coefficients[0::2], coefficients[1::2])
+        left = tuple(h for h, s in zip(members, size, strict=True) if s > LEAST_OF_FEW * size.max())
+        return shape_of(left) if members not in RUNS and self.stands_alone(left) and left != members else None
 
     def term(self, samples, shape, base_value=None):
-        harmonics = SETS[int(shape["harmonics"])]
-        return Term(self.id, dict(shape), zones=zone_harmonics(self.phase(samples), harmonics), trials=len(SETS))
+        members = members_of(shape)
+        trials = float(len(RUNS))
+        if members not in RUNS:
+            trials *= math.comb(len(FEW), len(members))
+        return Term(self.id, dict(shape), zones=zone_harmonics(self.phase(samples), members), trials=trials)
 
     def orders(self, term, ratio):
-        return list(SETS[int(term.shape["harmonics"])])
+        return list(members_of(term.shape))
 
     def parameters(self, term, estimate):
         found = {}
-        for i, h in enumerate(SETS[int(term.shape["harmonics"])]):
+        for i, h in enumerate(members_of(term.shape)):
             found[f"amplitude_{h}_um"] = estimate.derived(
                 lambda v, i=i: 1e3 * float(np.hypot(v[2 * i], v[2 * i + 1])), "um"
             )

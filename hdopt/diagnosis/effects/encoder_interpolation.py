@@ -24,6 +24,8 @@ SEARCHED = (1.0, 2.0, 4.0)
 """Two cycles a line without the first cannot be told from one cycle of twice as many lines."""
 SHOWS = 0.01
 """Power over that of its double or triple from which a line is taken for the encoder's own."""
+HARMONICS_OF_TEETH = 40
+"""Waves round the splines, h and h (1 + 1/N) up to so many, and the mesh order are the teeth's."""
 FEW_LINES, FEW_LINES_ODDS = 17, -8.0
 """Below so many lines a turn bolts and teeth are likelier than an encoder; log odds."""
 
@@ -35,11 +37,21 @@ def beside_the_mesh(orders, ratio):
     return near & (np.abs(orders - mesh) < SIDEBAND_REACH)
 
 
+def is_of_teeth(order, multiples, ratio, output):
+    """Whether an output encoder's line is where a wave round one of the splines shows, or any of its `multiples` at the
+    mesh of the teeth.
+    """
+    waves = (order, order / (1 + 1 / ratio)) if output else ()
+    round_a_spline = any(abs(wave - round(wave)) < 1e-6 and round(wave) <= HARMONICS_OF_TEETH for wave in waves)
+    return round_a_spline or any(abs(m * order - 2 * round(ratio + 1)) < 1e-6 for m in multiples)
+
+
 class EncoderInterpolation:
     id = "encoder_interpolation"
     domain = "order"
     needs_base = False
     high_order = True
+    leaves_nothing = True
     separating = (
         "record at two thirds of the speed and twice the sampling rate: the ripple stays at the encoder's lines"
     )
@@ -92,7 +104,9 @@ class EncoderInterpolation:
         multiples = HARMONICS[shape["harmonics"]]
         columns = sine_columns(angle, [m * shape["lines"] for m in multiples])
         odds = FEW_LINES_ODDS if shape["lines"] < FEW_LINES else 0.0
-        return Term(self.id, dict(shape), columns=columns, trials=trials, odds=odds)
+        order = shape["lines"] / (samples.ratio if shape["output"] else 1.0)
+        doubtful = is_of_teeth(order, multiples, samples.ratio, bool(shape["output"]))
+        return Term(self.id, dict(shape), columns=columns, trials=trials, odds=odds, doubtful=doubtful)
 
     def orders(self, term, ratio):
         order = term.shape["lines"] / (ratio if term.shape["output"] else 1.0)

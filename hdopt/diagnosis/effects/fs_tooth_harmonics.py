@@ -22,6 +22,10 @@ class FlexsplineToothHarmonics(CircularSplineToothHarmonics):
         need = samples.ratio / 8
         return None if samples.span_turns >= min(need, 10) else f"at least {min(need, 10):.0f} input turns"
 
+    @staticmethod
+    def stands_alone(members):
+        return True
+
     def orders(self, term, ratio):
         return [h * (1 + 1 / ratio) for h in super().orders(term, ratio)]
 

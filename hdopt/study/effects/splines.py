@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from hdopt.diagnosis.effects.circular_spline_lobing import LOBES
-from hdopt.diagnosis.effects.cs_tooth_harmonics import SETS
+from hdopt.diagnosis.effects.cs_tooth_harmonics import RUNS, members_of, shape_of
 from hdopt.diagnosis.effects.local_tooth_defect import COORDINATES, NARROWEST_DEG, WIDEST_DEG, WIDEST_OUTPUT_DEG
 from hdopt.diagnosis.effects.tooth_mesh import SIDEBANDS, ZONE_SIDEBANDS
 from hdopt.errors import HdoptError
@@ -23,15 +23,15 @@ class CircularSplineToothHarmonics(SineSet):
 
     id = "cs_tooth_harmonics"
     unit = UM
-    sines: ClassVar = {h: (f"amplitude_{h}_um", f"phase_{h}_deg") for h in sorted({h for group in SETS for h in group})}
+    sines: ClassVar = {h: (f"amplitude_{h}_um", f"phase_{h}_deg") for h in RUNS[-1]}
 
     def build(self, gear):
-        index = smallest_set(SETS, list(self.given()))
-        return AddedEffect(self.id, {"harmonics": float(index)}, self.coefficients(SETS[index]))
+        members = sorted(self.given())
+        return AddedEffect(self.id, shape_of(members), self.coefficients(members))
 
     @classmethod
     def keys(cls, effect, gear):
-        return cls.written(SETS[int(effect.shape["harmonics"])], effect.coefficients)
+        return cls.written(members_of(effect.shape), effect.coefficients)
 
 
 class FlexsplineToothHarmonics(CircularSplineToothHarmonics):

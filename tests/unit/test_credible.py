@@ -1,0 +1,134 @@
+"""What a name rests on besides its evidence: every part of an effect shows, and no other's orders are borrowed."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hdopt.diagnosis.candidates import Candidate, joint_fit
+from hdopt.diagnosis.credible import is_credible
+from hdopt.diagnosis.effects import EFFECTS
+from hdopt.diagnosis.effects.cs_tooth_harmonics import members_of, shape_of
+from hdopt.diagnosis.effects.encoder_interpolation import is_of_teeth
+from hdopt.diagnosis.fit import Problem, evaluate, refine
+from hdopt.diagnosis.noise import Noise
+from hdopt.diagnosis.nuisance import nuisances_for
+from hdopt.diagnosis.probe import FitProbe
+from hdopt.diagnosis.ripple import strong_ripple
+from hdopt.diagnosis.samples import gather, neighbours_for
+from hdopt.diagnosis.select import first_credible, trimmed
+from hdopt.drive import ARCMIN
+from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
+from hdopt.kinematics.waveform import kinematic_error_arcmin
+from hdopt.recording import recording_from_table
+from hdopt.study import load_study
+
+TURN = 2 * np.pi
+RATIO = 80.0
+NOISE = 0.01
+
+
+@pytest.fixture(scope="module")
+def study():
+    return load_study(drive="csf-25-80")
+
+
+def fitted(study, hidden, turns=40, rate=100):
+    """The base, from the errors it was made with, on a record that has `hidden` (a function of the input angle) too."""
+    theta = np.arange(turns * rate) * TURN / rate
+    error = kinematic_error_arcmin(study.drive, study.errors, theta) + hidden(theta)
+    error = error + np.random.default_rng(0).normal(0, NOISE, len(theta))
+    table = {
+        "time_s": 0.01 * np.arange(len(theta)),
+        "input_angle_deg": np.degrees(theta),
+        "output_angle_deg": np.degrees(theta / RATIO - error * ARCMIN),
+    }
+    recording = recording_from_table(pd.DataFrame(table), RATIO, name="record")
+    samples = gather([recording], neighbours_for([recording]))
+    base = CartesianModel.of(study.drive)
+    nuisances = nuisances_for(samples, base)
+    problem = Problem(samples, base, nuisances.columns(samples), Noise.white(samples, NOISE))
+    errors = to_cartesian(study.errors, base.half_width)
+    fit = refine(evaluate(problem, errors, np.zeros(problem.nuisance.shape[1]), (), ()), iterations=3)
+    return fit, recording, nuisances
+
+
+def with_effect(fit, name, shape):
+    return joint_fit(fit, [EFFECTS[name].term(fit.problem.samples, shape, fit.base_value)])
+
+
+def test_a_few_harmonics_are_found_alone(study):
+    """Waves 3 and 7 round the flexspline, none between them."""
+    ratio = 1 + 1 / RATIO
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(4 * ratio * t) + 0.08 * np.sin(8 * ratio * t + 1))
+    found = EFFECTS["fs_tooth_harmonics"].search(FitProbe(fit))
+    assert (4, 8) in [members_of(term.shape) for term in found]
+
+
+def test_parts_that_do_not_show_are_left_out(study):
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(4 * t) + 0.08 * np.sin(8 * t + 1))
+    all_of_them = with_effect(fit, "cs_tooth_harmonics", shape_of((4, 6, 8)))
+    assert not is_credible(all_of_them)
+    few = trimmed(all_of_them)
+    assert members_of(few.terms[0].shape) == (4, 8)
+    assert is_credible(few)
+    # One wave alone is a lobe of the clamping: nothing is left of such a set.
+    lobes, _, _ = fitted(study, lambda t: 0.1 * np.sin(6 * t))
+    assert trimmed(with_effect(lobes, "cs_tooth_harmonics", shape_of((4, 6)))) is None
+
+
+def test_a_line_and_its_double_are_no_bearing(study):
+    """At 2.667 and 5.333 cycles a turn they are waves 4 and 8 of some bearing's balls, without wave 2."""
+    half = (1 + 0.3168) * (1 + 1 / RATIO) / 2
+    shape = {"ball_to_pitch_ratio": 0.3168, "balls": 8.0, "zones": 1.0}
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(4 * half * t) + 0.03 * np.sin(8 * half * t + 1))
+    assert not is_credible(with_effect(fit, "bearing_pass", shape))
+    fit, _, _ = fitted(
+        study, lambda t: 0.1 * np.sin(4 * half * t) + 0.03 * np.sin(8 * half * t + 1) + 0.05 * np.sin(2 * half * t)
+    )
+    assert is_credible(with_effect(fit, "bearing_pass", shape))
+
+
+def test_an_eccentric_encoder_with_an_ellipse_shows_both(study):
+    shape = {"variant": 1.0}
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(2 * t / RATIO), turns=80)
+    assert not is_credible(with_effect(fit, "encoder_output_eccentricity", shape))
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(2 * t / RATIO) + 0.04 * np.sin(t / RATIO), turns=80)
+    assert is_credible(with_effect(fit, "encoder_output_eccentricity", shape))
+
+
+@pytest.mark.parametrize(
+    ("lines", "multiples", "output", "expected"),
+    [
+        (240, (1,), True, True),  # order 3
+        (243, (1,), True, True),  # order 3 (1 + 1/N)
+        (250, (1,), True, False),
+        (24, (1, 2), False, False),
+        (162, (1,), False, True),  # the mesh
+        (81, (1, 2), False, True),  # its double is
+        (81, (1,), False, False),
+    ],
+)
+def test_lines_at_the_orders_of_the_teeth(lines, multiples, output, expected):
+    order = lines / RATIO if output else float(lines)
+    assert is_of_teeth(order, multiples, RATIO, output) is expected
+
+
+def test_those_that_may_not_be_said_neither_lead_nor_rival(study):
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(4 * t) + 0.08 * np.sin(8 * t + 1))
+    bad = with_effect(fit, "cs_tooth_harmonics", shape_of((4, 6, 8)))
+    good = with_effect(fit, "cs_tooth_harmonics", shape_of((4, 8)))
+    candidates = [Candidate(bad, 100.0, 0.0), Candidate(good, 98.0, 0.0), Candidate(bad, 95.0, 0.0)]
+    candidates += [Candidate(bad, 50.0, 0.0), Candidate(fit, 0.0, 0.0)]
+    assert [c.evidence for c in first_credible(candidates)] == [98.0, 50.0, 0.0]
+
+
+@pytest.mark.parametrize(("size", "set_aside"), [(0.3, True), (0.002, False)])
+def test_strong_ripple_waits_for_its_own_search(study, size, set_aside):
+    """Order 101.3 in rows that are means of several samples: kept, it would come back as another order."""
+    fit, recording, nuisances = fitted(study, lambda t: size * np.sin(101.3 * t), turns=60, rate=400)
+    assert fit.problem.samples.are_averages
+    ripple = strong_ripple([recording], fit, nuisances)
+    assert (ripple is not None) is set_aside
+    if set_aside:
+        expected = size * np.sin(101.3 * recording.input_angle)
+        assert np.std(ripple - expected) < 0.2 * np.std(expected)
