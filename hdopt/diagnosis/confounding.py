@@ -16,11 +16,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hdopt.diagnosis.candidates import search_terms
 from hdopt.diagnosis.effect import Term
 from hdopt.diagnosis.effects import EFFECTS
 from hdopt.diagnosis.fit import Fit
 from hdopt.diagnosis.probe import FitProbe
-from hdopt.diagnosis.select import search_terms
 
 Array = NDArray[np.float64]
 

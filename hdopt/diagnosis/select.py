@@ -10,63 +10,37 @@ stands.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hdopt.diagnosis.base import fit_base
+from hdopt.diagnosis.candidates import Candidate, joint_fit, rank_subsets, search_terms, weigh, without_each
 from hdopt.diagnosis.catalogue import EXPLANATIONS, is_outside
+from hdopt.diagnosis.credible import is_credible
 from hdopt.diagnosis.effect import Term
-from hdopt.diagnosis.fit import Fit, evaluate, extend, refine
+from hdopt.diagnosis.fit import Fit, refine
 from hdopt.diagnosis.parallel import each
+from hdopt.diagnosis.price import NOTHING_BESIDE, Beside, flexibility, has_exact_shape, kind_of
 from hdopt.diagnosis.probe import FitProbe
 
-Array = NDArray[np.float64]
-
-MOST_EFFECTS = 3
-EFFECT_COST = 4.0
-"""Log prior odds against an effect being there: about 1 in 50."""
-DISCREPANCY = 0.08
-"""Share of the explained power that an effect must add beyond others of its kind: no model's shapes are exact, and
-what a slightly wrong shape leaves must not be named as further physics.
-"""
-OTHER_KIND = 0.01
-"""The same beside effects of another kind only: what a wrong loop leaves is no order, and the reverse."""
-KINDS = {
-    "order": "turning",
-    "angle": "turning",
-    "asynchronous order": "turning",
-    "time": "slow",
-    "temperature": "slow",
-    "torque": "load",
-}
-"""Kind of an effect by its domain; reversal, direction and speed are one: no curve of the torque makes a loop."""
-FEW_COEFFICIENTS, MANY_COEFFICIENTS = 8, 24
-CLEAR_WIN = 0.12
-"""Share of the explained power by which a description without physics must beat the catalogue."""
 LEADERS = 3
+TIE_OF_VARIANTS = 10.0
+"""Log evidence by which a wider variant of an effect must be better."""
+CLOSE_BEHIND = 10.0
+"""Log evidence within which a rival of the best must be credible too."""
+CLOSE = 0.8
+"""Share of the leader's evidence from which those behind it are fitted from new drives too."""
+BEHIND = 0.2
+"""Share of a wildcard's evidence from which a single effect may be a half of what it explains."""
+KEPT = 0.005
+"""Part of the gain that parts which do not show may take with them: without them a set can be said, with them not."""
+KNOWN = 5
+"""Candidates from which a later search goes on."""
+NARROW = 4
+"""Coefficients and shapes up to which sets are also fitted from new random drives."""
 WORTH_A_FIT = 0.25
 """Share of the best subset's gain from which a single effect is fitted jointly too: the refitted base may favour it."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A set of terms with its joint fit and log evidence against the base alone."""
-
-    fit: Fit
-    evidence: float
-    gain: float
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        return tuple(term.effect for term in self.fit.terms)
-
-    @property
-    def outside(self) -> bool:
-        """Whether a description without physics takes part."""
-        return any(is_outside(name) for name in self.effects)
 
 
 @dataclass(frozen=True)
@@ -81,169 +55,14 @@ class Selection:
     def best(self) -> Candidate:
         return self.candidates[0]
 
+    @property
+    def leaders(self) -> list[Fit]:
+        """Fits of the best candidates that have terms."""
+        return [candidate.fit for candidate in self.candidates if candidate.fit.terms][:KNOWN]
+
     def with_best_fit(self, fit: Fit) -> Selection:
         """The same selection with its best candidate fitted otherwise."""
         return replace(self, candidates=(replace(self.best, fit=fit), *self.candidates[1:]))
-
-
-def search_terms(probe: FitProbe, skip: Sequence[str] = (), only: Sequence[str] | None = None) -> list[Term]:
-    """Every effect's best terms for the probe's residual."""
-    base = probe.fit.problem.base
-    effects = [
-        effect
-        for effect in EXPLANATIONS.values()
-        if effect.id not in skip
-        and (only is None or effect.id in only)
-        and not (effect.needs_base and base is None)
-        and effect.lacks(probe.samples) is None
-    ]
-    return [term for found in each(lambda effect: effect.search(probe), effects) for term in found]
-
-
-@dataclass(frozen=True)
-class Beside:
-    """Terms already taken out of the rows (a ripple of higher order), and what they gained there: what their shapes
-    leave must not be named either.
-    """
-
-    terms: tuple[Term, ...] = ()
-    gain: float = 0.0
-
-
-NOTHING_BESIDE = Beside()
-
-
-def price(
-    terms: Sequence[Term], rows: float, gain: float, inflation: float, beside: Beside = NOTHING_BESIDE
-) -> float:
-    """What a set of terms has to pay in log evidence."""
-    cost = 0.5 * sum(term.freedom for term in terms) * math.log(rows)
-    cost += sum(math.log(max(term.trials, 1.0)) - term.odds for term in terms)
-    outside = sum(is_outside(term.effect) for term in terms)
-    cost += outside * 0.5 * CLEAR_WIN * gain / inflation
-    inexact = discrepancy([*terms, *beside.terms]) - discrepancy(beside.terms) if terms else 0.0
-    return cost + len(terms) * EFFECT_COST + 0.5 * inexact * (gain + beside.gain) / inflation
-
-
-def discrepancy(terms: Sequence[Term]) -> float:
-    """Share of the explained power that a set of terms pays for the inexactness of its shapes; a description without
-    physics could be the misfit of anything.
-    """
-    kinds = {kind_of(term) for term in terms if not is_outside(term.effect)}
-    alike = max(len(terms) - max(len(kinds), 1), 0)
-    # Sines of known orders leave nothing for each other: their shape is exact.
-    each_alike = OTHER_KIND if all(has_exact_shape(term) for term in terms) else DISCREPANCY
-    flexible = sum(flexibility(term) for term in terms)
-    return max(len(kinds) - 1, 0) * OTHER_KIND + alike * each_alike + flexible * DISCREPANCY
-
-
-def has_exact_shape(term: Term) -> bool:
-    """Whether a term's columns are known to the last digit, so that its fit leaves nothing."""
-    return getattr(EXPLANATIONS[term.effect], "exact_shape", False)
-
-
-def flexibility(term: Term) -> float:
-    """0 for a term of few coefficients, 1 for one that bends to the misfit of anything as a second effect would."""
-    return min(max((term.width - FEW_COEFFICIENTS) / (MANY_COEFFICIENTS - FEW_COEFFICIENTS), 0.0), 1.0)
-
-
-def kind_of(term: Term) -> str:
-    """What a term's misfit looks like; the resonance, whose shape is the base's orders, turns."""
-    return "turning" if term.effect == "resonance" else KINDS.get(EXPLANATIONS[term.effect].domain, "way")
-
-
-def rank_subsets(
-    probe: FitProbe,
-    terms: Sequence[Term],
-    inflation: float,
-    most: int = MOST_EFFECTS,
-    beside: Beside = NOTHING_BESIDE,
-) -> list[tuple[float, float, tuple[int, ...]]]:
-    """(evidence, gain, indices) of the best subsets of `terms`, at most one term an effect."""
-    if not terms:
-        return []
-    blocks, start = [], 0
-    stacked = []
-    for term in terms:
-        columns = probe.columns(term)
-        stacked.append(columns)
-        blocks.append(np.arange(start, start + columns.shape[1]))
-        start += columns.shape[1]
-    matrix = np.column_stack(stacked)
-    gram, moment = matrix.T @ matrix, matrix.T @ probe.white_residual
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-30))
-    gram, moment = gram / np.outer(scale, scale), moment / scale
-    rows = float((probe.noise.root_weight > 0).sum())
-    sigma2 = probe.noise.sigma**2
-
-    def gain_of(subset: tuple[int, ...]) -> float:
-        index = np.concatenate([blocks[i] for i in subset])
-        part = gram[np.ix_(index, index)] + 1e-8 * np.eye(len(index))
-        return float(moment[index] @ np.linalg.solve(part, moment[index])) / sigma2
-
-    scored: dict[tuple[int, ...], float] = {(i,): gain_of((i,)) for i in range(len(terms))}
-    frontier = list(scored)
-    for _ in range(most - 1):
-        frontier = sorted(frontier, key=lambda s: -scored[s])[:14]
-        grown = {
-            tuple(sorted((*subset, i)))
-            for subset in frontier
-            for i in range(len(terms))
-            if terms[i].effect not in {terms[j].effect for j in subset}
-        }
-        frontier = [subset for subset in grown if subset not in scored]
-        scored |= {subset: gain_of(subset) for subset in frontier}
-    top_gain = max(scored.values())
-    ranked = [
-        (gain / inflation / 2 - price([terms[i] for i in subset], rows, top_gain, inflation, beside), gain, subset)
-        for subset, gain in scored.items()
-    ]
-    # One entry for each set of effects: its best variant.
-    ranked.sort(reverse=True)
-    seen, best = set(), []
-    for entry in ranked:
-        names = frozenset(terms[i].effect for i in entry[2])
-        if names not in seen:
-            seen.add(names)
-            best.append(entry)
-    return best
-
-
-def joint_fit(start: Fit, terms: Sequence[Term], rng: np.random.Generator | None = None) -> Fit:
-    """`terms` fitted together with the base, from `start` on; with `rng` also from new random drives."""
-    probe = FitProbe(replace(start, terms=(), coefficients=()), keep=())
-    bare = extend(replace_terms(start, ()), terms)
-    columns = np.column_stack([probe.columns(term) for term in terms])
-    gram = columns.T @ columns
-    target = probe.project(start.problem.noise.whiten(start.residual + start.contributions))
-    solution = np.linalg.solve(gram + 1e-8 * np.trace(gram) / len(gram) * np.eye(len(gram)), columns.T @ target)
-    parts, position = [], 0
-    for term in terms:
-        parts.append(solution[position : position + term.width])
-        position += term.width
-    seeded = evaluate(start.problem, start.errors, start.offsets, terms, parts)
-    best = refine(min(seeded, bare, key=lambda f: f.objective), iterations=15)
-    if rng is not None and start.problem.base is not None:
-        other = fit_base(start.problem, rng, starts=10, terms=tuple(best.terms), near=None)
-        if other.objective < best.objective * 1.02:
-            other = refine(other, iterations=10)
-            best = min(best, other, key=lambda f: f.objective)
-    return best
-
-
-def replace_terms(fit: Fit, terms: Sequence[Term]) -> Fit:
-    return evaluate(fit.problem, fit.errors, fit.offsets, terms, [np.zeros(t.width) for t in terms])
-
-
-def weigh(
-    fit: Fit, base: Fit, inflation: float, top_gain: float | None = None, beside: Beside = NOTHING_BESIDE
-) -> Candidate:
-    """Evidence of a joint fit against the base alone."""
-    sigma2 = fit.problem.noise.sigma**2
-    gain = (base.objective - fit.objective) / sigma2
-    rows = float((fit.problem.noise.root_weight > 0).sum())
-    top = gain if top_gain is None else top_gain
-    return Candidate(fit, gain / inflation / 2 - price(fit.terms, rows, max(top, 0.0), inflation, beside), gain)
 
 
 def select(
@@ -254,49 +73,73 @@ def select(
     rounds: int = 2,
     order_range: tuple[float, float] | None = None,
     clean: Fit | None = None,
-    known: Fit | None = None,
+    known: Sequence[Fit] = (),
     beside: Beside = NOTHING_BESIDE,
 ) -> Selection:
     """The candidates that explain best, by alternating search about the best fit and joint fits of the leaders.
 
     `clean` is a base fitted beside smooth nuisance columns: a drive less bent towards what is missing, from which the
-    search also starts. `known` is what an earlier search found: the search goes on from there; `beside` is what was
+    search also starts. `known` are the leaders of an earlier search, which goes on from there; `beside` is what was
     taken out of the rows before.
     """
     if order_range is None:
         order_range = (0.0, base.problem.samples.highest_order)
     fits: dict[frozenset[str], Fit] = {}
 
-    def explore(centre: Fit, pool: Sequence[Term], leaders: int) -> bool:
-        """Joint fits of the best subsets and the best single effects about `centre`; whether any was new."""
+    def explore(centre: Fit, pool: Sequence[Term], leaders: int, afresh: bool = False) -> bool:
+        """Joint fits of the best subsets and the best single effects about `centre`; whether any was new. `afresh` fits
+        the narrow effects, much of which a bent base can take up, from new random drives too.
+        """
         probe = FitProbe(centre, keep=(), order_range=order_range)
         ranked = rank_subsets(probe, pool, inflation, beside=beside)
         most = max((gain for _, gain, _ in ranked), default=0.0)
-        single = [entry for entry in ranked if len(entry[2]) == 1 and entry[1] >= WORTH_A_FIT * most]
+        single = [
+            (evidence, gain, subset)
+            for evidence, gain, subset in ranked
+            if len(subset) == 1 and (gain >= WORTH_A_FIT * most or (afresh and has_exact_shape(pool[subset[0]])))
+        ]
         chosen = ranked[:leaders] + single[: leaders + 4]
         sets = {}
         for _, _, subset in chosen:
             sets.setdefault(frozenset(pool[i].effect for i in subset), subset)
         new = False
-        for fit in each(lambda subset: joint_fit(centre, [pool[i] for i in subset]), sets.values()):
+
+        def fitted(numbered: tuple[tuple[int, ...], np.random.Generator]) -> Fit:
+            subset, own_rng = numbered
+            terms = [pool[i] for i in subset]
+            narrow = afresh and sum(term.freedom for term in terms) <= NARROW
+            return joint_fit(centre, terms, own_rng if narrow else None)
+
+        for fit in each(fitted, zip(sets.values(), rng.spawn(len(sets)), strict=True)):
             names = frozenset(term.effect for term in fit.terms)
-            if names not in fits or fit.objective < fits[names].objective * (1 - 1e-6):
+            if names not in fits or is_better(fit, fits[names]):
                 fits[names] = fit
                 new = True
         return new
+
+    def is_better(fit: Fit, known: Fit, by: float = 1e-3) -> bool:
+        """Of two fits of the same effects, whose variants may differ in width, whether the first has more evidence."""
+        top = max(weigh(fit, base, inflation).gain, weigh(known, base, inflation).gain)
+        first, second = (weigh(f, base, inflation, top, beside).evidence for f in (fit, known))
+        return first > second + by
+
+    def weigh_fit(fit: Fit) -> float:
+        return weigh(fit, base, inflation, beside=beside).evidence
 
     def leader() -> Candidate | None:
         top = max((weigh(f, base, inflation).gain for f in fits.values()), default=0.0)
         weighed = (weigh(f, base, inflation, top, beside) for f in fits.values())
         return max(weighed, key=lambda c: c.evidence, default=None)
 
-    if known is not None and known.terms:
-        known = refine(known, iterations=8)
-        fits[frozenset(term.effect for term in known.terms)] = known
-    else:
-        explore(base, search_terms(FitProbe(base, order_range=order_range), skip), LEADERS)
+    for fit in each(lambda fit: refine(fit, iterations=8), known):
+        fits[frozenset(term.effect for term in fit.terms)] = fit
+    if not fits:
+        explore(base, search_terms(FitProbe(base, order_range=order_range), skip), LEADERS, afresh=True)
     if clean is not None:
         explore(clean, search_terms(FitProbe(clean, order_range=order_range), skip), LEADERS)
+    for fit in behind_a_wildcard(leader(), fits.values(), weigh_fit):
+        pool = [*fit.terms, *search_terms(FitProbe(fit, order_range=order_range), [*skip, fit.terms[0].effect])]
+        explore(fit, pool, LEADERS)
     centre: Fit | None = None
     for _ in range(rounds):
         best = leader()
@@ -315,8 +158,113 @@ def select(
             pool += search_terms(FitProbe(centre, keep=(), order_range=order_range), [*skip, *names])
         if not explore(centre, pool, LEADERS):
             break
+    best = leader()
+    if best is not None and best.evidence > 0 and base.problem.base is not None:
+        # The leader has been fitted from new drives; those close behind it, and simpler sets, may want another drive.
+        behind = sorted((f for f in fits.values() if f is not best.fit), key=weigh_fit, reverse=True)[:LEADERS]
+        behind = [fit.terms for fit in behind if weigh_fit(fit) > CLOSE * best.evidence]
+        sets = [*behind, *narrower(best.fit, skip, order_range)]
+        pairs = zip(sets, rng.spawn(len(sets)), strict=True)
+        for fit in each(lambda pair: joint_fit(best.fit, *pair), pairs):
+            names = frozenset(term.effect for term in fit.terms)
+            if names not in fits or is_better(fit, fits[names]):
+                fits[names] = fit
+    for names, fit in list(fits.items()):
+        few = trimmed(fit)
+        if few is not None and is_better(few, fit, by=-KEPT * weigh(fit, base, inflation).gain / inflation):
+            fits[names] = few
+    while (best := leader()) is not None and best.evidence > 0 and len(best.fit.terms) > 1:
+        # A term that came in beside a better drive may have no part in it: without each, from where the best stands.
+        for fit in without_each(best.fit):
+            names = frozenset(term.effect for term in fit.terms)
+            if names not in fits or is_better(fit, fits[names]):
+                fits[names] = fit
+        if leader().fit is best.fit:
+            break
     top = max((weigh(f, base, inflation).gain for f in fits.values()), default=0.0)
     candidates = [weigh(f, base, inflation, top, beside) for f in fits.values()]
     candidates.append(Candidate(base, 0.0, 0.0))
     candidates.sort(key=lambda c: -c.evidence)
-    return Selection(base, tuple(candidates), inflation)
+    candidates = first_credible(candidates)
+    best = candidates[0]
+    fuller = in_full(best.fit, base, inflation, order_range) if best.fit.terms else best.fit
+    return Selection(base, (replace(best, fit=fuller), *candidates[1:]), inflation)
+
+
+def trimmed(fit: Fit) -> Fit | None:
+    """`fit` without the parts of its terms that do not show; None where all do."""
+    terms = []
+    for term, coefficients in zip(fit.terms, fit.coefficients, strict=True):
+        effect = EXPLANATIONS[term.effect]
+        shape = effect.trimmed(term, coefficients) if hasattr(effect, "trimmed") else None
+        terms.append(term if shape is None else effect.term(fit.problem.samples, shape, fit.base_value))
+    if all(new is old for new, old in zip(terms, fit.terms, strict=True)):
+        return None
+    return joint_fit(fit, terms)
+
+
+def in_full(fit: Fit, base: Fit, inflation: float, order_range: tuple[float, float]) -> Fit:
+    """`fit`, or the same effects in wider variants where these pay for their coefficients: what a name has to pay for
+    bending to anything, it need not pay any more once it stands.
+    """
+    rows = float((fit.problem.noise.root_weight > 0).sum())
+
+    def paid(candidate: Fit) -> float:
+        freedom = sum(term.freedom for term in candidate.terms)
+        trials = sum(math.log(max(term.trials, 1.0)) for term in candidate.terms)
+        return weigh(candidate, base, inflation).gain / inflation / 2 - 0.5 * freedom * math.log(rows) - trials
+
+    for i, term in enumerate(fit.terms):
+        keep = [j for j in range(len(fit.terms)) if j != i]
+        probe = FitProbe(fit, keep=keep, order_range=order_range)
+        wider = [t for t in search_terms(probe, only=[term.effect]) if t.width > term.width]
+        for other in wider:
+            candidate = joint_fit(fit, [other if j == i else t for j, t in enumerate(fit.terms)])
+            if paid(candidate) > paid(fit) + TIE_OF_VARIANTS and is_credible(candidate):
+                fit = candidate
+    return fit
+
+
+def behind_a_wildcard(leader: Candidate | None, fits: Iterable[Fit], evidence: Callable[[Fit], float]) -> list[Fit]:
+    """Single effects beside which a second is looked for, where the leader bends to anything: what it explains may be
+    two effects, of which each alone leaves the other.
+    """
+    if leader is None or leader.evidence <= 0:
+        return []
+    if not any(is_outside(t.effect) or t.doubtful or flexibility(t) > 0 for t in leader.fit.terms):
+        return []
+    single = [
+        fit
+        for fit in fits
+        if len(fit.terms) == 1
+        and fit is not leader.fit
+        and not is_outside(fit.terms[0].effect)
+        and evidence(fit) > BEHIND * leader.evidence
+    ]
+    return sorted(single, key=evidence, reverse=True)[:LEADERS]
+
+
+def narrower(fit: Fit, skip: Sequence[str], order_range: tuple[float, float]) -> list[list[Term]]:
+    """Sets in which a plain term takes the place of a wide one of `fit`: about a base that is bent to the wide one it
+    looks worse than it is.
+    """
+    sets = []
+    for i, term in enumerate(fit.terms):
+        if term.width <= NARROW or kind_of(term) != "turning":
+            continue
+        others = [t for j, t in enumerate(fit.terms) if j != i]
+        probe = FitProbe(fit, keep=[j for j in range(len(fit.terms)) if j != i], order_range=order_range)
+        found = search_terms(probe, [*skip, *(t.effect for t in fit.terms)])
+        plain = [t for t in found if t.width <= NARROW and kind_of(t) == "turning" and not t.doubtful]
+        sets += [[*others, t] for t in sorted(plain, key=probe.gain, reverse=True)[:LEADERS]]
+    return sets
+
+
+def first_credible(candidates: list[Candidate]) -> list[Candidate]:
+    """`candidates` in order of evidence, without those that may not be said, as far as they lead or come close."""
+    credible: list[Candidate] = []
+    for candidate in candidates:
+        close = not credible or credible[0].evidence - candidate.evidence < CLOSE_BEHIND
+        if not close or not candidate.fit.terms or is_credible(candidate.fit):
+            credible.append(candidate)
+    return credible

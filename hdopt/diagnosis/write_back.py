@@ -14,7 +14,8 @@ from hdopt.extended.operation import RPM
 
 if TYPE_CHECKING:
     from hdopt.diagnosis.effect import Parameter
-    from hdopt.diagnosis.verdict import Diagnosis, Found
+    from hdopt.diagnosis.found import Found
+    from hdopt.diagnosis.verdict import Diagnosis
     from hdopt.drive import DriveGeometry
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from hdopt.diagnosis.candidates import joint_fit
 from hdopt.diagnosis.confounding import confounded_with, remaining_span, share_in_span, smallest_angle_deg
 from hdopt.diagnosis.effects import EFFECTS
 from hdopt.diagnosis.fit import Fit, Problem, evaluate, refine
 from hdopt.diagnosis.noise import Noise
 from hdopt.diagnosis.nuisance import nuisances_for
 from hdopt.diagnosis.samples import gather
-from hdopt.diagnosis.select import joint_fit
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.study import load_study
 from tests.unit.test_diagnosis import HIDDEN, NOISE, bench
@@ -19,7 +19,7 @@ SHAPES = {
     "output_coupling": {"variant": 0.0},
     "channel_delay": {},
     "lost_motion": {"ramp_arcmin": 0.3},
-    "hysteresis": {"transition_deg": 1.5, "maxwell": 0.0},
+    "hysteresis": {"transition_deg": 1.5, "law": 0.0},
     "thermal_drift": {"time_constant_s": 100.0},
     "torsional_windup": {},
 }

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from hdopt.diagnosis import diagnose
+from hdopt.diagnosis.candidates import joint_fit
 from hdopt.diagnosis.conditions import across_conditions, find_conditions, levels
 from hdopt.diagnosis.effects import EFFECTS
 from hdopt.diagnosis.fit import Problem, evaluate, refine
 from hdopt.diagnosis.noise import Noise
 from hdopt.diagnosis.nuisance import nuisances_for
 from hdopt.diagnosis.samples import gather
-from hdopt.diagnosis.select import joint_fit
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.study import load_study
 from tests.unit.test_diagnosis import HIDDEN, NOISE, bench

@@ -9,11 +9,11 @@ from hdopt.diagnosis.effect import Term
 from hdopt.diagnosis.effects import EFFECTS
 from hdopt.diagnosis.fit import Problem, evaluate, refine
 from hdopt.diagnosis.noise import STEADIEST, Noise, estimate, without_lines
-from hdopt.diagnosis.outside import A_FEW, OUTSIDE
+from hdopt.diagnosis.outside import OUTSIDE
 from hdopt.diagnosis.parallel import each
+from hdopt.diagnosis.price import DISCREPANCY, OTHER_KIND, Beside, discrepancy, price
 from hdopt.diagnosis.probe import FitProbe
 from hdopt.diagnosis.samples import gather
-from hdopt.diagnosis.select import DISCREPANCY, OTHER_KIND, Beside, discrepancy, price
 from hdopt.diagnosis.zone_ripple import fit_in_zones
 from hdopt.drive import ARCMIN
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
@@ -95,7 +95,7 @@ def test_events_are_described_where_they_happen():
     jumps = 0.2 * ((rows > 1000).astype(float) - (rows > 2200) + (rows > 4000) - (rows > 5100))
     found = OUTSIDE["_jump"].search(FitProbe(bare(record(theta, jumps + noise))))[0]
     for row in (1001, 2201, 4001, 5101):
-        assert min(abs(at - row) for at in found.shape.values()) <= A_FEW // 2
+        assert min(abs(at - row) for at in found.shape.values()) <= 4
 
 
 @pytest.mark.slow
@@ -158,9 +158,10 @@ def test_second_effects_pay_by_kind_and_flexible_ones_like_two():
     assert discrepancy([term("cs_tooth_harmonics", 46)]) == pytest.approx(DISCREPANCY)
     # A description without physics could be the misfit of anything.
     assert discrepancy([loop, term("_sine_in_time", 2)]) == pytest.approx(DISCREPANCY)
-    taken = Beside((term("tooth_mesh", 2),), gain=1000.0)
-    extra = price([order], 100.0, 0.0, 1.0, taken) - price([order], 100.0, 0.0, 1.0)
-    assert extra == pytest.approx(0.5 * DISCREPANCY * 1000.0)
+    for taken, share in (("tooth_mesh", OTHER_KIND), ("local_tooth_defect", DISCREPANCY)):
+        beside = Beside((term(taken, 2),), gain=1000.0)
+        extra = price([order], 100.0, 0.0, 1.0, beside) - price([order], 100.0, 0.0, 1.0)
+        assert extra == pytest.approx(0.5 * share * 1000.0)
 
 
 def test_pieces_keep_their_order_on_any_number_of_threads():

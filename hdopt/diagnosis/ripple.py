@@ -1,0 +1,127 @@
+"""Orders above what the averaged rows hold: looked for on the rows as recorded, and taken out of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.diagnosis import noise as noise_model
+from hdopt.diagnosis.catalogue import EXPLANATIONS
+from hdopt.diagnosis.effect import Term, sine_columns, strongest_orders
+from hdopt.diagnosis.effects import HIGH_ORDER
+from hdopt.diagnosis.fit import Fit, Problem, evaluate, refine
+from hdopt.diagnosis.noise import Noise
+from hdopt.diagnosis.nuisance import Nuisances
+from hdopt.diagnosis.outside import AnyOrder
+from hdopt.diagnosis.price import Beside, leaves_nothing
+from hdopt.diagnosis.probe import FitProbe
+from hdopt.diagnosis.samples import Samples, gather
+from hdopt.diagnosis.select import Selection, select
+from hdopt.diagnosis.zone_ripple import fit_in_zones
+from hdopt.recording import Recording
+
+Array = NDArray[np.float64]
+
+RIPPLE_LINES, STRONG_RIPPLE = 12, 0.25
+"""Lines beyond the averaged rows that are looked at, and their power, over that of all else there, from which they are
+set aside before the search in the averaged rows.
+"""
+
+
+def find_ripple(
+    recordings: Sequence[Recording], low: Fit, nuisances: Nuisances, ruled_out: Sequence[str], rng: np.random.Generator
+) -> tuple[Selection | None, Array | None]:
+    """The search of orders above the averaged rows, and what its best candidate adds to the rows as recorded, (n,)."""
+    high = high_order_selection(recordings, low, nuisances, ruled_out, rng)
+    if high is None or not high.best.fit.terms:
+        return high, None
+    inside = fit_in_zones(gather(recordings), low, nuisances, high.best.fit)
+    if inside is None:
+        return high, high.best.fit.contributions
+    return high.with_best_fit(inside.fit), inside.adds
+
+
+def high_order_selection(
+    recordings: Sequence[Recording],
+    low: Fit,
+    nuisances: Nuisances,
+    ruled_out: Sequence[str],
+    rng: np.random.Generator,
+) -> Selection | None:
+    """Effects of orders above what the averaged rows hold, looked for on the rows as recorded."""
+    averaged = low.problem.samples
+    if averaged.locked or not averaged.are_averages:
+        return None
+    raw = gather(recordings)
+    lowest = averaged.highest_order
+    problem = Problem(raw, low.problem.base, nuisances.columns(raw), Noise.white(raw, 1.0), low.problem.prior_scale)
+    base_value = (
+        low.problem.base.evaluate_at(problem.rotation, low.errors)[0]
+        if low.problem.base is not None
+        else np.zeros(len(raw))
+    )
+    terms = [EXPLANATIONS[t.effect].term(raw, t.shape, base_value) for t in low.terms]
+    residual = evaluate(problem, low.errors, low.offsets, terms, low.coefficients).residual
+    raw = replace(raw, error=residual)
+    problem = Problem(raw, None, np.ones((len(raw), 1)), Noise.white(raw, float(np.std(residual))))
+    bare = refine(evaluate(problem, np.zeros(0), np.zeros(1), (), ()), iterations=2)
+    noise = noise_model.estimate(raw, bare.residual)
+    # A strong ripple must not be taken for noise: its strongest lines are taken out before the noise is measured.
+    lines = strongest_orders(FitProbe(bare), 6, lowest=lowest, highest=0.49 * raw.rows_per_turn)
+    if lines:
+        columns = sine_columns(raw.theta, lines)
+        clean = bare.residual - columns @ np.linalg.lstsq(columns, bare.residual, rcond=None)[0]
+        noise = noise_model.estimate(raw, clean)
+    bare = evaluate(problem.with_noise(noise), np.zeros(0), bare.offsets, (), ())
+    low_effects = [*ruled_out, *(e for e in EXPLANATIONS if e not in HIGH_ORDER and e != AnyOrder.id)]
+    # What a pulse or a loop leaves where its shape is not quite right reaches into these orders too.
+    rough = [i for i, term in enumerate(low.terms) if not leaves_nothing(term)]
+    left = float(np.var(sum((low.contribution(i) for i in rough), np.zeros(len(averaged)))))
+    taken = beside(bare, left, [low.terms[i] for i in rough])
+    return select(
+        bare, 1.0, rng, skip=low_effects, rounds=2, order_range=ripple_orders(averaged, raw), beside=taken
+    )
+
+
+def ripple_orders(averaged: Samples, raw: Samples) -> tuple[float, float]:
+    """Orders that the rows as recorded hold and their averages do not."""
+    return averaged.highest_order, 0.49 * raw.rows_per_turn
+
+
+def beside(base: Fit, power: float, terms: Sequence[Term]) -> Beside:
+    """`terms` of so much power (arcmin^2) that were taken out of the rows of `base`."""
+    rows = float((base.problem.noise.root_weight > 0).sum())
+    return Beside(tuple(terms), power * rows / base.problem.noise.sigma**2)
+
+
+def strong_ripple(recordings: Sequence[Recording], base: Fit, nuisances: Nuisances) -> Array | None:
+    """The strongest lines of orders beyond the averaged rows, as they add to the error of the rows as recorded, (n,);
+    None where they are weak, or where no rows were averaged.
+    """
+    averaged = base.problem.samples
+    if averaged.locked or not averaged.are_averages:
+        return None
+    raw = gather(recordings)
+    problem = Problem(raw, base.problem.base, nuisances.columns(raw), Noise.white(raw, 1.0), base.problem.prior_scale)
+    residual = evaluate(problem, base.errors, base.offsets, (), ()).residual
+    bare = replace(problem, base=None, samples=replace(raw, error=residual), nuisance=np.ones((len(raw), 1)))
+    probe = FitProbe(evaluate(bare, np.zeros(0), np.zeros(1), (), ()))
+    lowest, highest = ripple_orders(averaged, raw)
+    lines = strongest_orders(probe, RIPPLE_LINES, lowest=lowest, highest=highest)
+    if not lines:
+        return None
+    columns = sine_columns(raw.theta, lines)
+    ripple = columns @ np.linalg.lstsq(columns, probe.residual, rcond=None)[0]
+    return ripple if np.var(ripple) > STRONG_RIPPLE * np.var(probe.residual - ripple) else None
+
+
+def subtract(recordings: Sequence[Recording], total: Array) -> list[Recording]:
+    """Recordings without what `total` (arcmin, on their rows as recorded) adds to their errors."""
+    bounds = np.cumsum([0, *(len(r) for r in recordings)])
+    return [
+        replace(r, error_arcmin=r.error_arcmin - total[a:b])
+        for r, a, b in zip(recordings, bounds[:-1], bounds[1:], strict=True)
+    ]
