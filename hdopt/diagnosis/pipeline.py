@@ -68,7 +68,7 @@ def gather_evidence(
         base_fit = refine(_rebase(base_fit, problem_2), iterations=8)
         selection = select(base_fit, inflation_2, rng, skip=ruled_out, known=rebased(selection, problem_2))
         noise, inflation = noise_2, inflation_2
-    high, ripple = find_ripple(recordings, selection.best.fit, nuisances, ruled_out, rng)
+    high, ripple = find_ripple(recordings, selection, nuisances, ruled_out, rng)
     if ripple is not None:
         cleaned = subtract(recordings, ripple)
         samples = gather(cleaned, neighbours_for(cleaned))
@@ -82,7 +82,7 @@ def gather_evidence(
         selection = select(base_fit, inflation, rng, skip=ruled_out, known=known, beside=taken)
         if set(selection.best.effects) != set(before):
             # What was beside the ripple when it was named is not there any more.
-            high, _ = find_ripple(recordings, selection.best.fit, nuisances, ruled_out, rng)
+            high, _ = find_ripple(recordings, selection, nuisances, ruled_out, rng)
     return assess(samples, selection, high, nuisances, inflation, rng)
 
 

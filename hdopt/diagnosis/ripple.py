@@ -32,13 +32,19 @@ set aside before the search in the averaged rows.
 
 
 def find_ripple(
-    recordings: Sequence[Recording], low: Fit, nuisances: Nuisances, ruled_out: Sequence[str], rng: np.random.Generator
+    recordings: Sequence[Recording],
+    found: Selection,
+    nuisances: Nuisances,
+    ruled_out: Sequence[str],
+    rng: np.random.Generator,
 ) -> tuple[Selection | None, Array | None]:
-    """The search of orders above the averaged rows, and what its best candidate adds to the rows as recorded, (n,)."""
-    high = high_order_selection(recordings, low, nuisances, ruled_out, rng)
+    """The search of orders above the averaged rows beside what was `found` in them, and what its best candidate adds to
+    the rows as recorded, (n,).
+    """
+    high = high_order_selection(recordings, found, nuisances, ruled_out, rng)
     if high is None or not high.best.fit.terms:
         return high, None
-    inside = fit_in_zones(gather(recordings), low, nuisances, high.best.fit)
+    inside = fit_in_zones(gather(recordings), found.best.fit, nuisances, high.best.fit)
     if inside is None:
         return high, high.best.fit.contributions
     return high.with_best_fit(inside.fit), inside.adds
@@ -46,12 +52,13 @@ def find_ripple(
 
 def high_order_selection(
     recordings: Sequence[Recording],
-    low: Fit,
+    found: Selection,
     nuisances: Nuisances,
     ruled_out: Sequence[str],
     rng: np.random.Generator,
 ) -> Selection | None:
-    """Effects of orders above what the averaged rows hold, looked for on the rows as recorded."""
+    """Effects of orders above what the averaged rows hold, on the rows as recorded without what was `found` there."""
+    low = found.best.fit
     averaged = low.problem.samples
     if averaged.locked or not averaged.are_averages:
         return None
@@ -80,6 +87,8 @@ def high_order_selection(
     # What a pulse or a loop leaves where its shape is not quite right reaches into these orders too.
     rough = [i for i, term in enumerate(low.terms) if not leaves_nothing(term)]
     left = float(np.var(sum((low.contribution(i) for i in rough), np.zeros(len(averaged)))))
+    # A term may be large only against a bent base: what both explain together is what counts.
+    left = min(left, max(float(np.var(found.base.residual) - np.var(low.residual)), 0.0))
     taken = beside(bare, left, [low.terms[i] for i in rough])
     return select(
         bare, 1.0, rng, skip=low_effects, rounds=2, order_range=ripple_orders(averaged, raw), beside=taken

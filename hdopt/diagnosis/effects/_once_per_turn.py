@@ -7,7 +7,7 @@ import numpy as np
 from hdopt.diagnosis.effect import Term, sine_columns, terms_at
 
 LEAST_PART = 0.1
-"""Size of the smaller of two orders over the larger from which both are there."""
+"""Size of the first order over the largest from which it is there."""
 
 
 class ShaftSine:
@@ -47,9 +47,9 @@ class ShaftSine:
 
     @staticmethod
     def every_part_shows(term, estimate):
-        """Of two orders both must be there: one alone is another variant's, or another effect's."""
+        """The first order must be there: the second without it would be another effect's."""
         size = np.hypot(estimate.values[0 : term.width : 2], estimate.values[1 : term.width : 2])
-        return bool(size.min() > LEAST_PART * size.max())
+        return bool(size[0] > LEAST_PART * size.max())
 
     def orders(self, term, ratio):
         return [k if shaft == "input" else k / ratio for shaft, k in self.variants[int(term.shape["variant"])]]
