@@ -59,6 +59,7 @@ def gather_evidence(
     base_fit = refine(fit_base(problem.with_noise(noise), rng, starts=4, near=start), iterations=6)
     clean = clean_base(problem.with_noise(noise), rng)
     selection = select(base_fit, inflation, rng, skip=ruled_out, clean=clean)
+    base_fit = selection.base
     for _ in range(NOISE_ROUNDS):
         # The noise again, now without what was found: where it was most of what is there, more shows beside it.
         noise_2, inflation_2 = measure_noise(selection.best.fit)
@@ -67,7 +68,7 @@ def gather_evidence(
         problem_2 = problem.with_noise(noise_2)
         base_fit = refine(_rebase(base_fit, problem_2), iterations=8)
         selection = select(base_fit, inflation_2, rng, skip=ruled_out, known=rebased(selection, problem_2))
-        noise, inflation = noise_2, inflation_2
+        base_fit, noise, inflation = selection.base, noise_2, inflation_2
     high, ripple = find_ripple(recordings, selection, nuisances, ruled_out, rng)
     if ripple is not None:
         cleaned = subtract(recordings, ripple)

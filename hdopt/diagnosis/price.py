@@ -33,6 +33,7 @@ KINDS = {
 }
 """Kind of an effect by its domain; reversal, direction and speed are one: no curve of the torque makes a loop."""
 FEW_COEFFICIENTS, MANY_COEFFICIENTS = 8, 24
+ENCODER = "encoder_interpolation"
 CLEAR_WIN = 0.12
 """Share of the explained power by which a description without physics, or one at another effect's orders, must beat the
 catalogue.
@@ -58,11 +59,23 @@ def price(
     """What a set of terms has to pay in log evidence."""
     cost = 0.5 * sum(term.freedom for term in terms) * math.log(rows)
     cost += sum(math.log(max(term.trials, 1.0)) - term.odds for term in terms)
+    # The first cycle of an encoder whose second was found among higher orders is no further effect.
+    cost -= sum(EFFECT_COST + math.log(max(t.trials, 1.0)) - t.odds for t in terms if is_cycle_of(t, beside.terms))
     if {term.effect for term in terms} >= ONE_IN_THE_OTHER:
         cost += TWICE
     cost += sum(term.doubtful for term in terms) * 0.5 * CLEAR_WIN * gain / inflation
     inexact = discrepancy([*terms, *beside.terms]) - discrepancy(beside.terms) if terms else 0.0
     return cost + len(terms) * EFFECT_COST + 0.5 * inexact * (gain + beside.gain) / inflation
+
+
+def is_cycle_of(term: Term, found: Sequence[Term]) -> bool:
+    """Whether `term` has the lines of an encoder of which `found` holds a multiple."""
+    return term.effect == ENCODER and any(
+        other.effect == ENCODER
+        and other.shape["output"] == term.shape["output"]
+        and other.shape["lines"] % term.shape["lines"] == 0
+        for other in found
+    )
 
 
 def discrepancy(terms: Sequence[Term]) -> float:

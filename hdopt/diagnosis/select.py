@@ -19,7 +19,7 @@ from hdopt.diagnosis.candidates import Candidate, joint_fit, rank_subsets, searc
 from hdopt.diagnosis.catalogue import EXPLANATIONS, is_outside
 from hdopt.diagnosis.credible import is_credible
 from hdopt.diagnosis.effect import Term
-from hdopt.diagnosis.fit import Fit, refine
+from hdopt.diagnosis.fit import Fit, evaluate, refine
 from hdopt.diagnosis.parallel import each
 from hdopt.diagnosis.price import NOTHING_BESIDE, Beside, flexibility, has_exact_shape, kind_of
 from hdopt.diagnosis.probe import FitProbe
@@ -181,6 +181,11 @@ def select(
                 fits[names] = fit
         if leader().fit is best.fit:
             break
+    best = leader()
+    if best is not None and best.evidence > 0:
+        # Beside an effect the base may have come to a better drive: then that is the one to beat.
+        alone = refine(evaluate(best.fit.problem, best.fit.errors, best.fit.offsets, (), ()), iterations=10)
+        base = min(base, alone, key=lambda fit: fit.objective)
     top = max((weigh(f, base, inflation).gain for f in fits.values()), default=0.0)
     candidates = [weigh(f, base, inflation, top, beside) for f in fits.values()]
     candidates.append(Candidate(base, 0.0, 0.0))

@@ -197,8 +197,10 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
 
 
 def _worth_naming(evidence: Evidence) -> bool:
+    """Whether the effects predict better, and do so themselves: not by a better drive that was found beside them."""
     base, extended = evidence.base_held_out.variance, evidence.extended_held_out.variance
-    return base - extended > SMALLEST_SHARE * extended
+    own = sum(term_powers(evidence.selection.best.fit))
+    return min(base - extended, 2 * own) > SMALLEST_SHARE * extended
 
 
 def _stands_out(high: Candidate, evidence: Evidence) -> bool:

@@ -184,6 +184,8 @@ class BearingPass:
         """Any line, and any line with its double, is an order of some bearing: named lines must all be there, as must a
         few waves of unequal balls, and of many waves a good part.
         """
+        if not RATIO_RANGE[0] <= term.shape["ball_to_pitch_ratio"] <= RATIO_RANGE[1]:
+            return False
         sines = 2 * (term.width // 2)
         size = np.hypot(estimate.values[0:sines:2], estimate.values[1:sines:2])
         variance = np.diag(estimate.covariance)[:sines]
