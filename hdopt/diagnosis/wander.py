@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 
 PER_TURN = 4
 """Means an input turn."""
-SLOW = 0.5
-"""Share of a term's power that must be left in the means for it to count as slow."""
+SLOW_TURNS, SLOW = 2, 0.5
+"""A term counts as slow whose means over so many turns of travel still hold this share of its power."""
 FEWEST_PERIODS, LINE = 3, 60.0
 """Periods of a slow wave in a record, and its power over the median beside it, from which it is one: of a few hundred
 frequencies the strongest of a walk stands about 10 times above.
@@ -55,7 +55,11 @@ def lost_in_wander(fit: Fit, index: int, price: float) -> bool:
 
     contribution = fit.contribution(index)
     means = mean(contribution)[:, 0]
-    if np.average((means - np.average(means, weights=count)) ** 2, weights=count) < SLOW * np.var(contribution):
+    longer = np.arange(len(count)) // (PER_TURN * SLOW_TURNS)
+    weight = np.bincount(longer, count)
+    over_turns = np.bincount(longer, means * count) / weight
+    spread = np.average((over_turns - np.average(over_turns, weights=weight)) ** 2, weights=weight)
+    if spread < SLOW * np.var(contribution):
         return False
     columns = []
     for i, (term, coefficients) in enumerate(zip(fit.terms, fit.coefficients, strict=True)):

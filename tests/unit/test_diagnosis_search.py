@@ -158,7 +158,7 @@ def test_second_effects_pay_by_kind_and_flexible_ones_like_two():
     assert discrepancy([term("cs_tooth_harmonics", 46)]) == pytest.approx(DISCREPANCY)
     # A description without physics could be the misfit of anything.
     assert discrepancy([loop, term("_sine_in_time", 2)]) == pytest.approx(DISCREPANCY)
-    for taken, share in (("tooth_mesh", OTHER_KIND), ("local_tooth_defect", DISCREPANCY)):
+    for taken, share in (("encoder_output_eccentricity", OTHER_KIND), ("tooth_mesh", DISCREPANCY)):
         beside = Beside((term(taken, 2),), gain=1000.0)
         extra = price([order], 100.0, 0.0, 1.0, beside) - price([order], 100.0, 0.0, 1.0)
         assert extra == pytest.approx(0.5 * share * 1000.0)
