@@ -19,8 +19,8 @@ from hdopt.recording import TURN
 
 Array = NDArray[np.float64]
 
-MOST_CONFIDENT = 0.95
-"""No name is surer: what all shapes of the catalogue miss is in no evidence. In the blind runs about nine names of ten
+MOST_CONFIDENT = 0.97
+"""No name is surer: what all shapes of the catalogue miss is in no evidence. In the last two blind runs 97 of 100 names
 that the evidence alone called certain were right.
 """
 
