@@ -22,6 +22,8 @@ FEW, MOST_OF_FEW = tuple(range(2, 13)), 3
 
 LEAST_OF_FEW = 0.15
 """Size of the smallest of a few harmonics over the largest: less is what another shape leaves."""
+SAID = 4
+"""Waves that the sentence lists."""
 SHORT_RUN, SHOWN_OF_A_RUN = 4, 0.5
 """Harmonics of a short run, and the part of them that must be of such a size."""
 
@@ -110,11 +112,11 @@ class CircularSplineToothHarmonics:
         return found
 
     def sentence(self, parameters, rms_arcmin):
-        parts = [
-            f"{p.value:.2g} um at {name.split('_')[1]} waves a turn"
-            for name, p in parameters.items()
-            if name.startswith("amplitude")
-        ]
+        sizes = {name.split("_")[1]: p.value for name, p in parameters.items() if name.startswith("amplitude")}
+        largest = sorted(sizes, key=sizes.get, reverse=True)[:SAID]
+        parts = [f"{sizes[h]:.2g} um at {h} waves a turn" for h in sorted(largest, key=int)]
+        if len(sizes) > SAID:
+            parts.append(f"less at {len(sizes) - SAID} others")
         return (
             f"The {self.spline}'s teeth deviate from their place by more than one wave round the rim: "
             f"{', '.join(parts)} ({rms_arcmin:.2g} arcmin rms at the output)."
