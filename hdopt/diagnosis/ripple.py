@@ -62,26 +62,15 @@ def high_order_selection(
     averaged = low.problem.samples
     if averaged.locked or not averaged.are_averages:
         return None
-    raw = gather(recordings)
-    lowest = averaged.highest_order
-    problem = Problem(raw, low.problem.base, nuisances.columns(raw), Noise.white(raw, 1.0), low.problem.prior_scale)
-    base_value = (
-        low.problem.base.evaluate_at(problem.rotation, low.errors)[0]
-        if low.problem.base is not None
-        else np.zeros(len(raw))
-    )
-    terms = [EXPLANATIONS[t.effect].term(raw, t.shape, base_value) for t in low.terms]
-    residual = evaluate(problem, low.errors, low.offsets, terms, low.coefficients).residual
-    raw = replace(raw, error=residual)
-    problem = Problem(raw, None, np.ones((len(raw), 1)), Noise.white(raw, float(np.std(residual))))
+    problem = left_as_recorded(recordings, low, nuisances)
+    raw = problem.samples
+    lowest, highest = orders = ripple_orders(averaged, raw)
     bare = refine(evaluate(problem, np.zeros(0), np.zeros(1), (), ()), iterations=2)
     noise = noise_model.estimate(raw, bare.residual)
     # A strong ripple must not be taken for noise: its strongest lines are taken out before the noise is measured.
-    lines = strongest_orders(FitProbe(bare), 6, lowest=lowest, highest=0.49 * raw.rows_per_turn)
+    lines = strongest_orders(FitProbe(bare), 6, lowest=lowest, highest=highest)
     if lines:
-        columns = sine_columns(raw.theta, lines)
-        clean = bare.residual - columns @ np.linalg.lstsq(columns, bare.residual, rcond=None)[0]
-        noise = noise_model.estimate(raw, clean)
+        noise = noise_model.estimate(raw, bare.residual - waves_of(raw, bare.residual, lines))
     bare = evaluate(problem.with_noise(noise), np.zeros(0), bare.offsets, (), ())
     low_effects = [*ruled_out, *(e for e in EXPLANATIONS if e not in HIGH_ORDER and e != AnyOrder.id)]
     # What a pulse or a loop leaves where its shape is not quite right reaches into these orders too.
@@ -90,9 +79,23 @@ def high_order_selection(
     # A term may be large only against a bent base: what both explain together is what counts.
     left = min(left, max(float(np.var(found.base.residual) - np.var(low.residual)), 0.0))
     taken = beside(bare, left, [low.terms[i] for i in rough])
-    return select(
-        bare, 1.0, rng, skip=low_effects, rounds=2, order_range=ripple_orders(averaged, raw), beside=taken
-    )
+    return select(bare, 1.0, rng, skip=low_effects, rounds=2, order_range=orders, beside=taken)
+
+
+def left_as_recorded(recordings: Sequence[Recording], fit: Fit, nuisances: Nuisances) -> Problem:
+    """What `fit`, made on averaged rows, leaves of the rows as recorded: a problem with an offset alone beside it."""
+    raw, old = gather(recordings), fit.problem
+    problem = Problem(raw, old.base, nuisances.columns(raw), Noise.white(raw, 1.0), old.prior_scale)
+    base_value = np.zeros(len(raw)) if old.base is None else old.base.evaluate_at(problem.rotation, fit.errors)[0]
+    terms = [EXPLANATIONS[t.effect].term(raw, t.shape, base_value) for t in fit.terms]
+    left = replace(raw, error=evaluate(problem, fit.errors, fit.offsets, terms, fit.coefficients).residual)
+    return Problem(left, None, np.ones((len(left), 1)), Noise.white(left, float(np.std(left.error))))
+
+
+def waves_of(samples: Samples, values: Array, orders: Sequence[float]) -> Array:
+    """The sines of `orders` in `values` (n,), together."""
+    columns = sine_columns(samples.theta, orders)
+    return columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
 
 
 def ripple_orders(averaged: Samples, raw: Samples) -> tuple[float, float]:
@@ -113,17 +116,13 @@ def strong_ripple(recordings: Sequence[Recording], base: Fit, nuisances: Nuisanc
     averaged = base.problem.samples
     if averaged.locked or not averaged.are_averages:
         return None
-    raw = gather(recordings)
-    problem = Problem(raw, base.problem.base, nuisances.columns(raw), Noise.white(raw, 1.0), base.problem.prior_scale)
-    residual = evaluate(problem, base.errors, base.offsets, (), ()).residual
-    bare = replace(problem, base=None, samples=replace(raw, error=residual), nuisance=np.ones((len(raw), 1)))
-    probe = FitProbe(evaluate(bare, np.zeros(0), np.zeros(1), (), ()))
-    lowest, highest = ripple_orders(averaged, raw)
+    problem = left_as_recorded(recordings, base, nuisances)
+    probe = FitProbe(evaluate(problem, np.zeros(0), np.zeros(1), (), ()))
+    lowest, highest = ripple_orders(averaged, problem.samples)
     lines = strongest_orders(probe, RIPPLE_LINES, lowest=lowest, highest=highest)
     if not lines:
         return None
-    columns = sine_columns(raw.theta, lines)
-    ripple = columns @ np.linalg.lstsq(columns, probe.residual, rcond=None)[0]
+    ripple = waves_of(problem.samples, probe.residual, lines)
     return ripple if np.var(ripple) > STRONG_RIPPLE * np.var(probe.residual - ripple) else None
 
 

@@ -111,11 +111,16 @@ def select(
             return joint_fit(centre, terms, own_rng if narrow else None)
 
         for fit in each(fitted, zip(sets.values(), rng.spawn(len(sets)), strict=True)):
-            names = frozenset(term.effect for term in fit.terms)
-            if names not in fits or is_better(fit, fits[names]):
-                fits[names] = fit
-                new = True
+            new |= take(fit)
         return new
+
+    def take(fit: Fit) -> bool:
+        """Takes `fit` for its set of effects where it is the first or better; whether it did."""
+        names = frozenset(term.effect for term in fit.terms)
+        if names in fits and not is_better(fit, fits[names]):
+            return False
+        fits[names] = fit
+        return True
 
     def is_better(fit: Fit, known: Fit, by: float = 1e-3) -> bool:
         """Of two fits of the same effects, whose variants may differ in width, whether the first has more evidence."""
@@ -166,9 +171,7 @@ def select(
         sets = [*behind, *narrower(best.fit, skip, order_range)]
         pairs = zip(sets, rng.spawn(len(sets)), strict=True)
         for fit in each(lambda pair: joint_fit(best.fit, *pair), pairs):
-            names = frozenset(term.effect for term in fit.terms)
-            if names not in fits or is_better(fit, fits[names]):
-                fits[names] = fit
+            take(fit)
     for names, fit in list(fits.items()):
         few = trimmed(fit)
         if few is not None and is_better(few, fit, by=-KEPT * weigh(fit, base, inflation).gain / inflation):
@@ -176,9 +179,7 @@ def select(
     while (best := leader()) is not None and best.evidence > 0 and len(best.fit.terms) > 1:
         # A term that came in beside a better drive may have no part in it: without each, from where the best stands.
         for fit in without_each(best.fit):
-            names = frozenset(term.effect for term in fit.terms)
-            if names not in fits or is_better(fit, fits[names]):
-                fits[names] = fit
+            take(fit)
         if leader().fit is best.fit:
             break
     best = leader()

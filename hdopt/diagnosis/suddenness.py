@@ -64,10 +64,8 @@ def sudden_steps(fit: Fit) -> Steps:
     rows = _separate(size, usable & (size > OUT) & (size**2 > as_glitch**2 + OVER_A_GLITCH))
     if len(rows) < FEWEST or len(np.unique(samples.block[rows])) < FEWEST_TURNS or _set_by_angle(samples, rows):
         return none
-    residual = fit.residual
-    colour = np.convolve(np.abs(white) < 3 * _scatter(white), np.ones(1), "same") > 0
-    quiet = float(np.var(white[colour]))
-    return Steps(rows, float(np.sqrt(max(np.var(residual) - quiet, 0.0))))
+    quiet = float(np.var(white[np.abs(white) < 3 * _scatter(white)]))
+    return Steps(rows, float(np.sqrt(max(np.var(fit.residual) - quiet, 0.0))))
 
 
 def _scores(white: Array, trace: Array, block: NDArray[np.int64]) -> Array:

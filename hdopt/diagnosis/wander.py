@@ -118,7 +118,6 @@ def _line(time: Array, values: Array) -> SlowWave | None:
     even = even - even.mean()
     pole = min(max(float(even[1:] @ even[:-1]) / max(float(even @ even), 1e-300), 0.0), 0.99)
     power = np.abs(np.fft.rfft((even[1:] - pole * even[:-1]) * np.hanning(n - 1))) ** 2
-    # From two periods in the record on, to a turn.
     low, high = FEWEST_PERIODS, n // PER_TURN
     if high - low < 12:
         return None

@@ -190,9 +190,7 @@ class BearingPass:
         size = np.hypot(estimate.values[0:sines:2], estimate.values[1:sines:2])
         variance = np.diag(estimate.covariance)[:sines]
         certain = size > LINE_SHOWS * np.sqrt(0.5 * (variance[0::2] + variance[1::2]))
-        if "zones" not in term.shape:
-            return bool(np.all(certain & (size > LEAST_LINE * size.max())))
-        if len(ZONE_HARMONICS[int(term.shape["zones"])]) <= FEW_WAVES:
+        if "zones" not in term.shape or len(ZONE_HARMONICS[int(term.shape["zones"])]) <= FEW_WAVES:
             return bool(np.all(certain & (size > LEAST_LINE * size.max())))
         return bool(np.mean(certain) >= MANY_SHOW)
 
