@@ -66,7 +66,8 @@ class Probe(Protocol):
 
     samples: Samples
     residual: Array
-    base_value: Array
+    motion: Array
+    """The drive's motion before its spring, arcmin, (n,): what excites a resonance."""
     order_range: tuple[float, float]
     """Orders (cycles per input turn) that the search looks at."""
 
@@ -85,7 +86,10 @@ class Effect(Protocol):
 
     Where it applies, an effect also has: `exact_shape`, True where nothing of it is left for another to explain;
     `leaves_nothing`, True where it reaches no orders but its own; `every_part_shows(term, estimate)`, whether a fit has
-    all that the term stands for (`credible`); `trimmed(term, coefficients)`, the shape of what shows, or None.
+    all that the term stands for (`credible`); `trimmed(term, coefficients)`, the shape of what shows, or None;
+    `shortened(term)`, shapes that bend less; `excites`, True where its columns move the drive's output (as whatever
+    acts in the zones does), and `response(samples, shape, coefficients, motions)` where it follows such a motion
+    (`transmission`).
     """
 
     id: str
@@ -219,9 +223,7 @@ def widest_that_pays(probe: Probe, terms: Sequence[Term]) -> list[Term]:
 def best_terms(probe: Probe, terms: Sequence[Term], keep: int = 1) -> list[Term]:
     """The `keep` terms with the largest gain after paying for their freedom and their odds."""
     cost = math.log(max(len(probe.residual), 2))
-    ranked = sorted(
-        terms, key=lambda term: probe.gain(term) - cost * term.freedom + 2 * term.odds, reverse=True
-    )
+    ranked = sorted(terms, key=lambda term: probe.gain(term) - cost * term.freedom + 2 * term.odds, reverse=True)
     return ranked[:keep]
 
 

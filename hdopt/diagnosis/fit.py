@@ -18,6 +18,7 @@ from hdopt.diagnosis.catalogue import EXPLANATIONS
 from hdopt.diagnosis.effect import Estimate, Term
 from hdopt.diagnosis.noise import Noise
 from hdopt.diagnosis.samples import Samples
+from hdopt.diagnosis.transmission import driven_by, excites, motion_of, transmitted
 from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel
 
 Array = NDArray[np.float64]
@@ -94,6 +95,11 @@ class Fit:
     def residual(self) -> Array:
         return self.problem.samples.error - self.prediction
 
+    @cached_property
+    def motion(self) -> Array:
+        """The drive's motion before its spring, arcmin, (n,): what excites a resonance."""
+        return motion_of(self.base_value, self.terms, self.coefficients)
+
     def contribution(self, index: int) -> Array:
         """What term `index` adds to the prediction, arcmin: with its zones' driving switched as fitted."""
         return term_columns(self.terms[index], self.zone, self.problem.base) @ self.coefficients[index]
@@ -103,19 +109,29 @@ class Fit:
         """What all terms add, arcmin."""
         return sum((self.contribution(i) for i in range(len(self.terms))), np.zeros(len(self.problem.samples)))
 
-    def design(self) -> Array:
-        """Columns: base errors, offsets, then for each term its coefficients and free shape parameters; (n, q)."""
-        return np.column_stack(
-            [self.base_jacobian, self.problem.nuisance]
-            + [
-                columns
-                for term, c in zip(self.terms, self.coefficients, strict=True)
-                for columns in (
-                    term_columns(term, self.zone, self.problem.base),
-                    shape_columns(term, c, self.problem, self.zone, self.base_value),
-                )
-            ]
-        )
+    def seen(self, columns: Array, keep: Sequence[int] | None = None) -> Array:
+        """Columns of the drive's motion (n, k) as its output shows them beside the terms of `keep`, all by default."""
+        kept = range(len(self.terms)) if keep is None else keep
+        terms, coefficients = [self.terms[i] for i in kept], [self.coefficients[i] for i in kept]
+        return transmitted(columns, self.problem.samples, terms, coefficients)
+
+    def columns_of(self, term: Term, keep: Sequence[int] | None = None) -> Array:
+        """A term's columns as the output shows them beside the terms of `keep`, all by default, (n, p)."""
+        columns = term_columns(term, self.zone, self.problem.base)
+        return self.seen(columns, keep) if excites(term) else columns
+
+    def design(self, keep: Sequence[int] | None = None, move_shapes: bool = True) -> Array:
+        """Columns: base errors, offsets, then for each term of `keep` (all by default) its coefficients and, with
+        `move_shapes`, its free shape parameters; (n, q).
+        """
+        blocks = [self.seen(self.base_jacobian, keep), self.problem.nuisance]
+        for i in range(len(self.terms)) if keep is None else keep:
+            term = self.terms[i]
+            blocks.append(self.columns_of(term, keep))
+            if move_shapes and term.steps:
+                columns = shape_columns(self, i)
+                blocks.append(self.seen(columns, keep) if excites(term) else columns)
+        return np.column_stack(blocks)
 
     def prior_precision(self, width: int) -> Array:
         precision = np.zeros(width)
@@ -166,15 +182,16 @@ def term_columns(term: Term, zone: NDArray[np.int64], base: CartesianModel | Non
     return base.arcmin_per_mm * np.where((zone == 0)[:, None], term.zones[0], term.zones[1])
 
 
-def shape_columns(term: Term, coefficients: Array, problem: Problem, zone: NDArray, base_value: Array) -> Array:
-    """Derivative of the term's contribution by each of its free shape parameters, (n, k), by central differences."""
+def shape_columns(fit: Fit, index: int) -> Array:
+    """Derivative of term `index`'s contribution by its free shape parameters, (n, k), by central differences."""
+    term, problem = fit.terms[index], fit.problem
     columns = []
     for name, step in term.steps.items():
         sides = []
         for sign in (1, -1):
             shifted = {**term.shape, name: term.shape[name] + sign * step}
-            moved = EXPLANATIONS[term.effect].term(problem.samples, shifted, base_value)
-            sides.append(term_columns(moved, zone, problem.base) @ coefficients)
+            moved = EXPLANATIONS[term.effect].term(problem.samples, shifted, fit.motion)
+            sides.append(term_columns(moved, fit.zone, problem.base) @ fit.coefficients[index])
         columns.append((sides[0] - sides[1]) / (2 * step))
     return np.column_stack(columns) if columns else np.empty((len(problem.samples), 0))
 
@@ -196,6 +213,7 @@ def evaluate(
             np.zeros(len(samples), np.int64),
             np.empty((len(samples), 0)),
         )
+    terms = driven_by(motion_of(base_value, terms, coefficients), samples, terms)
     prediction = base_value + problem.nuisance @ offsets
     for term, c in zip(terms, coefficients, strict=True):
         if term.zones is None:
@@ -214,7 +232,7 @@ def refine(fit: Fit, iterations: int = 12, tolerance: float = 1e-5, move_shapes:
     problem, damping = fit.problem, 1e-4
     wb, wn = problem.base_width, problem.nuisance.shape[1]
     for _ in range(iterations):
-        design = fit.design() if move_shapes else _linear_design(fit)
+        design = fit.design(move_shapes=move_shapes)
         white = problem.noise.whiten(design)
         residual = problem.noise.whiten(fit.residual)
         precision = problem.noise.sigma**2 * fit.prior_precision(design.shape[1])
@@ -234,7 +252,6 @@ def refine(fit: Fit, iterations: int = 12, tolerance: float = 1e-5, move_shapes:
                 continue
             position = wb + wn
             terms, coefficients = [], []
-            trial_base = fit.base_value
             for term, c in zip(fit.terms, fit.coefficients, strict=True):
                 delta = step[position : position + term.width]
                 position += term.width
@@ -244,7 +261,7 @@ def refine(fit: Fit, iterations: int = 12, tolerance: float = 1e-5, move_shapes:
                         limit = 0.3 * abs(shape[name]) + 20 * term.steps[name]
                         shape[name] += float(np.clip(step[position], -limit, limit))
                         position += 1
-                    moved = EXPLANATIONS[term.effect].term(problem.samples, shape, trial_base)
+                    moved = EXPLANATIONS[term.effect].term(problem.samples, shape, fit.motion)
                     term = replace(moved, trials=term.trials, odds=term.odds)
                 terms.append(term)
                 coefficients.append(c + delta)
@@ -261,13 +278,6 @@ def refine(fit: Fit, iterations: int = 12, tolerance: float = 1e-5, move_shapes:
         if drop < tolerance * fit.objective:
             break
     return fit
-
-
-def _linear_design(fit: Fit) -> Array:
-    return np.column_stack(
-        [fit.base_jacobian, fit.problem.nuisance]
-        + [term_columns(term, fit.zone, fit.problem.base) for term in fit.terms]
-    )
 
 
 def extend(fit: Fit, terms: Sequence[Term]) -> Fit:

@@ -106,7 +106,7 @@ def _mean_by_offset(problem: Problem) -> Array:
 def _rebase(fit: Fit, problem: Problem) -> Fit:
     """The same parameters on another problem's rows and noise."""
     terms = [
-        replace(EXPLANATIONS[t.effect].term(problem.samples, t.shape, fit.base_value), trials=t.trials, odds=t.odds)
+        replace(EXPLANATIONS[t.effect].term(problem.samples, t.shape, fit.motion), trials=t.trials, odds=t.odds)
         for t in fit.terms
     ]
     return evaluate(problem, fit.errors, fit.offsets, terms, fit.coefficients)

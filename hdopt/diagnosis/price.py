@@ -53,9 +53,7 @@ class Beside:
 NOTHING_BESIDE = Beside()
 
 
-def price(
-    terms: Sequence[Term], rows: float, gain: float, inflation: float, beside: Beside = NOTHING_BESIDE
-) -> float:
+def price(terms: Sequence[Term], rows: float, gain: float, inflation: float, beside: Beside = NOTHING_BESIDE) -> float:
     """What a set of terms has to pay in log evidence."""
     cost = 0.5 * sum(term.freedom for term in terms) * math.log(rows)
     cost += sum(math.log(max(term.trials, 1.0)) - term.odds for term in terms)
@@ -64,8 +62,11 @@ def price(
     if {term.effect for term in terms} >= ONE_IN_THE_OTHER:
         cost += TWICE
     cost += sum(term.doubtful for term in terms) * 0.5 * CLEAR_WIN * gain / inflation
-    inexact = discrepancy([*terms, *beside.terms]) - discrepancy(beside.terms) if terms else 0.0
-    return cost + len(terms) * EFFECT_COST + 0.5 * inexact * (gain + beside.gain) / inflation
+    # What was taken out to the last digit leaves nothing that could be named.
+    rough = [term for term in beside.terms if not leaves_nothing(term)]
+    power = gain + beside.gain if rough else gain
+    inexact = discrepancy([*terms, *rough]) - discrepancy(rough) if terms else 0.0
+    return cost + len(terms) * EFFECT_COST + 0.5 * inexact * power / inflation
 
 
 def is_cycle_of(term: Term, found: Sequence[Term]) -> bool:
@@ -106,5 +107,5 @@ def flexibility(term: Term) -> float:
 
 
 def kind_of(term: Term) -> str:
-    """What a term's misfit looks like; the resonance, whose shape is the base's orders, turns."""
-    return "turning" if term.effect == "resonance" else KINDS.get(EXPLANATIONS[term.effect].domain, "way")
+    """What a term's misfit looks like."""
+    return KINDS.get(EXPLANATIONS[term.effect].domain, "way")

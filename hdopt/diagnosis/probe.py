@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdopt.diagnosis.effect import Term
-from hdopt.diagnosis.fit import Fit, shape_columns, term_columns
+from hdopt.diagnosis.fit import Fit
+from hdopt.diagnosis.transmission import excites, is_driven
 from hdopt.recording import TURN
 
 Array = NDArray[np.float64]
@@ -23,20 +24,19 @@ class FitProbe:
     """
 
     def __init__(self, fit: Fit, keep: Sequence[int] | None = None, order_range: tuple[float, float] | None = None):
-        keep = range(len(fit.terms)) if keep is None else keep
+        self.keep = range(len(fit.terms)) if keep is None else keep
         self.fit = fit
         self.samples = fit.problem.samples
-        self.base_value = fit.base_value
+        self.motion = fit.motion
         self.order_range = order_range or (0.0, self.samples.highest_order)
         self.noise = fit.problem.noise
-        self.residual = fit.residual + sum(
-            (fit.contribution(i) for i in range(len(fit.terms)) if i not in keep), np.zeros(len(self.samples))
-        )
-        design = [fit.base_jacobian, fit.problem.nuisance]
-        for i in keep:
-            design.append(term_columns(fit.terms[i], fit.zone, fit.problem.base))
-            design.append(shape_columns(fit.terms[i], fit.coefficients[i], fit.problem, fit.zone, fit.base_value))
-        design = np.column_stack(design)
+        self.swings = any(is_driven(fit.terms[i]) for i in self.keep)
+        self.residual = fit.residual
+        for i, term in enumerate(fit.terms):
+            if i not in self.keep:
+                own = fit.contribution(i)[:, None]
+                self.residual = self.residual + (fit.seen(own, self.keep) if excites(term) else own)[:, 0]
+        design = fit.design(self.keep)
         white = self.noise.whiten(design)
         # The prior on the base keeps directions the data leave open from swallowing an effect.
         prior = np.sqrt(fit.prior_precision(design.shape[1])) * self.noise.sigma
@@ -53,7 +53,7 @@ class FitProbe:
 
     def white_columns(self, term: Term) -> Array:
         """The term's columns, whitened."""
-        return self.noise.whiten(term_columns(term, self.fit.zone, self.fit.problem.base))
+        return self.noise.whiten(self.fit.columns_of(term, self.keep))
 
     def columns(self, term: Term) -> Array:
         """The term's columns, whitened and projected."""
@@ -62,11 +62,12 @@ class FitProbe:
     def _whitened(self, term: Term) -> tuple[Array, Array]:
         """The term's whitened columns and their inner products."""
         known = self.fit.problem.whitened
-        if term.kept and id(term) in known:
+        alone = term.kept and term.zones is None and not (self.swings and excites(term))
+        if alone and id(term) in known:
             return known[id(term)][1:]
         white = self.white_columns(term)
         gram = white.T @ white
-        if term.kept and term.zones is None:
+        if alone:
             known[id(term)] = (term, white, gram)
         return white, gram
 

@@ -9,24 +9,31 @@ stands.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hdopt.diagnosis.candidates import Candidate, joint_fit, rank_subsets, search_terms, weigh, without_each
-from hdopt.diagnosis.catalogue import EXPLANATIONS, is_outside
+from hdopt.diagnosis.candidates import (
+    MOST_EFFECTS,
+    Candidate,
+    joint_fit,
+    rank_subsets,
+    search_terms,
+    weigh,
+    without_each,
+)
+from hdopt.diagnosis.catalogue import is_outside
 from hdopt.diagnosis.credible import is_credible
 from hdopt.diagnosis.effect import Term
 from hdopt.diagnosis.fit import Fit, evaluate, refine
 from hdopt.diagnosis.parallel import each
-from hdopt.diagnosis.price import NOTHING_BESIDE, Beside, flexibility, has_exact_shape, kind_of
+from hdopt.diagnosis.price import NOTHING_BESIDE, Beside, flexibility, has_exact_shape
 from hdopt.diagnosis.probe import FitProbe
+from hdopt.diagnosis.transmission import is_driven
+from hdopt.diagnosis.variants import NARROW, in_full, narrower, otherwise_credible, shortened, trimmed
 
 LEADERS = 3
-TIE_OF_VARIANTS = 10.0
-"""Log evidence by which a wider variant of an effect must be better."""
 CLOSE_BEHIND = 10.0
 """Log evidence within which a rival of the best must be credible too."""
 CLOSE = 0.8
@@ -37,8 +44,6 @@ KEPT = 0.005
 """Part of the gain that parts which do not show may take with them: without them a set can be said, with them not."""
 KNOWN = 5
 """Candidates from which a later search goes on."""
-NARROW = 4
-"""Coefficients and shapes up to which sets are also fitted from new random drives."""
 WORTH_A_FIT = 0.25
 """Share of the best subset's gain from which a single effect is fitted jointly too: the refitted base may favour it."""
 
@@ -92,6 +97,7 @@ def select(
         """
         probe = FitProbe(centre, keep=(), order_range=order_range)
         ranked = rank_subsets(probe, pool, inflation, beside=beside)
+        shaken = behind_a_resonance(centre, pool)
         most = max((gain for _, gain, _ in ranked), default=0.0)
         single = [
             (evidence, gain, subset)
@@ -100,19 +106,34 @@ def select(
         ]
         chosen = ranked[:leaders] + single[: leaders + 4]
         sets = {}
-        for _, _, subset in chosen:
-            sets.setdefault(frozenset(pool[i].effect for i in subset), subset)
+        for terms in [*shaken, *([pool[i] for i in subset] for _, _, subset in chosen)]:
+            sets.setdefault(frozenset(term.effect for term in terms), terms)
         new = False
 
-        def fitted(numbered: tuple[tuple[int, ...], np.random.Generator]) -> Fit:
-            subset, own_rng = numbered
-            terms = [pool[i] for i in subset]
+        def fitted(numbered: tuple[list[Term], np.random.Generator]) -> Fit:
+            terms, own_rng = numbered
             narrow = afresh and sum(term.freedom for term in terms) <= NARROW
             return joint_fit(centre, terms, own_rng if narrow else None)
 
         for fit in each(fitted, zip(sets.values(), rng.spawn(len(sets)), strict=True)):
             new |= take(fit)
         return new
+
+    def behind_a_resonance(centre: Fit, pool: Sequence[Term]) -> list[list[Term]]:
+        """The best sets of `pool` beside each driven term of `centre`, as the output shows them through it: alone they
+        are other waves than these.
+        """
+        sets = []
+        for i, driven in enumerate(centre.terms):
+            if not is_driven(driven):
+                continue
+            others = [term for term in pool if term.effect != driven.effect]
+            probe = FitProbe(centre, keep=[i], order_range=order_range)
+            ranked = rank_subsets(
+                probe, others, inflation, MOST_EFFECTS - 1, Beside((driven, *beside.terms), beside.gain)
+            )
+            sets += [[driven, *(others[j] for j in subset)] for _, _, subset in ranked[:LEADERS]]
+        return sets
 
     def take(fit: Fit) -> bool:
         """Takes `fit` for its set of effects where it is the first or better; whether it did."""
@@ -176,6 +197,10 @@ def select(
         few = trimmed(fit)
         if few is not None and is_better(few, fit, by=-KEPT * weigh(fit, base, inflation).gain / inflation):
             fits[names] = few
+    for fit in sorted(fits.values(), key=weigh_fit, reverse=True)[:LEADERS]:
+        for shorter in shortened(fit, rng):
+            if not take(shorter):
+                break
     while (best := leader()) is not None and best.evidence > 0 and len(best.fit.terms) > 1:
         # A term that came in beside a better drive may have no part in it: without each, from where the best stands.
         for fit in without_each(best.fit):
@@ -191,44 +216,16 @@ def select(
     candidates = [weigh(f, base, inflation, top, beside) for f in fits.values()]
     candidates.append(Candidate(base, 0.0, 0.0))
     candidates.sort(key=lambda c: -c.evidence)
+    for candidate in candidates[:LEADERS]:
+        if not candidate.fit.terms or is_credible(candidate.fit):
+            break
+        others = otherwise_credible(candidate.fit, skip, order_range)
+        candidates += [weigh(f, base, inflation, top, beside) for f in others]
+    candidates.sort(key=lambda c: -c.evidence)
     candidates = first_credible(candidates)
     best = candidates[0]
     fuller = in_full(best.fit, base, inflation, order_range) if best.fit.terms else best.fit
     return Selection(base, (replace(best, fit=fuller), *candidates[1:]), inflation)
-
-
-def trimmed(fit: Fit) -> Fit | None:
-    """`fit` without the parts of its terms that do not show; None where all do."""
-    terms = []
-    for term, coefficients in zip(fit.terms, fit.coefficients, strict=True):
-        effect = EXPLANATIONS[term.effect]
-        shape = effect.trimmed(term, coefficients) if hasattr(effect, "trimmed") else None
-        terms.append(term if shape is None else effect.term(fit.problem.samples, shape, fit.base_value))
-    if all(new is old for new, old in zip(terms, fit.terms, strict=True)):
-        return None
-    return joint_fit(fit, terms)
-
-
-def in_full(fit: Fit, base: Fit, inflation: float, order_range: tuple[float, float]) -> Fit:
-    """`fit`, or the same effects in wider variants where these pay for their coefficients: what a name has to pay for
-    bending to anything, it need not pay any more once it stands.
-    """
-    rows = float((fit.problem.noise.root_weight > 0).sum())
-
-    def paid(candidate: Fit) -> float:
-        freedom = sum(term.freedom for term in candidate.terms)
-        trials = sum(math.log(max(term.trials, 1.0)) for term in candidate.terms)
-        return weigh(candidate, base, inflation).gain / inflation / 2 - 0.5 * freedom * math.log(rows) - trials
-
-    for i, term in enumerate(fit.terms):
-        keep = [j for j in range(len(fit.terms)) if j != i]
-        probe = FitProbe(fit, keep=keep, order_range=order_range)
-        wider = [t for t in search_terms(probe, only=[term.effect]) if t.width > term.width]
-        for other in wider:
-            candidate = joint_fit(fit, [other if j == i else t for j, t in enumerate(fit.terms)])
-            if paid(candidate) > paid(fit) + TIE_OF_VARIANTS and is_credible(candidate):
-                fit = candidate
-    return fit
 
 
 def behind_a_wildcard(leader: Candidate | None, fits: Iterable[Fit], evidence: Callable[[Fit], float]) -> list[Fit]:
@@ -248,22 +245,6 @@ def behind_a_wildcard(leader: Candidate | None, fits: Iterable[Fit], evidence: C
         and evidence(fit) > BEHIND * leader.evidence
     ]
     return sorted(single, key=evidence, reverse=True)[:LEADERS]
-
-
-def narrower(fit: Fit, skip: Sequence[str], order_range: tuple[float, float]) -> list[list[Term]]:
-    """Sets in which a plain term takes the place of a wide one of `fit`: about a base that is bent to the wide one it
-    looks worse than it is.
-    """
-    sets = []
-    for i, term in enumerate(fit.terms):
-        if term.width <= NARROW or kind_of(term) != "turning":
-            continue
-        others = [t for j, t in enumerate(fit.terms) if j != i]
-        probe = FitProbe(fit, keep=[j for j in range(len(fit.terms)) if j != i], order_range=order_range)
-        found = search_terms(probe, [*skip, *(t.effect for t in fit.terms)])
-        plain = [t for t in found if t.width <= NARROW and kind_of(t) == "turning" and not t.doubtful]
-        sets += [[*others, t] for t in sorted(plain, key=probe.gain, reverse=True)[:LEADERS]]
-    return sets
 
 
 def first_credible(candidates: list[Candidate]) -> list[Candidate]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hdopt.diagnosis.fit import Fit, shape_columns, term_columns
+from hdopt.diagnosis.fit import Fit, shape_columns
 
 Array = NDArray[np.float64]
 
@@ -62,18 +62,10 @@ def lost_in_wander(fit: Fit, index: int, price: float) -> bool:
     if spread < SLOW * np.var(contribution):
         return False
     columns = []
-    for i, (term, coefficients) in enumerate(zip(fit.terms, fit.coefficients, strict=True)):
+    for i, term in enumerate(fit.terms):
         if i != index:
-            columns += [
-                term_columns(term, fit.zone, fit.problem.base),
-                shape_columns(term, coefficients, fit.problem, fit.zone, fit.base_value),
-            ]
-    own = np.column_stack(
-        [
-            term_columns(fit.terms[index], fit.zone, fit.problem.base),
-            shape_columns(fit.terms[index], fit.coefficients[index], fit.problem, fit.zone, fit.base_value),
-        ]
-    )
+            columns += [fit.columns_of(term), shape_columns(fit, i)]
+    own = np.column_stack([fit.columns_of(fit.terms[index]), shape_columns(fit, index)])
     beside = mean(np.column_stack([fit.problem.nuisance, *columns]))
     record = samples.record[np.searchsorted(cell, np.arange(len(count)))]
     left = mean(fit.residual)[:, 0]

@@ -75,8 +75,13 @@ class AddedEffect:
 
     @property
     def follows_base(self) -> bool:
-        """Whether the base's own waveform drives this effect: it has no value at one angle alone."""
+        """Whether the drive's own motion drives this effect: it has no value at one angle alone."""
         return hasattr(self.effect, "steady_state")
+
+    @property
+    def moves_the_output(self) -> bool:
+        """Whether the columns of this effect are a motion of the drive, which excites what swings behind it."""
+        return getattr(self.effect, "excites", False)
 
     def term(self, samples: Samples, base_value: Array | None = None) -> Term:
         """The effect's columns on these rows, by its own physics."""

@@ -101,13 +101,16 @@ class ExtendedModel:
 
     def beside(self, theta: Array, direction: float = 1.0) -> Array:
         """What effects add to the kinematic error outside the zones, arcmin, shape (n,)."""
-        added = np.zeros(len(theta))
-        for effect, term in self._terms(theta, direction):
-            if term.columns is not None:
-                added += self.operation.rows_of_pass(term.columns @ np.array(effect.coefficients))
+        added = sum((values for _, values in self._columns(theta, direction)), np.zeros(len(theta)))
         for grid, values in self._settled.get(direction, ()):
             added += np.interp(theta, grid, values, period=self.span)
         return added
+
+    def _columns(self, theta: Array, direction: float):
+        """The effects that add to the kinematic error itself, and what each adds, arcmin, (n,)."""
+        for effect, term in self._terms(theta, direction):
+            if term.columns is not None:
+                yield effect, self.operation.rows_of_pass(term.columns @ np.array(effect.coefficients))
 
     def _terms(self, theta: Array, direction: float):
         rows = self.operation.rows(self.ratio, theta, direction, self.span)
@@ -125,7 +128,8 @@ class ExtendedModel:
         settled = {}
         for direction in self.operation.directions:
             order = slice(None, None, int(direction))
-            excitation = self.driven(theta, deviation, direction)[order]
+            moving = [values for effect, values in self._columns(theta, direction) if effect.moves_the_output]
+            excitation = sum(moving, self.driven(theta, deviation, direction))[order]
             rows = running.rows(self.ratio, full_turn(self.drive, self.samples_per_turn), 1.0, self.span)
             settled[direction] = tuple(
                 (theta, (effect.term(rows, excitation).columns @ np.array(effect.coefficients))[order])

@@ -7,6 +7,7 @@ import pytest
 from hdopt.diagnosis.candidates import Candidate, joint_fit
 from hdopt.diagnosis.credible import is_credible
 from hdopt.diagnosis.effects import EFFECTS
+from hdopt.diagnosis.effects.bearing_pass import bearing_orders
 from hdopt.diagnosis.effects.cs_tooth_harmonics import members_of, shape_of
 from hdopt.diagnosis.effects.encoder_interpolation import is_of_teeth
 from hdopt.diagnosis.fit import Problem, evaluate, refine
@@ -15,7 +16,8 @@ from hdopt.diagnosis.nuisance import nuisances_for
 from hdopt.diagnosis.probe import FitProbe
 from hdopt.diagnosis.ripple import strong_ripple
 from hdopt.diagnosis.samples import gather, neighbours_for
-from hdopt.diagnosis.select import first_credible, trimmed
+from hdopt.diagnosis.select import first_credible
+from hdopt.diagnosis.variants import otherwise_credible, shortened, trimmed
 from hdopt.drive import ARCMIN
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.kinematics.waveform import kinematic_error_arcmin
@@ -120,6 +122,40 @@ def test_those_that_may_not_be_said_neither_lead_nor_rival(study):
     candidates = [Candidate(bad, 100.0, 0.0), Candidate(good, 98.0, 0.0), Candidate(bad, 95.0, 0.0)]
     candidates += [Candidate(bad, 50.0, 0.0), Candidate(fit, 0.0, 0.0)]
     assert [c.evidence for c in first_credible(candidates)] == [98.0, 50.0, 0.0]
+
+
+def test_a_name_that_may_not_be_said_this_way_may_be_in_another(study):
+    """26 balls unlike in place: most of it at their own wave, the rest at others. A bearing of 37 balls has an outer
+    pass there too, and no line besides that shows."""
+    half = (1 + 0.1267) * (1 + 1 / RATIO) / 2
+    outer = 26 * half
+    ratio = 1 - 2 * outer / 37 / (1 + 1 / RATIO)
+    assert bearing_orders(ratio, 37, RATIO)[3] == pytest.approx(outer)
+    fit, _, _ = fitted(
+        study,
+        lambda t: 0.1 * np.sin(outer * t) + sum(0.015 * np.sin(k * half * t + k) for k in range(2, 25, 2)),
+        turns=60,
+    )
+    wrong = with_effect(fit, "bearing_pass", {"ball_to_pitch_ratio": ratio, "balls": 37.0, "lines": 1.0})
+    assert not is_credible(wrong)
+    others = otherwise_credible(wrong, (), (0.0, wrong.problem.samples.highest_order))
+    assert others
+    assert all("zones" in other.terms[0].shape for other in others)
+    assert others[0].terms[0].shape["ball_to_pitch_ratio"] == pytest.approx(0.1267, abs=2e-4)
+    assert others[0].objective < wrong.objective
+
+
+def test_a_run_of_waves_is_tried_shorter(study):
+    """Waves 2 and 4 round the circular spline, fitted with 2 to 24: runs get shorter, and 2 to 4 is enough."""
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(2 * t) + 0.08 * np.sin(4 * t + 1))
+    wide = with_effect(fit, "cs_tooth_harmonics", shape_of(range(2, 25)))
+    runs = [(members_of(less.terms[0].shape), less) for less in shortened(wide, np.random.default_rng(0))]
+    assert [members[-1] for members, _ in runs] == [14, 8, 5, 4, 3]
+    left = {members[-1]: np.std(less.residual) for members, less in runs}
+    assert left[4] < 1.02 * np.std(wide.residual)
+    assert left[3] > 2 * left[4]
+    few = with_effect(fit, "cs_tooth_harmonics", shape_of((2, 4)))
+    assert list(shortened(few, np.random.default_rng(0))) == []
 
 
 @pytest.mark.parametrize(("size", "set_aside"), [(0.3, True), (0.002, False)])

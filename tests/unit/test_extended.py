@@ -15,7 +15,7 @@ from hdopt.cli import main
 from hdopt.diagnosis import diagnose
 from hdopt.diagnosis.effect import Parameter, Term
 from hdopt.diagnosis.effects import EFFECTS
-from hdopt.diagnosis.effects.resonance import relative_responses
+from hdopt.diagnosis.effects._oscillator import relative_responses, settled_responses
 from hdopt.diagnosis.found import Found
 from hdopt.diagnosis.write_back import found_effects, write_study
 from hdopt.errors import HdoptError, MissingValue
@@ -129,10 +129,25 @@ def test_steady_resonance_is_what_the_integration_in_time_settles_to(study_with,
     theta, settled = model._settled[1.0][0]
     rows = Operation(speed=2 * math.pi).rows(80, theta, 1.0, model.span)
     _, excitation = model.with_effects([]).relative_turn()
-    integrated = relative_responses(rows, excitation, 3.0, 0.05) @ [1.0, share]
+    integrated = relative_responses(rows, excitation[:, None], 3.0, 0.05, np.array([[1.0], [share]]))[:, 0, 0]
     half = len(theta) // 2
     assert np.std(settled) > 0.05
     assert np.std((settled - integrated)[half:]) < 0.02 * np.std(settled)
+
+
+def test_resonance_is_excited_by_all_that_moves_the_output(study_with):
+    """A lobe in the zones and a pulse outside them: the resonance answers to the motion with both."""
+    swinging = {"resonance": {"frequency_hz": 3.0, "damping_ratio": 0.05}}
+    moving = {
+        "circular_spline_lobing": {"lobes": 5, "radial_amplitude_um": 10.0, "phase_deg": 17.0},
+        "local_tooth_defect": {"on": "output", "angle_deg": 100.0, "width_deg": 3.0, "height_arcmin": 0.2},
+    }
+    model = extended_model(study_with(moving | swinging, {"speed_rpm": 60.0}))
+    theta, settled = model._settled[1.0][0]
+    _, motion = extended_model(study_with(moving, {"speed_rpm": 60.0})).relative_turn()
+    rows = Operation(speed=2 * math.pi).rows(80, theta, 1.0, model.span)
+    expected = settled_responses(rows.time, motion, 3.0, 0.05)[:, 0]
+    np.testing.assert_allclose(settled, expected, atol=1e-9)
 
 
 def test_extremes_without_effects_are_those_of_the_base():

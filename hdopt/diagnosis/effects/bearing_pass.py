@@ -64,6 +64,7 @@ class BearingPass:
     id = "bearing_pass"
     domain = "order"
     needs_base = False
+    excites = True
     separating = (
         "record ten output turns, or with the bearing turned by one ball pitch: its orders drift against the teeth"
     )
@@ -226,11 +227,7 @@ class BearingPass:
     def orders(self, term, ratio):
         if "zones" in term.shape:
             half = (1 + term.shape["ball_to_pitch_ratio"]) * (1 + 1 / ratio) / 2
-            return [
-                o
-                for h in zone_orders(term.shape)
-                for o in ([h * half] if h % 2 == 0 else [1 + h * half])
-            ]
+            return [o for h in zone_orders(term.shape) for o in ([h * half] if h % 2 == 0 else [1 + h * half])]
         orders = bearing_orders(term.shape["ball_to_pitch_ratio"], term.shape["balls"], ratio)
         return [float(orders[i]) for i in LINES[int(term.shape["lines"])]]
 

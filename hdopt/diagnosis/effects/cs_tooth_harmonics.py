@@ -92,6 +92,16 @@ class CircularSplineToothHarmonics:
         left = tuple(h for h, s in zip(members, size, strict=True) if s > LEAST_OF_FEW * size.max())
         return shape_of(left) if members not in RUNS and self.stands_alone(left) and left != members else None
 
+    @staticmethod
+    def shortened(term):
+        """Shapes of shorter runs than the term's own, the longest first."""
+        members = members_of(term.shape)
+        return (
+            [shape_of(run) for run in reversed(RUNS) if len(run) > 1 and run[-1] < members[-1]]
+            if members in RUNS
+            else []
+        )
+
     def term(self, samples, shape, base_value=None):
         members = members_of(shape)
         trials = float(len(RUNS))

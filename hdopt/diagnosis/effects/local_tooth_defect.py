@@ -31,6 +31,7 @@ class LocalToothDefect:
     id = "local_tooth_defect"
     domain = "angle"
     needs_base = False
+    excites = True
     separating = (
         "turn the circular spline by some teeth, and the flexspline against the output: the pulse moves with its part"
     )
