@@ -5,7 +5,7 @@ import pytest
 
 from hdopt.diagnosis.confounding import Confounding
 from hdopt.diagnosis.effect import Parameter
-from hdopt.report.sections.diagnosis import confounded_items, parameter_row
+from hdopt.report.sections.diagnosis import LISTED_WAVES, confounded_items, parameter_row, waves_figure, waves_of
 from hdopt.report.sections.diagnosis_residual import FEWEST, POINTS, continued, means_along
 
 
@@ -50,3 +50,15 @@ def test_what_could_be_mistaken_is_said_once_for_each_effect():
     table, *texts = confounded_items(Told)
     assert table.frame["could be"].tolist() == ["Hysteresis", "Channel delay"]
     assert [text.text for text in texts] == ["To tell lost motion apart: reverse slowly."]
+
+
+def test_many_waves_are_drawn_and_few_listed():
+    size = Parameter(0.5, -0.1, 1.1, "um")
+    waves = {f"{kind}_{h}_{unit}": size for h in range(2, 41) for kind, unit in (("amplitude", "um"), ("phase", "deg"))}
+    assert list(waves_of(waves)) == list(range(2, 41))
+    (bars,) = waves_figure("cs_tooth_harmonics", waves_of(waves)).figure.data
+    assert list(bars.x) == list(range(2, 41))
+    assert bars.error_y.arrayminus[0] == 0.5
+    few = {"amplitude_arcmin": size, "phase_deg": size, "amplitude_output_2_arcmin": size, "delay_s": size}
+    assert len(waves_of(few)) <= LISTED_WAVES
+    assert waves_of(few) == {}

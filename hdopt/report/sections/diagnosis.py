@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from hdopt.diagnosis.verdict import TIE
@@ -14,6 +15,10 @@ from hdopt.report.theme import BLUE, GREEN, GREY, figure
 if TYPE_CHECKING:
     from hdopt.diagnosis.effect import Parameter
     from hdopt.diagnosis.verdict import Diagnosis
+
+WAVE = re.compile(r"(amplitude|phase)_(\d+)_(?:um|deg|arcmin)$")
+LISTED_WAVES = 6
+"""Waves up to which an effect's amplitudes and phases stand in the table; more are drawn."""
 
 NUMBERS = {"value": ".4g", "low": ".4g", "high": ".4g"}
 
@@ -49,16 +54,52 @@ def verdict_section(diagnosis: Diagnosis) -> Section:
         items.append(Text(f"Its strongest orders are {orders} cycles per input turn."))
     if diagnosis.separating_test:
         items.append(Text(f"What to measure next: {diagnosis.separating_test}."))
+    drawn = {found.id: waves_of(found.parameters) for found in diagnosis.effects}
     rows = [
         {"effect": label(found.id)} | parameter_row("parameter", name, parameter)
         for found in diagnosis.effects
         for name, parameter in found.parameters.items()
+        if len(drawn[found.id]) <= LISTED_WAVES or not WAVE.match(name)
     ]
     if rows:
         items.append(Table("diagnosis-parameters", "Parameters, with 95 % intervals", pd.DataFrame(rows), "", NUMBERS))
+    items += [
+        waves_figure(found.id, waves) for found in diagnosis.effects if len(waves := drawn[found.id]) > LISTED_WAVES
+    ]
     if diagnosis.confounded:
         items += confounded_items(diagnosis)
     return Section("diagnosis", "Verdict", tuple(items), diagnosis.says)
+
+
+def waves_of(parameters: Mapping[str, Parameter]) -> dict[int, Parameter]:
+    """The amplitudes among an effect's parameters that are numbered by waves a turn."""
+    found = {name: WAVE.match(name) for name in parameters}
+    return {int(match[2]): parameters[name] for name, match in found.items() if match and match[1] != "phase"}
+
+
+def waves_figure(effect: str, waves: Mapping[int, Parameter]) -> Figure:
+    """The amplitudes of an effect's waves with their intervals: as a table they would fill a page."""
+    import plotly.graph_objects as go
+
+    unit = next(iter(waves.values())).unit
+    chart = figure("waves a turn", f"amplitude [{unit}]", height=280)
+    sizes = list(waves.values())
+    chart.add_trace(
+        go.Bar(
+            x=list(waves),
+            y=[p.value for p in sizes],
+            error_y={
+                "type": "data",
+                "array": [p.high - p.value for p in sizes],
+                "arrayminus": [min(p.value - p.low, p.value) for p in sizes],
+                "color": GREY,
+            },
+            marker_color=BLUE,
+        )
+    )
+    chart.update_yaxes(range=[0, 1.5 * max(p.value for p in sizes)])
+    note = "Bars end at the fitted value, lines at its 95 % interval. Phases are among the numbers of this report."
+    return Figure(f"diagnosis-waves-{effect}", f"{label(effect)}: its waves", chart, note)
 
 
 def parameter_row(heading: str, name: str, parameter: Parameter) -> dict[str, object]:
