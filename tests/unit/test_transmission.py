@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from scipy.signal import lfilter
 
+from hdopt.diagnosis.credible import is_credible, lost_in_misfit
 from hdopt.diagnosis.effects import EFFECTS
 from hdopt.diagnosis.effects._oscillator import relative_responses
 from hdopt.diagnosis.fit import Problem, evaluate, refine
@@ -130,3 +131,11 @@ def test_fit_finds_lobes_behind_a_resonance(study):
     lobes = truth.terms[0]
     seen, direct = (FitProbe(alone, keep=keep).gain(lobes) for keep in ([0], []))
     assert seen > 1.2 * direct
+
+
+@pytest.mark.parametrize(("size", "credible"), [(1.0, True), (0.02, False)])
+def test_a_swing_must_be_more_than_the_misfit_of_what_excites_it(study, size, credible):
+    problem = problem_of(study)
+    fit = shaken(study, problem, [np.array([4e-3, 2e-3]), np.array([size, 0.0])])
+    assert lost_in_misfit(fit, 1) is not credible
+    assert is_credible(fit) is credible
