@@ -16,6 +16,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 ALLOWED_SKIPS = ("no recordings", "this machine has OSMesa")
 """What a skip's reason may start with in CI: the recordings belong to others and are not part of the project."""
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+"""Before numpy is first imported: workers side by side, each with a thread a core for every small product, take a
+hundred times as long.
+"""
+
 _skipped: list[tuple[str, str]] = []
 
 

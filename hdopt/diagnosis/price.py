@@ -62,11 +62,12 @@ def price(terms: Sequence[Term], rows: float, gain: float, inflation: float, bes
     if {term.effect for term in terms} >= ONE_IN_THE_OTHER:
         cost += TWICE
     cost += sum(term.doubtful for term in terms) * 0.5 * CLEAR_WIN * gain / inflation
-    # What was taken out to the last digit leaves nothing that could be named.
     rough = [term for term in beside.terms if not leaves_nothing(term)]
-    power = gain + beside.gain if rough else gain
-    inexact = discrepancy([*terms, *rough]) - discrepancy(rough) if terms else 0.0
-    return cost + len(terms) * EFFECT_COST + 0.5 * inexact * power / inflation
+    inexact = (discrepancy([*terms, *rough]) - discrepancy(rough)) * (gain + (beside.gain if rough else 0.0))
+    if terms and beside.terms and not rough:
+        # What was taken out to the last digit leaves as little as another kind of effect.
+        inexact += OTHER_KIND * beside.gain
+    return cost + len(terms) * EFFECT_COST + 0.5 * inexact / inflation
 
 
 def is_cycle_of(term: Term, found: Sequence[Term]) -> bool:
