@@ -31,7 +31,7 @@ KINDS = {
     "temperature": "slow",
     "torque": "load",
 }
-"""Kind of an effect by its domain; reversal, direction and speed are one: no curve of the torque makes a loop."""
+"""Kind of an effect by its domain; reversal and direction are one: no curve of the torque makes a loop."""
 FEW_COEFFICIENTS, MANY_COEFFICIENTS = 8, 24
 ENCODER = "encoder_interpolation"
 CLEAR_WIN = 0.12
@@ -108,5 +108,7 @@ def flexibility(term: Term) -> float:
 
 
 def kind_of(term: Term) -> str:
-    """What a term's misfit looks like."""
-    return KINDS.get(EXPLANATIONS[term.effect].domain, "way")
+    """What a term's misfit looks like; that of a resonance, whose frequency lies in its response to each speed, like no
+    other's.
+    """
+    return "swing" if term.effect == "resonance" else KINDS.get(EXPLANATIONS[term.effect].domain, "way")
