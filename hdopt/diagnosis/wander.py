@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdopt.diagnosis.fit import Fit, shape_columns
+from hdopt.diagnosis.samples import Samples
 
 Array = NDArray[np.float64]
 
@@ -39,25 +40,37 @@ class SlowWave:
     rms: float
 
 
+class _QuarterTurns:
+    """Means of rows over quarters of an input turn, within a record."""
+
+    def __init__(self, samples: Samples):
+        self.cell = _cells(samples)
+        self.count = np.bincount(self.cell).astype(float)
+        self.record = samples.record[np.searchsorted(self.cell, np.arange(len(self.count)))]
+
+    def __len__(self) -> int:
+        return len(self.count)
+
+    def of(self, values: Array) -> Array:
+        """Means of columns (n, k), or of one (n,), in the same form."""
+        columns = values.reshape(len(values), -1).T
+        means = np.column_stack([np.bincount(self.cell, column) / self.count for column in columns])
+        return means if values.ndim > 1 else means[:, 0]
+
+
 def lost_in_wander(fit: Fit, index: int, price: float) -> bool:
     """Whether term `index` of `fit` is slow and does not pay its `price` (log evidence) against the wander left."""
     samples = fit.problem.samples
     if samples.locked:
         return False
-    cell = _cells(samples)
-    count = np.bincount(cell).astype(float)
-    if len(count) < FEWEST_MEANS:
+    quarters = _QuarterTurns(samples)
+    if len(quarters) < FEWEST_MEANS:
         return False
-
-    def mean(values: Array) -> Array:
-        table = values.reshape(len(values), -1)
-        return np.column_stack([np.bincount(cell, column) / count for column in table.T])
-
     contribution = fit.contribution(index)
-    means = mean(contribution)[:, 0]
-    longer = np.arange(len(count)) // (PER_TURN * SLOW_TURNS)
-    weight = np.bincount(longer, count)
-    over_turns = np.bincount(longer, means * count) / weight
+    means = quarters.of(contribution)
+    longer = np.arange(len(quarters)) // (PER_TURN * SLOW_TURNS)
+    weight = np.bincount(longer, quarters.count)
+    over_turns = np.bincount(longer, means * quarters.count) / weight
     spread = np.average((over_turns - np.average(over_turns, weights=weight)) ** 2, weights=weight)
     if spread < SLOW * np.var(contribution):
         return False
@@ -66,13 +79,12 @@ def lost_in_wander(fit: Fit, index: int, price: float) -> bool:
         if i != index:
             columns += [fit.columns_of(term), shape_columns(fit, i)]
     own = np.column_stack([fit.columns_of(fit.terms[index]), shape_columns(fit, index)])
-    beside = mean(np.column_stack([fit.problem.nuisance, *columns]))
-    record = samples.record[np.searchsorted(cell, np.arange(len(count)))]
-    left = mean(fit.residual)[:, 0]
-    ar, start = _autoregression(left, record)
+    beside = quarters.of(np.column_stack([fit.problem.nuisance, *columns]))
+    left = quarters.of(fit.residual)
+    ar, start = _autoregression(left, quarters.record)
     target = _filtered(left + means, ar, start)
     others = _filtered(beside, ar, start)
-    with_own = _filtered(np.column_stack([beside, mean(own)]), ar, start)
+    with_own = _filtered(np.column_stack([beside, quarters.of(own)]), ar, start)
     without, complete = (_left_over(columns, target) for columns in (others, with_own))
     variance = complete / max(len(target) - with_own.shape[1], 1)
     return (without - complete) / variance / 2 < price
@@ -87,13 +99,11 @@ def slow_wave(fit: Fit) -> SlowWave | None:
     samples = fit.problem.samples
     if samples.locked or samples.time is None:
         return None
-    cell = _cells(samples)
-    count = np.bincount(cell).astype(float)
-    means, time = (np.bincount(cell, values) / count for values in (fit.residual, samples.time))
-    record = samples.record[np.searchsorted(cell, np.arange(len(count)))]
+    quarters = _QuarterTurns(samples)
+    means, time = (quarters.of(values) for values in (fit.residual, samples.time))
     found = None
-    for number in np.unique(record):
-        own = record == number
+    for number in np.unique(quarters.record):
+        own = quarters.record == number
         wave = _line(time[own], means[own])
         if wave is not None and (found is None or wave.rms > found.rms):
             found = wave
@@ -126,7 +136,7 @@ def _neighbours(along: Array, cycles: int) -> list[Array]:
     return [f(2 * math.pi * (cycles + off) * along) for off in (-0.5, 0.0, 0.5) for f in (np.sin, np.cos)]
 
 
-def _cells(samples) -> NDArray[np.int64]:
+def _cells(samples: Samples) -> NDArray[np.int64]:
     """Number of the quarter turn of each row, counted along the motion; reversals and gaps begin a new one."""
     quarter = np.floor(samples.theta / (2 * math.pi / PER_TURN)).astype(np.int64)
     change = (np.diff(quarter) != 0) | (np.diff(samples.piece) != 0) | (np.diff(samples.direction) != 0)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hdopt.diagnosis.effect import Effect, Term
 from hdopt.diagnosis.effects import EFFECTS
-from hdopt.diagnosis.effects.tooth_mesh import SIDEBANDS, ZONE_SIDEBANDS
+from hdopt.diagnosis.effects.tooth_mesh import SIDEBANDS, ZONE_SIDEBANDS, mesh_order
 from hdopt.diagnosis.samples import Samples
 
 Array = NDArray[np.float64]
@@ -100,7 +100,7 @@ class AddedEffect:
         """Orders that this effect adds to the spectrum, where it is made of sines."""
         if self.id == "tooth_mesh":
             sides = ZONE_SIDEBANDS if "zones" in self.shape else SIDEBANDS
-            return [2.0 * round(ratio + 1) + k for k in sides[int(self.shape["sidebands"])]]
+            return [mesh_order(ratio) + k for k in sides[int(self.shape["sidebands"])]]
         if self.id == "torsional_windup":
             return [2.0] if "angle" in self.shape else []
         named = getattr(self.effect, "orders", None)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from hdopt.diagnosis.effect import Parameter, Term, best_terms, sine_columns
+from hdopt.diagnosis.effects.tooth_mesh import mesh_order
 
 LOWEST_ORDER = 8.0
 LOWEST_PAIR = 3.0
@@ -32,9 +33,8 @@ FEW_LINES, FEW_LINES_ODDS = 17, -8.0
 
 def beside_the_mesh(orders, ratio):
     """Where an order is the tooth mesh or a sideband of it, drawn aside by a few output turns' worth of modulation."""
-    mesh = 2 * round(ratio + 1)
     near = np.abs(orders - np.round(orders)) < MODULATION_PER_OUTPUT_TURN / ratio
-    return near & (np.abs(orders - mesh) < SIDEBAND_REACH)
+    return near & (np.abs(orders - mesh_order(ratio)) < SIDEBAND_REACH)
 
 
 def is_of_teeth(order, multiples, ratio, output):
@@ -43,7 +43,7 @@ def is_of_teeth(order, multiples, ratio, output):
     """
     waves = (order, order / (1 + 1 / ratio)) if output else ()
     round_a_spline = any(abs(wave - round(wave)) < 1e-6 and round(wave) <= HARMONICS_OF_TEETH for wave in waves)
-    return round_a_spline or any(abs(m * order - 2 * round(ratio + 1)) < 1e-6 for m in multiples)
+    return round_a_spline or any(abs(m * order - mesh_order(ratio)) < 1e-6 for m in multiples)
 
 
 class EncoderInterpolation:

@@ -27,6 +27,11 @@ ZONE_SIDEBANDS = ((0,), (0, -1, 1), (0, -1, 1, -2, 2))
 """Inside the zones, whose change needs no sidebands of its own."""
 
 
+def mesh_order(ratio: float) -> float:
+    """Z_CS: teeth that the wave generator passes an input turn, for two lobes."""
+    return 2.0 * round(ratio + 1)
+
+
 class ToothMesh:
     id = "tooth_mesh"
     domain = "order"
@@ -42,7 +47,7 @@ class ToothMesh:
 
     @staticmethod
     def order(samples) -> float:
-        return 2.0 * round(samples.ratio + 1)
+        return mesh_order(samples.ratio)
 
     def search(self, probe):
         if not probe.order_range[0] < self.order(probe.samples) < probe.order_range[1]:
