@@ -20,7 +20,7 @@ from hdopt.recording import TURN
 Array = NDArray[np.float64]
 
 MOST_CONFIDENT = 0.97
-"""No name is surer: what all shapes of the catalogue miss is in no evidence. In the last two blind runs 97 of 100 names
+"""No name is surer: what all shapes of the catalogue miss is in no evidence. In three blind runs 97 of 100 names
 that the evidence alone called certain were right.
 """
 
