@@ -52,17 +52,31 @@ class Noise:
         return _filtered(table, self.ar, self.root_weight).reshape(values.shape)
 
 
+SIDE_BY_SIDE = 8
+"""Columns from which the filter's sums are taken for all columns side by side."""
+
+
 @njit(cache=True, nogil=True)
 def _filtered(values, ar, root_weight):
     """(x_t - sum a_k x_{t-k}) times the weight of row t, for each column of `values` (n, q)."""
     rows, columns = values.shape
     result = np.empty((rows, columns))
     for t in range(rows):
+        lags = min(len(ar), t)
+        if columns < SIDE_BY_SIDE:
+            for q in range(columns):
+                white = values[t, q]
+                for k in range(lags):
+                    white -= ar[k] * values[t - 1 - k, q]
+                result[t, q] = white * root_weight[t]
+            continue
         for q in range(columns):
-            white = values[t, q]
-            for k in range(min(len(ar), t)):
-                white -= ar[k] * values[t - 1 - k, q]
-            result[t, q] = white * root_weight[t]
+            result[t, q] = values[t, q]
+        for k in range(lags):
+            for q in range(columns):
+                result[t, q] -= ar[k] * values[t - 1 - k, q]
+        for q in range(columns):
+            result[t, q] *= root_weight[t]
     return result
 
 

@@ -8,7 +8,7 @@ priced like one. A catalogue effect that merely resembles such a structure loses
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import fftconvolve
+from scipy.ndimage import convolve1d
 
 from hdopt.diagnosis.effect import Term, best_terms, sine_columns, strongest_orders, terms_at
 from hdopt.diagnosis.steps import find_steps, step_columns
@@ -173,7 +173,7 @@ class Bump(Event):
                 continue
             reach = int(4 * width) + 1
             kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
-            score = np.abs(fftconvolve(probe.residual, kernel, "same"))
+            score = np.abs(convolve1d(probe.residual, kernel, mode="constant"))
             shapes.append({"row": float(np.argmax(score)), "width": float(width)})
         return best_terms(probe, [self.term(samples, shape) for shape in shapes])
 

@@ -27,6 +27,8 @@ from hdopt.recording import Recording
 
 Array = NDArray[np.float64]
 
+BESIDE_RIPPLE = 0.01
+"""Power over the ripple's from which effects that came or went beside it may have had a part in its name."""
 NOISE_ROUNDS = 3
 """How often the noise is measured anew at most."""
 
@@ -75,13 +77,15 @@ def gather_evidence(
         samples = gather(cleaned, neighbours_for(cleaned))
         problem = replace(problem, samples=samples, nuisance=nuisances.columns(samples), noise=noise)
         base_fit = refine(_rebase(base_fit, problem), iterations=8)
-        before = selection.best.effects
-        noise, inflation = measure_noise(base_fit if not before else _rebase(selection.best.fit, problem))
+        before = selection.best
+        noise, inflation = measure_noise(base_fit if not before.effects else _rebase(before.fit, problem))
         base_fit = refine(_rebase(base_fit, problem.with_noise(noise)), iterations=4)
         taken = beside(base_fit, float(np.var(ripple)), high.best.fit.terms)
         known = rebased(selection, base_fit.problem)
         selection = select(base_fit, inflation, rng, skip=ruled_out, known=known, beside=taken)
-        if set(selection.best.effects) != set(before):
+        changed = set(selection.best.effects) != set(before.effects)
+        sizes = [float(np.var(fit.contributions)) for fit in (selection.best.fit, before.fit)]
+        if changed and max(sizes) > BESIDE_RIPPLE * float(np.var(ripple)):
             # What was beside the ripple when it was named is not there any more.
             high, _ = find_ripple(recordings, selection, nuisances, ruled_out, rng)
     return assess(samples, selection, high, nuisances, inflation, rng)

@@ -187,7 +187,9 @@ def select(
     best = leader()
     if best is not None and best.evidence > 0 and base.problem.base is not None:
         # The leader has been fitted from new drives; those close behind it, and simpler sets, may want another drive.
-        behind = sorted((f for f in fits.values() if f is not best.fit), key=weigh_fit, reverse=True)[:LEADERS]
+        # What only adds to the leader's effects shares its drive.
+        others = (fit for names, fit in fits.items() if not names >= set(best.effects))
+        behind = sorted(others, key=weigh_fit, reverse=True)[:LEADERS]
         behind = [fit.terms for fit in behind if weigh_fit(fit) > CLOSE * best.evidence]
         sets = [*behind, *narrower(best.fit, skip, order_range)]
         pairs = zip(sets, rng.spawn(len(sets)), strict=True)
