@@ -8,6 +8,9 @@ import click
 
 from hdopt.cli.common import emit, json_option, seed_option
 
+MOST_LISTED = 12
+"""Parameters of one effect that the terminal shows."""
+
 
 @click.command()
 @click.argument("recordings", nargs=-1, required=True, metavar="REC...", type=click.Path(path_type=Path))
@@ -68,8 +71,11 @@ def _lines(diagnosis):
     yield f"  {diagnosis.says}"
     for found in diagnosis.effects:
         yield f"  {found.id}: confidence {found.confidence:.2f}, {found.where['rms_arcmin']:.3g} arcmin rms"
-        for name, p in found.parameters.items():
+        listed = list(found.parameters.items())
+        for name, p in listed[:MOST_LISTED]:
             yield f"    {name:24s} {p.value:.5g}  ({p.low:.5g} to {p.high:.5g}) {p.unit}"
+        if len(listed) > MOST_LISTED:
+            yield f"    and {len(listed) - MOST_LISTED} more, all of them in --json"
     if diagnosis.separating_test:
         yield f"  next: {diagnosis.separating_test}"
     fit = diagnosis.fit

@@ -142,9 +142,10 @@ class Estimate:
         half = 1.96 * math.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0))
         return Parameter(value, value - half, value + half, unit)
 
-    def amplitude(self, sin: int, cos: int, unit: str = "arcmin") -> Parameter:
-        """Amplitude of a pair of sine and cosine coefficients."""
-        return self.derived(lambda v: math.hypot(v[sin], v[cos]), unit)
+    def amplitude(self, sin: int, cos: int, unit: str = "arcmin", scale: float = 1.0) -> Parameter:
+        """Amplitude of a pair of sine and cosine coefficients, times `scale`; its interval ends at zero."""
+        found = self.derived(lambda v: scale * math.hypot(v[sin], v[cos]), unit)
+        return replace(found, low=max(found.low, 0.0))
 
     def range_of(self, shapes: Array, unit: str) -> Parameter:
         """Largest less smallest value of the curve `shapes` (n, p) @ values."""
@@ -153,10 +154,11 @@ class Estimate:
         return self.derived(lambda v: float((high - low) @ v), unit)
 
     def phase_deg(self, sin: int, cos: int) -> Parameter:
-        """Phase phi of a sin(x + phi) from its sine and cosine coefficients, deg, in (-180, 180]."""
+        """Phase phi of a sin(x + phi) from its sine and cosine coefficients, deg, in (-180, 180]; at worst +-180."""
         value = math.degrees(math.atan2(self.values[cos], self.values[sin]))
         spread = self.derived(lambda v: (math.degrees(math.atan2(v[cos], v[sin])) - value + 180) % 360 - 180, "deg")
-        return Parameter(value, value + spread.low - spread.value, value + spread.high - spread.value, "deg")
+        half = min(spread.high - spread.value, 180.0)
+        return Parameter(value, value - half, value + half, "deg")
 
 
 def sine_columns(phase: Array, harmonics: Sequence[float]) -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hdopt.diagnosis.confounding import Confounding
-from hdopt.diagnosis.effect import Parameter
+from hdopt.diagnosis.effect import Estimate, Parameter
 from hdopt.report.sections.diagnosis import LISTED_WAVES, confounded_items, parameter_row, waves_figure, waves_of
 from hdopt.report.sections.diagnosis_residual import FEWEST, POINTS, continued, means_along
 
@@ -62,3 +62,14 @@ def test_many_waves_are_drawn_and_few_listed():
     few = {"amplitude_arcmin": size, "phase_deg": size, "amplitude_output_2_arcmin": size, "delay_s": size}
     assert len(waves_of(few)) <= LISTED_WAVES
     assert waves_of(few) == {}
+
+
+def test_intervals_end_where_amplitudes_and_phases_do():
+    known = Estimate(np.array([3.0, 4.0]), np.diag([0.01, 0.01]))
+    assert known.amplitude(0, 1, "um", scale=1e3).value == pytest.approx(5e3)
+    assert known.amplitude(0, 1).high - known.amplitude(0, 1).low == pytest.approx(2 * 1.96 * 0.1, rel=1e-3)
+    phase = known.phase_deg(0, 1)
+    assert phase.high - phase.value == pytest.approx(np.degrees(1.96 * 0.1 / 5), rel=1e-3)
+    open_ = Estimate(np.array([0.3, 0.4]), np.diag([100.0, 100.0]))
+    assert open_.amplitude(0, 1).low == 0.0
+    assert open_.phase_deg(0, 1).high - open_.phase_deg(0, 1).low == 360.0

@@ -235,7 +235,7 @@ class BearingPass:
         if "zones" in term.shape:
             found = {
                 "ball_to_pitch_ratio": estimate.parameter(term.width, "1"),
-                "unequal_um": estimate.derived(lambda v: 1e3 * float(np.hypot(v[0], v[1])), "um"),
+                "unequal_um": estimate.amplitude(0, 1, "um", scale=1e3),
             }
             size = np.hypot(estimate.values[0 : term.width : 2], estimate.values[1 : term.width : 2])
             if term.shape["balls"] and size[-1] > COUNTED * np.median(size[:-1]):

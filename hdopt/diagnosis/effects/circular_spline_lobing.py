@@ -7,8 +7,6 @@ lobes. Units: um of radius; prior 0 to 50 um, n 2 to 16.
 
 from __future__ import annotations
 
-import math
-
 from hdopt.diagnosis.effect import Parameter, Term, best_terms, terms_at
 from hdopt.diagnosis.effects._zone_harmonics import zone_harmonics
 
@@ -50,7 +48,7 @@ class CircularSplineLobing:
         n = term.shape["lobes"]
         return {
             "lobes": Parameter(n, n, n, "1"),
-            "arc_amplitude_um": estimate.derived(lambda v: 1e3 * math.hypot(v[0], v[1]), "um"),
+            "arc_amplitude_um": estimate.amplitude(0, 1, "um", scale=1e3),
             "phase_deg": estimate.phase_deg(0, 1),
         }
 

@@ -115,9 +115,7 @@ class CircularSplineToothHarmonics:
     def parameters(self, term, estimate):
         found = {}
         for i, h in enumerate(members_of(term.shape)):
-            found[f"amplitude_{h}_um"] = estimate.derived(
-                lambda v, i=i: 1e3 * float(np.hypot(v[2 * i], v[2 * i + 1])), "um"
-            )
+            found[f"amplitude_{h}_um"] = estimate.amplitude(2 * i, 2 * i + 1, "um", scale=1e3)
             found[f"phase_{h}_deg"] = estimate.phase_deg(2 * i, 2 * i + 1)
         return found
 

@@ -73,11 +73,9 @@ class ToothMesh:
         if "zones" in term.shape:
             second = term.width // 2
             return {
-                "zone_1_amplitude_um": estimate.derived(lambda v: 1e3 * float(np.hypot(v[0], v[1])), "um"),
+                "zone_1_amplitude_um": estimate.amplitude(0, 1, "um", scale=1e3),
                 "zone_1_phase_deg": estimate.phase_deg(0, 1),
-                "zone_2_amplitude_um": estimate.derived(
-                    lambda v: 1e3 * float(np.hypot(v[second], v[second + 1])), "um"
-                ),
+                "zone_2_amplitude_um": estimate.amplitude(second, second + 1, "um", scale=1e3),
                 "zone_2_phase_deg": estimate.phase_deg(second, second + 1),
             }
         return {"amplitude_arcmin": estimate.amplitude(0, 1), "phase_deg": estimate.phase_deg(0, 1)}

@@ -98,7 +98,10 @@ def waves_figure(effect: str, waves: Mapping[int, Parameter]) -> Figure:
         )
     )
     chart.update_yaxes(range=[0, 1.5 * max(p.value for p in sizes)])
-    note = "Bars end at the fitted value, lines at its 95 % interval. Phases are among the numbers of this report."
+    note = (
+        "Bars end at the fitted value, lines at its 95 % interval: where that reaches zero, this recording cannot tell "
+        "the wave from others. Phases are among the numbers of this report."
+    )
     return Figure(f"diagnosis-waves-{effect}", f"{label(effect)}: its waves", chart, note)
 
 
