@@ -66,11 +66,11 @@ LOBED = [np.array([1e-3, 5e-4]), np.array([1.0, 0.2])]
 def test_filter_is_that_of_the_signal_library():
     """On an even clock that needs no refining the swing is the plain digital filter of its equation."""
     rng = np.random.default_rng(0)
-    time = np.arange(2000) / 200
+    time = np.arange(2000) / 400
     samples = type("Rows", (), {"time": time, "piece": np.zeros(2000, int), "__len__": lambda self: 2000})()
     motions = rng.normal(size=(2000, 3))
     w = TURN * FREQUENCY
-    k = w / np.tan(w / 400)
+    k = w / np.tan(w / 800)
     poles = [k * k + 2 * DAMPING * w * k + w * w, 2 * w * w - 2 * k * k, k * k - 2 * DAMPING * w * k + w * w]
     zeros = [k * k + 0.6 * DAMPING * w * k, -2 * k * k, k * k - 0.6 * DAMPING * w * k]
     expected = -lfilter(zeros, poles, motions - motions[0], axis=0)
