@@ -148,7 +148,7 @@ def without_each(fit: Fit) -> list[Fit]:
     """`fit` without each of its terms in turn, the others refitted from where they stand."""
     fits = []
     for left_out in range(len(fit.terms)):
-        keep = [i for i in range(len(fit.terms)) if i != left_out]
+        keep = fit.all_but(left_out)
         terms, parts = [fit.terms[i] for i in keep], [fit.coefficients[i] for i in keep]
         fits.append(refine(evaluate(fit.problem, fit.errors, fit.offsets, terms, parts), iterations=10))
     return fits

@@ -100,6 +100,10 @@ class Fit:
         """The drive's motion before its spring, arcmin, (n,): what excites a resonance."""
         return motion_of(self.base_value, self.terms, self.coefficients)
 
+    def all_but(self, index: int) -> list[int]:
+        """The numbers of the terms without `index`: what to keep beside it."""
+        return [i for i in range(len(self.terms)) if i != index]
+
     def contribution(self, index: int) -> Array:
         """What term `index` adds to the prediction, arcmin: with its zones' driving switched as fitted."""
         return term_columns(self.terms[index], self.zone, self.problem.base) @ self.coefficients[index]

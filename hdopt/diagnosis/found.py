@@ -93,8 +93,7 @@ def describe(candidate: Candidate, evidence: Evidence, high: bool = False) -> li
 
 def share_of(fit: Fit, index: int) -> float:
     """Share of the power left by the base and the other effects that this effect takes."""
-    keep = [i for i in range(len(fit.terms)) if i != index]
-    probe = FitProbe(fit, keep=keep)
+    probe = FitProbe(fit, keep=fit.all_but(index))
     power = float(probe.white_residual @ probe.white_residual)
     return probe.gain(fit.terms[index]) * probe.noise.sigma**2 / max(power, 1e-300)
 

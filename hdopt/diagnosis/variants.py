@@ -51,8 +51,8 @@ def otherwise_credible(fit: Fit, skip: Sequence[str], order_range: tuple[float, 
     """The effects of `fit` in other variants of one of them, where these may be said and `fit` may not."""
     found = []
     for i, term in enumerate(fit.terms):
-        others = [t for j, t in enumerate(fit.terms) if j != i]
-        probe = FitProbe(fit, keep=[j for j in range(len(fit.terms)) if j != i], order_range=order_range)
+        others = [fit.terms[j] for j in fit.all_but(i)]
+        probe = FitProbe(fit, keep=fit.all_but(i), order_range=order_range)
         for variant in search_terms(probe, skip, only=[term.effect]):
             if variant.width != term.width or variant.shape.keys() != term.shape.keys():
                 found.append(joint_fit(fit, [*others, variant]))
@@ -71,8 +71,7 @@ def in_full(fit: Fit, base: Fit, inflation: float, order_range: tuple[float, flo
         return weigh(candidate, base, inflation).gain / inflation / 2 - 0.5 * freedom * math.log(rows) - trials
 
     for i, term in enumerate(fit.terms):
-        keep = [j for j in range(len(fit.terms)) if j != i]
-        probe = FitProbe(fit, keep=keep, order_range=order_range)
+        probe = FitProbe(fit, keep=fit.all_but(i), order_range=order_range)
         wider = [t for t in search_terms(probe, only=[term.effect]) if t.width > term.width]
         for other in wider:
             candidate = joint_fit(fit, [other if j == i else t for j, t in enumerate(fit.terms)])
@@ -89,8 +88,8 @@ def narrower(fit: Fit, skip: Sequence[str], order_range: tuple[float, float]) ->
     for i, term in enumerate(fit.terms):
         if term.width <= NARROW or kind_of(term) != "turning":
             continue
-        others = [t for j, t in enumerate(fit.terms) if j != i]
-        probe = FitProbe(fit, keep=[j for j in range(len(fit.terms)) if j != i], order_range=order_range)
+        others = [fit.terms[j] for j in fit.all_but(i)]
+        probe = FitProbe(fit, keep=fit.all_but(i), order_range=order_range)
         found = search_terms(probe, [*skip, *(t.effect for t in fit.terms)])
         plain = [t for t in found if t.width <= NARROW and kind_of(t) == "turning" and not t.doubtful]
         sets += [[*others, t] for t in sorted(plain, key=probe.gain, reverse=True)[:MOST_PLAIN]]

@@ -10,6 +10,7 @@ curve has shown nothing.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,12 +75,12 @@ def lost_in_wander(fit: Fit, index: int, price: float) -> bool:
     spread = np.average((over_turns - np.average(over_turns, weights=weight)) ** 2, weights=weight)
     if spread < SLOW * np.var(contribution):
         return False
-    columns = []
-    for i, term in enumerate(fit.terms):
-        if i != index:
-            columns += [fit.columns_of(term), shape_columns(fit, i)]
-    own = np.column_stack([fit.columns_of(fit.terms[index]), shape_columns(fit, index)])
-    beside = quarters.of(np.column_stack([fit.problem.nuisance, *columns]))
+
+    def columns(numbers: Sequence[int]) -> list[Array]:
+        return [block for i in numbers for block in (fit.columns_of(fit.terms[i]), shape_columns(fit, i))]
+
+    own = np.column_stack(columns([index]))
+    beside = quarters.of(np.column_stack([fit.problem.nuisance, *columns(fit.all_but(index))]))
     left = quarters.of(fit.residual)
     ar, start = _autoregression(left, quarters.record)
     target = _filtered(left + means, ar, start)
