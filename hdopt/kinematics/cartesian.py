@@ -1,9 +1,9 @@
 """The kinematic error of one drive in the form that a fit needs: Cartesian errors, driving zone and derivatives.
 
-The closed form (Jia 2021, Eqs. (16)-(32)) in one compiled pass. The twelve errors are lengths in mm, so that the model
-is smooth where an amplitude is zero: (e1 sin beta1, e1 cos beta1), the input axis's tilt as rim lift (b/2)(tan beta3,
-tan beta2), (e2 cos alpha1, e2 sin alpha1), the wave generator's tilt (b/2)(tan alpha2, tan alpha3), teeth (a cos phi,
-a sin phi) of CS and FS.
+The closed form (Jia 2021, Eqs. (16)-(32); `hdopt.kinematics.closed_form` inlined) in one compiled pass. The twelve
+errors are lengths in mm, so that the model is smooth where an amplitude is zero: (e1 sin beta1, e1 cos beta1), the
+input axis's tilt as rim lift (b/2)(tan beta3, tan beta2), (e2 cos alpha1, e2 sin alpha1), the wave generator's tilt
+(b/2)(tan alpha2, tan alpha3), teeth (a cos phi, a sin phi) of CS and FS.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from hdopt.deviations import DriveErrors
-from hdopt.drive import Drive
+from hdopt.drive.errors import DriveErrors
+from hdopt.drive.geometry import Drive
+from hdopt.errors import HdoptError
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
-from hdopt.kinematics.kernel import rigid_motion, rim_depth
+from hdopt.kinematics.kernel import motion_at, rigid_motion, rim_constants, rim_depth, tooth_deviation
 
 Array = NDArray[np.float64]
 
@@ -91,12 +92,14 @@ class CartesianModel:
 
     @classmethod
     def of(cls, drive: Drive) -> CartesianModel:
+        if drive.has_measured_teeth:
+            raise HdoptError("a diagnosis takes no measured teeth; leave [cs_teeth] and [fs_teeth] out of the study")
         geometry = drive.geometry
         return cls(
             tip_geometry(drive),
             math.tan(geometry.pressure_angle),
             float(geometry.arcmin_per_mm),
-            geometry.circular_spline_teeth / geometry.flexspline_teeth,
+            geometry.flexspline_advance,
         )
 
     @property
@@ -149,8 +152,8 @@ def _sine_cosine(x):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _evaluate(rotation, tip, tan_alpha, scale, p, extra):
-    half_width, tilt_gain = tip.half_width, (tip.semi_major + tip.tip_radius) / 2 / tip.half_width**2
-    per_flatness, bow = 1 / (tip.semi_major - tip.tip_radius), tip.semi_major / 2 / tip.half_width**2
+    half_width = tip.half_width
+    rim = rim_constants(tip)
     motion = rigid_motion(
         tip, p[0], p[1], p[2] / half_width, p[3] / half_width, p[4], p[5], p[6] / half_width, p[7] / half_width
     )
@@ -161,42 +164,39 @@ def _evaluate(rotation, tip, tan_alpha, scale, p, extra):
     has_extra = extra.shape[1] == n
     for i in range(n):
         c, s, cf, sf = rotation[i, 0], rotation[i, 1], rotation[i, 2], rotation[i, 3]
-        e_a = motion.ea_cos * c + motion.ea_sin * s + motion.ea_0
-        e_l = motion.el_cos * c + motion.el_sin * s + motion.el_0
-        t_a = motion.ta_cos * c + motion.ta_sin * s + motion.ta_0
-        t_l = motion.tl_cos * c + motion.tl_sin * s + motion.tl_0
+        e_a, e_l, t_a, t_l = motion_at(motion, c, s)
         best, z, k, o = -math.inf, 1.0, 1.0, 0.0
-        so = co = sof = cof = 0.0
+        sin_o = sin_of = 0.0
+        cos_o = cos_of = 1.0
         for z_now in (1.0, -1.0):
-            depth, o_now, of_now = rim_depth(tip, e_a, e_l, t_a, t_l, z_now, 1.0)
-            depth_low, o_low, of_low = rim_depth(tip, e_a, e_l, t_a, t_l, z_now, -1.0)
+            depth, o_now, of_now = rim_depth(rim, e_a, e_l, t_a, t_l, z_now, 1.0)
+            depth_low, o_low, of_low = rim_depth(rim, e_a, e_l, t_a, t_l, z_now, -1.0)
             k_now = 1.0
             if depth_low > depth:
                 depth, o_now, of_now, k_now = depth_low, o_low, of_low, -1.0
-            # Offsets o and o': forward in zone 1, backward in zone 2; a half turn away there, unscaled.
-            sin_x, cos_x = _sine_cosine(z_now * o_now)
-            sin_xf, cos_xf = _sine_cosine(z_now * of_now)
-            so_now, co_now = s * cos_x + c * sin_x, c * cos_x - s * sin_x
-            sof_now, cof_now = sf * cos_xf + cf * sin_xf, cf * cos_xf - sf * sin_xf
-            teeth = p[8] * so_now + p[9] * co_now + p[10] * sof_now + p[11] * cof_now
-            tau = depth * tan_alpha + z_now * teeth
+            sin_now, cos_now = _sine_cosine(o_now)
+            sin_f_now, cos_f_now = _sine_cosine(of_now)
+            tau = depth * tan_alpha + tooth_deviation(p[9], p[8], c, s, z_now, cos_now, sin_now)
+            tau += tooth_deviation(p[11], p[10], cf, sf, z_now, cos_f_now, sin_f_now)
             if has_extra:
                 tau += extra[0 if z_now > 0 else 1, i]
             if tau > best:
                 best, z, k, o = tau, z_now, k_now, o_now
-                so, co, sof, cof = so_now, co_now, sof_now, cof_now
+                sin_o, cos_o, sin_of, cos_of = sin_now, cos_now, sin_f_now, cos_f_now
         value[i] = scale * best
         zone[i] = 0 if z > 0 else 1
+        so, co = s * cos_o + z * c * sin_o, c * cos_o - z * s * sin_o
+        sof, cof = sf * cos_of + z * cf * sin_of, cf * cos_of - z * sf * sin_of
         # d tau = tan_alpha d depth + (d tau/d o) d o + (d tau/d o') d o', where o = q/flatness and o' = o - shift/L_W,
         # first by the motions e_a, e_l, t_a, t_l of the rim.
         slope_cs = p[8] * co - p[9] * so
         slope_fs = p[10] * cof - p[11] * sof
-        by_q = tan_alpha * o + (slope_cs + slope_fs) * per_flatness
+        by_q = tan_alpha * o + (slope_cs + slope_fs) * rim.per_flatness
         by_shift = by_q - slope_fs / tip.semi_major
         by_e_a = scale * tan_alpha * z * tip.passes_major
         by_e_l = scale * by_shift * tip.passes_minor
-        by_t_a = scale * (tan_alpha * (k - 2 * bow * t_a) - by_q * z * tilt_gain * t_l)
-        by_t_l = scale * (by_shift * z * k - by_q * z * tilt_gain * t_a)
+        by_t_a = scale * (tan_alpha * (k - 2 * rim.bow * t_a) - by_q * z * rim.tilt_gain * t_l)
+        by_t_l = scale * (by_shift * z * k - by_q * z * rim.tilt_gain * t_a)
         jacobian[i, 0] = by_e_a * s + by_e_l * c
         jacobian[i, 1] = by_e_a * c - by_e_l * s
         jacobian[i, 2] = by_t_a * s + by_t_l * c

@@ -1,9 +1,11 @@
 """The deepest points in closed form: the exact geometry expanded to second order in the errors.
 
-Re-derived from Jia 2021, Eqs. (16)-(23), for a profile whose tip has the radius of curvature rho0. The two formulas
-below are plain arithmetic: NumPy calls them on arrays, the compiled kernel on numbers. Against the exact geometry the
-depth is right to about 1e-4 arcmin (as kinematic error) for errors of the size of the shipped tolerances; the error
-grows with the third power of the errors (`tests/unit/test_closed_form.py` measures it).
+Re-derived from Jia 2021, Eqs. (16)-(23), for a profile whose tip has the radius of curvature rho0. `rigid_motion`,
+`motion_at`, `rim_depth` and `tooth_deviation` are the one place that writes the deviation of a meshing zone. They are
+plain arithmetic without number literals that would widen single precision: NumPy calls them on arrays, every compiled
+kernel inlines them. Against the exact geometry the depth is right to about 1e-4 arcmin (as kinematic error) for errors
+of the size of the shipped tolerances; the error grows with the third power of the errors
+(`tests/unit/test_kinematics.py` measures it).
 """
 
 from __future__ import annotations
@@ -11,12 +13,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from hdopt.deviations import DriveErrors
-from hdopt.drive import Drive
-from hdopt.kinematics.exact import DeepestPoints
-from hdopt.profiles import tip_radius_of_curvature
+from hdopt.drive.errors import DriveErrors, Values
+from hdopt.drive.geometry import Drive
+from hdopt.drive.profiles import tip_radius_of_curvature
+from hdopt.kinematics.branches import Branches, DeepestPoints, deepest
+
+Array = NDArray[np.float64]
 
 
 class TipGeometry(NamedTuple):
@@ -29,25 +33,43 @@ class TipGeometry(NamedTuple):
     passes_minor: float
 
 
+class RimConstants(NamedTuple):
+    """Constants of `rim_depth`, made from `TipGeometry`; G = L_W - rho0."""
+
+    tilt_gain: float
+    """(L_W + rho0)/2/(b/2)^2, 1/mm: how far tilt about both axes moves the tip sideways."""
+    bow: float
+    """L_W/2/(b/2)^2, 1/mm: how much tilt shortens the projected major axis."""
+    per_flatness: float
+    """1/G, 1/mm."""
+    half_per_flatness: float
+    """1/(2 G), 1/mm."""
+    per_major: float
+    """1/L_W, 1/mm."""
+
+
 class RigidMotion(NamedTuple):
     """Coefficients of the wave generator's offset and tilt over one turn, mm.
 
     E_a = a_cos cos + a_sin sin + a_0 along the major axis, E_l = l_cos cos + l_sin sin + l_0 along the minor one;
-    the same with t for the rim's lift by tilt, T_a and T_l.
+    the same with t for the rim's lift by tilt, T_a and T_l, and for the twist (rad) that two tilts make together.
     """
 
-    ea_cos: ArrayLike
-    ea_sin: ArrayLike
-    ea_0: ArrayLike
-    el_cos: ArrayLike
-    el_sin: ArrayLike
-    el_0: ArrayLike
-    ta_cos: ArrayLike
-    ta_sin: ArrayLike
-    ta_0: ArrayLike
-    tl_cos: ArrayLike
-    tl_sin: ArrayLike
-    tl_0: ArrayLike
+    ea_cos: Values
+    ea_sin: Values
+    ea_0: Values
+    el_cos: Values
+    el_sin: Values
+    el_0: Values
+    ta_cos: Values
+    ta_sin: Values
+    ta_0: Values
+    tl_cos: Values
+    tl_sin: Values
+    tl_0: Values
+    twist_cos: Values
+    twist_sin: Values
+    twist_0: Values
 
 
 def tip_geometry(drive: Drive) -> TipGeometry:
@@ -62,40 +84,105 @@ def tip_geometry(drive: Drive) -> TipGeometry:
     )
 
 
-def rigid_motion(tip, e1_x, e1_y, tan_tilt_x, tan_tilt_y, e2_major, e2_minor, tan_wg_major, tan_wg_minor):
-    """`RigidMotion` from error components: (e1 sin beta1, e1 cos beta1), (tan beta3, tan beta2),
-    (e2 cos alpha1, e2 sin alpha1), (tan alpha2, tan alpha3). Projections on u = (sin theta, cos theta) along the major
-    axis and v = (cos theta, -sin theta) along the minor one."""
-    lift_x, lift_y = tip.half_width * tan_tilt_x, tip.half_width * tan_tilt_y
-    return RigidMotion(
-        tip.passes_major * e1_y,
-        tip.passes_major * e1_x,
-        tip.passes_major * e2_major,
-        tip.passes_minor * e1_x,
-        -tip.passes_minor * e1_y,
-        tip.passes_minor * e2_minor,
-        lift_y,
-        lift_x,
-        tip.half_width * tan_wg_major,
-        lift_x,
-        -lift_y,
-        tip.half_width * tan_wg_minor,
+def rim_constants(tip: TipGeometry) -> RimConstants:
+    """The constants of `rim_depth` for a wave generator's tip."""
+    flatness, square = tip.semi_major - tip.tip_radius, tip.half_width * tip.half_width
+    return RimConstants(
+        (tip.semi_major + tip.tip_radius) / 2 / square,
+        tip.semi_major / 2 / square,
+        1 / flatness,
+        0.5 / flatness,
+        1 / tip.semi_major,
     )
 
 
-def rim_depth(tip, e_a, e_l, t_a, t_l, zone_sign, rim_sign):
-    """Depth delta (mm) and offsets o, o' (rad) of one rim's outermost point in one zone (signs +1 or -1)."""
-    flatness = tip.semi_major - tip.tip_radius
+def rigid_motion(
+    tip: TipGeometry,
+    e1_x: Values,
+    e1_y: Values,
+    tan_tilt_x: Values,
+    tan_tilt_y: Values,
+    e2_major: Values,
+    e2_minor: Values,
+    tan_wg_major: Values,
+    tan_wg_minor: Values,
+) -> RigidMotion:
+    """`RigidMotion` from error components: (e1 sin beta1, e1 cos beta1), (tan beta3, tan beta2),
+    (e2 cos alpha1, e2 sin alpha1), (tan alpha2, tan alpha3). Projections on u = (sin theta, cos theta) along the major
+    axis and v = (cos theta, -sin theta) along the minor one. Eccentricities in mm."""
+    lift_x, lift_y = tip.half_width * tan_tilt_x, tip.half_width * tan_tilt_y
+    return RigidMotion(
+        ea_cos=tip.passes_major * e1_y,
+        ea_sin=tip.passes_major * e1_x,
+        ea_0=tip.passes_major * e2_major,
+        el_cos=tip.passes_minor * e1_x,
+        el_sin=-tip.passes_minor * e1_y,
+        el_0=tip.passes_minor * e2_minor,
+        ta_cos=lift_y,
+        ta_sin=lift_x,
+        ta_0=tip.half_width * tan_wg_major,
+        tl_cos=lift_x,
+        tl_sin=-lift_y,
+        tl_0=tip.half_width * tan_wg_minor,
+        twist_cos=(tan_tilt_y * tan_wg_minor - tan_tilt_x * tan_wg_major) * 0.5,
+        twist_sin=(tan_tilt_x * tan_wg_minor + tan_tilt_y * tan_wg_major) * 0.5,
+        twist_0=(tan_tilt_x * tan_tilt_y + tan_wg_major * tan_wg_minor) * 0.5,
+    )
+
+
+def motion_at(motion: RigidMotion, cos: Array, sin: Array) -> tuple[Array, Array, Array, Array]:
+    """E_a, E_l, T_a and T_l, mm, at the input angle with cosine `cos` and sine `sin`; `motion` as in `rigid_motion`.
+
+    Two tilts after each other turn the wave generator a little about its axis, by half the area that they span. An
+    eccentricity along the ground's major axis then has a part across the turned one. It is of third order, but where
+    the structure removes E_l it is all that tells at which angle each zone's deepest rim changes.
+    """
+    e_a = motion.ea_cos * cos + motion.ea_sin * sin + motion.ea_0
+    twist = motion.twist_cos * cos + motion.twist_sin * sin + motion.twist_0
+    return (
+        e_a,
+        motion.el_cos * cos + motion.el_sin * sin + motion.el_0 - e_a * twist,
+        motion.ta_cos * cos + motion.ta_sin * sin + motion.ta_0,
+        motion.tl_cos * cos + motion.tl_sin * sin + motion.tl_0,
+    )
+
+
+def rim_depth(
+    rim: RimConstants, e_a: Array, e_l: Array, t_a: Array, t_l: Array, zone_sign: float, rim_sign: float
+) -> tuple[Array, Array, Array]:
+    """Depth delta (mm) and offsets o, o' (rad) of one rim's outermost point in one zone.
+
+    Jia 2021, Eqs. (16)-(23), to second order in the errors. `e_a`, `e_l`, `t_a`, `t_l` as `motion_at` gives them, mm;
+    `zone_sign` +1 near the + major end, -1 near the opposite one; `rim_sign` +1 or -1, counted along the zone's own
+    direction. o is seen from the CS centre, o' from the wave generator's, both positive toward +v.
+    """
     shift = e_l + zone_sign * rim_sign * t_l
-    q = shift - zone_sign * (tip.semi_major + tip.tip_radius) / 2 * t_a * t_l / tip.half_width**2
-    depth = zone_sign * e_a + rim_sign * t_a - tip.semi_major / 2 * (t_a / tip.half_width) ** 2 + q * q / (2 * flatness)
-    return depth, q / flatness, q / flatness - shift / tip.semi_major
+    q = shift - zone_sign * rim.tilt_gain * t_a * t_l
+    offset = q * rim.per_flatness
+    depth = zone_sign * e_a + rim_sign * t_a - rim.bow * t_a * t_a + q * q * rim.half_per_flatness
+    return depth, offset, offset - shift * rim.per_major
 
 
-def deepest_points(drive: Drive, errors: DriveErrors, theta: ArrayLike) -> DeepestPoints:
-    """Deepest points at input angles `theta`, rad; `errors` and `theta` broadcast, results have shape (2, ...).
+def tooth_deviation(
+    cos_part: Values, sin_part: Values, cos: Array, sin: Array, zone_sign: float, offset_cos: Array, offset_sin: Array
+) -> Array:
+    """Deviation of a spline's teeth met in one zone, mm of arc (Jia 2021, Eqs. (31a), (31b)).
 
-    Valid for profiles with a smooth tip (`tip_is_smooth`) and errors up to about three times the shipped tolerances.
+    s a sin(x + phi + s o): `cos_part` = a sin(phi), `sin_part` = a cos(phi), mm; `cos`, `sin` of the tooth angle x,
+    theta for the CS and Z_CS/Z_FS theta for the FS; `offset_cos`, `offset_sin` of the offset, o (CS) or o' (FS).
+    The half turn to zone 2 is not scaled, so that it is the sign alone.
+    """
+    here = cos_part * cos + sin_part * sin
+    ahead = sin_part * cos - cos_part * sin
+    return zone_sign * here * offset_cos + ahead * offset_sin
+
+
+def branches(drive: Drive, errors: DriveErrors, theta: ArrayLike) -> Branches:
+    """Every rim's outermost point in both zones at input angles `theta`, rad; `errors` and `theta` broadcast, results
+    have shape (2, 2, ...).
+
+    Valid for drives whose profile has a smooth tip (`tip_is_smooth`) and errors up to about three times the shipped
+    tolerances.
     """
     tip, e = tip_geometry(drive), errors
     motion = rigid_motion(
@@ -109,16 +196,14 @@ def deepest_points(drive: Drive, errors: DriveErrors, theta: ArrayLike) -> Deepe
         np.tan(e.wg_tilt_major),
         np.tan(e.wg_tilt_minor),
     )
-    cos, sin = np.cos(theta), np.sin(theta)
-    e_a = motion.ea_cos * cos + motion.ea_sin * sin + motion.ea_0
-    e_l = motion.el_cos * cos + motion.el_sin * sin + motion.el_0
-    t_a = motion.ta_cos * cos + motion.ta_sin * sin + motion.ta_0
-    t_l = motion.tl_cos * cos + motion.tl_sin * sin + motion.tl_0
-    zones = []
-    for zone_sign in (1.0, -1.0):
-        upper = rim_depth(tip, e_a, e_l, t_a, t_l, zone_sign, 1.0)
-        lower = rim_depth(tip, e_a, e_l, t_a, t_l, zone_sign, -1.0)
-        deeper = upper[0] >= lower[0]
-        chosen = [np.where(deeper, a, b) for a, b in zip(upper, lower, strict=True)]
-        zones.append([*chosen, np.where(deeper, 1.0, -1.0)])
-    return DeepestPoints(*(np.stack(pair) for pair in zip(*zones, strict=True)))
+    where = motion_at(motion, np.cos(theta), np.sin(theta))
+    rim = rim_constants(tip)
+    signs = (1.0, -1.0)
+    found = [[np.broadcast_arrays(*rim_depth(rim, *where, zone, k)) for k in signs] for zone in signs]
+    return Branches(*(np.array([[of_rim[i] for of_rim in zone] for zone in found]) for i in range(3)))
+
+
+def deepest_points(drive: Drive, errors: DriveErrors, theta: ArrayLike) -> DeepestPoints:
+    """Deepest points of a `drive` with `errors` at input angles `theta`, rad: the deeper rims of `branches`; the two
+    broadcast, results have shape (2, ...)."""
+    return deepest(branches(drive, errors, theta))

@@ -1,78 +1,174 @@
-"""The converged peak-to-peak by search: slow, sure, and valid for every geometry. The compiled kernel is held to it.
+"""What is said of one drive: converged extremes, the peak-to-peak that a recording can show, and that of a coarse grid.
 
 Over one full relative turn of FS and CS every input angle meets the FS teeth in Z_FS/gcd(Z_FS, Z_CS) phases, while
-everything else repeats each input turn. So one input turn is scanned, with all phases at each angle, not N turns.
-Where the deepest rim switches, tau steps; the extremes are one-sided limits there, which a repeated zoom approaches.
+everything else repeats each input turn. So one input turn of the chosen geometry is sampled, and its essential extremes
+over all phases follow (`hdopt.kinematics.essential`). The compiled kernel for many drives is held to these values.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from hdopt.deviations import DriveErrors
-from hdopt.drive import Drive
-from hdopt.kinematics.waveform import circular_spline_term, geometry_for, kinematic_error_arcmin
+from hdopt.drive.errors import DriveErrors
+from hdopt.drive.geometry import Drive
+from hdopt.kinematics.branches import Branches, deepest
+from hdopt.kinematics.load_sharing import mesh_tables
+from hdopt.kinematics.waveform import (
+    BRANCHES,
+    DEFAULT_METHOD,
+    deviation_at,
+    full_turn,
+    geometry_for,
+    kinematic_error_arcmin,
+)
 
 Array = NDArray[np.float64]
 
-GRID_DEG = 0.25
+PLACES = 360
+"""Places of an input turn where the branches are sampled: 720 change the base case by 1e-9 arcmin."""
+PLACES_MEASURED = 720
+"""The same for profiles whose contour is not smooth."""
+PLACES_A_MEASURED_TOOTH = 4
+"""The same for one tooth of splines whose teeth are known one by one: their mean in mesh varies within one."""
+PLACES_PER_TOOTH = 8
+"""Of the waveform in which windows of a tooth's width are first laid."""
+FINE_PLACES = 256
+"""The same for the best windows."""
+WINDOWS = 24
+"""How many are laid anew."""
 ZOOMS = 5
 ZOOM_POINTS = 33
 CANDIDATES = 24
-BISECTIONS = 36
-CLUSTER = np.geomspace(1e-6, np.radians(GRID_DEG), 12)
 
 
-def extremes_arcmin(drive: Drive, errors: DriveErrors, geometry: str | None = None) -> tuple[float, float]:
-    """Infimum and supremum of the kinematic error of one drive over a full relative turn, arcmin (k_e = 1).
+def sampled_branches(drive: Drive, errors: DriveErrors, geometry: str = DEFAULT_METHOD) -> tuple[Array, Branches]:
+    """Input angles (rad, (n,)) of an even grid of one turn, and the branches of `drive` with scalar `errors` there by
+    the `geometry` named, (2, 2, n)."""
+    geometry_for(drive, geometry)
+    places = PLACES if drive.wave_generator.profile.tip_is_smooth else PLACES_MEASURED
+    if drive.has_measured_teeth:
+        places = max(places, PLACES_A_MEASURED_TOOTH * drive.geometry.circular_spline_teeth)
+    theta = np.arange(places, dtype=np.float64) * (2 * np.pi / places)
+    found = BRANCHES[geometry](drive, errors, theta)
+    return theta, Branches(*(np.ascontiguousarray(values.reshape(2, 2, places)) for values in vars(found).values()))
 
-    `errors` must be scalars. One input turn is scanned every 0.25 deg, and closely around every change of the deepest
-    rim, with every FS phase; the best local extremes are zoomed into until their cells are below 1e-6 deg.
+
+def extremes_arcmin(
+    drive: Drive,
+    errors: DriveErrors,
+    geometry: str = DEFAULT_METHOD,
+    misalignment: float = 1.0,
+    tables: tuple[Array, Array] | None = None,
+) -> tuple[float, float]:
+    """Essential infimum and supremum of the kinematic error of `drive` with scalar `errors`, arcmin, k_e = 1, over one
+    full relative turn.
+
+    Jia 2021, Eqs. (16)-(32); `geometry` is "exact" or "closed form"; `misalignment` multiplies the arc that it makes,
+    where the teeth in contact share it; `tables` are `mesh_tables` of the drive where they are known already. Angles
+    where rims only tie never count, real slivers between two changes of the deepest rim do. Right to 1e-6 arcmin for
+    smooth profiles. Errors must keep the deepest points within 60 deg of the major axis.
     """
-    theta = _scan(drive, errors, geometry)
-    low, high = _over_phases(drive, errors, theta, geometry)
-    lowest = zoom_lowest(lambda angles: _over_phases(drive, errors, angles, geometry)[0], theta, low)
-    highest = -zoom_lowest(lambda angles: -_over_phases(drive, errors, angles, geometry)[1], theta, -high)
-    scale = drive.geometry.arcmin_per_mm
-    return lowest * scale, highest * scale
+    from hdopt.kinematics.essential import Sampled, Teeth, essential_extremes
+
+    gear, e = drive.geometry, errors
+    _, found = sampled_branches(drive, errors, geometry)
+    teeth = Teeth(
+        float(e.cs_tooth_amplitude * np.sin(e.cs_tooth_phase)),
+        float(e.cs_tooth_amplitude * np.cos(e.cs_tooth_phase)),
+        float(e.fs_tooth_amplitude * np.sin(e.fs_tooth_phase)),
+        float(e.fs_tooth_amplitude * np.cos(e.fs_tooth_phase)),
+        *(mesh_tables(drive) if tables is None else tables),
+    )
+    tan_alpha = misalignment * float(np.tan(gear.pressure_angle))
+    low, high = essential_extremes(
+        Sampled(
+            found.depth, found.offset_cs, found.offset_fs, tan_alpha, gear.flexspline_advance, gear.beat_phases, teeth
+        )
+    )
+    return low * gear.arcmin_per_mm, high * gear.arcmin_per_mm
 
 
-def _scan(drive: Drive, errors: DriveErrors, geometry: str | None) -> Array:
-    """Angles of one input turn to look at first: a regular grid, and clusters on both sides of every rim change."""
-    deepest_points = geometry_for(drive, geometry)
-    grid = np.arange(0, 2 * np.pi, np.radians(GRID_DEG))
-    rim = deepest_points(drive, errors, grid).rim
-    changes = []
-    for zone in (0, 1):
-        before = np.flatnonzero(rim[zone] != np.roll(rim[zone], -1))
-        if len(before) == 0:
-            continue
-        low, high, start = grid[before], grid[before] + np.radians(GRID_DEG), rim[zone][before]
-        for _ in range(BISECTIONS):
-            middle = (low + high) / 2
-            same = deepest_points(drive, errors, middle).rim[zone] == start
-            low, high = np.where(same, middle, low), np.where(same, high, middle)
-        changes += [*low, *high]
-    clusters = np.add.outer(changes, np.concatenate([-CLUSTER[::-1], [0.0], CLUSTER])).ravel()
-    return np.unique(np.concatenate([grid, np.mod(clusters, 2 * np.pi)]))
+def converged_peak_to_peak_arcmin(drive: Drive, errors: DriveErrors, geometry: str = DEFAULT_METHOD) -> float:
+    """Essential supremum less essential infimum of `drive` with scalar `errors`, arcmin, k_e = 1; `geometry` is "exact"
+    or "closed form"."""
+    low, high = extremes_arcmin(drive, errors, geometry)
+    return high - low
 
 
-def _over_phases(drive: Drive, errors: DriveErrors, theta: Array, geometry: str | None) -> tuple[Array, Array]:
-    """Least and greatest max(tau_1, tau_2) over all FS phases at each angle, mm of arc; shape of `theta` (n,)."""
-    points = geometry_for(drive, geometry)(drive, errors, theta)
-    without_fs = points.depth * np.tan(drive.geometry.pressure_angle) + circular_spline_term(errors, points, theta)
-    gear = drive.geometry
-    phases = np.arange(gear.beat_phases) * (2 * np.pi / gear.beat_phases)
-    x = (gear.circular_spline_teeth / gear.flexspline_teeth) * theta + errors.fs_tooth_phase + phases[:, None]
-    zone_1 = without_fs[0] + errors.fs_tooth_amplitude * np.sin(x + points.offset_fs[0])
-    zone_2 = without_fs[1] - errors.fs_tooth_amplitude * np.sin(x - points.offset_fs[1])
-    driving = np.maximum(zone_1, zone_2)
-    return driving.min(axis=0), driving.max(axis=0)
+def peak_to_peak_by_search_arcmin(drive: Drive, errors: DriveErrors, geometry: str = DEFAULT_METHOD) -> Array:
+    """`converged_peak_to_peak_arcmin` of `drive` for arrays of `errors` by the `geometry` named, drive by drive; the
+    result has the errors' shape."""
+    rows = (DriveErrors.from_matrix(row) for row in errors.to_matrix())
+    tables = mesh_tables(drive)
+    spans = [np.ptp(extremes_arcmin(drive, row, geometry, tables=tables)) for row in rows]
+    return np.reshape(spans, errors.shape)
 
 
-def zoom_lowest(function, theta: Array, values: Array, period: float = 2 * np.pi) -> float:
-    """Least value of `function` near the lowest local minima of its `values` at the angles `theta` of one period."""
+def tooth_width_peak_to_peak_arcmin(drive: Drive, errors: DriveErrors, geometry: str = DEFAULT_METHOD) -> float:
+    """The peak-to-peak that holds over the width of one FS tooth (2 pi/Z_FS of input angle), arcmin, k_e = 1.
+
+    That is what a recording can show: the largest level that `drive` with scalar `errors` stays above over a window of
+    that width, less the smallest that it stays below. `geometry` is "exact" or "closed form". Right to 1e-4 arcmin.
+    """
+    teeth = drive.geometry.flexspline_teeth
+    waveform = interpolated_waveform(drive, errors, geometry)
+    theta = full_turn(drive, teeth * PLACES_PER_TOOTH)
+    return held_peak_to_peak(waveform, theta, waveform(theta), 2 * np.pi / teeth)
+
+
+def interpolated_waveform(
+    drive: Drive, errors: DriveErrors, geometry: str = DEFAULT_METHOD
+) -> Callable[[Array], Array]:
+    """The kinematic error (arcmin, k_e = 1) of `drive` with scalar `errors` as a function of input angles (rad, (n,)).
+
+    The branches of the `geometry` named are sampled once and joined by cubic splines, right to 1e-7 arcmin.
+    """
+    from scipy.interpolate import CubicSpline
+
+    places, found = sampled_branches(drive, errors, geometry)
+    values = np.stack(list(vars(found).values()))
+    splines = CubicSpline(np.append(places, 2 * np.pi), np.append(values, values[..., :1], -1), -1, "periodic")
+
+    def waveform(theta: Array) -> Array:
+        points = deepest(Branches(*splines(np.mod(theta, 2 * np.pi))))
+        error: Array = drive.geometry.arcmin_per_mm * np.max(deviation_at(drive, errors, theta, points), axis=0)
+        return error
+
+    return waveform
+
+
+def held_peak_to_peak(waveform: Callable[[Array], Array], theta: Array, values: Array, width: float) -> float:
+    """Range that the periodic `waveform` over angles (rad) holds over windows of `width` (rad); its unit.
+
+    `values` are those at `theta`, an even grid (n,) of its period. The best windows of the grid are laid anew on a
+    finer one.
+    """
+    return _held_high(waveform, theta, values, width) + _held_high(lambda x: -waveform(x), theta, -values, width)
+
+
+def _held_high(waveform: Callable[[Array], Array], theta: Array, values: Array, width: float) -> float:
+    """The largest level that `waveform` stays above over a window."""
+    from numpy.lib.stride_tricks import sliding_window_view
+    from scipy.ndimage import minimum_filter1d
+
+    step = theta[1] - theta[0]
+    cells = max(int(width / step), 1)
+    levels = np.roll(minimum_filter1d(values, cells + 1, mode="wrap"), -(cells + 1) // 2)
+    fine = width / FINE_PLACES
+    best = float(levels.max())
+    reach = int(np.ceil(2 * step / fine))
+    for start in theta[np.argsort(levels)[-WINDOWS:]]:
+        path = waveform(start + fine * np.arange(-reach, FINE_PLACES + reach + 1))
+        best = max(best, float(sliding_window_view(path, FINE_PLACES + 1).min(axis=1).max()))
+    return best
+
+
+def zoom_lowest(function: Callable[[Array], Array], theta: Array, values: Array, period: float = 2 * np.pi) -> float:
+    """Least value of `function` near the lowest local minima of its `values` at the angles `theta` (rad, (n,)) of one
+    `period`."""
     local = np.flatnonzero((values <= np.roll(values, 1)) & (values <= np.roll(values, -1)))
     local = local[np.argsort(values[local])[:CANDIDATES]]
     gaps = np.diff(np.append(theta, theta[0] + period))
@@ -87,17 +183,11 @@ def zoom_lowest(function, theta: Array, values: Array, period: float = 2 * np.pi
     return best
 
 
-def peak_to_peak_by_search_arcmin(drive: Drive, errors: DriveErrors, geometry: str | None = None) -> Array:
-    """Converged peak-to-peak, arcmin, for arrays of `errors`: supremum less infimum, drive by drive."""
-    matrix = errors.to_matrix()
-    spans = [np.ptp(extremes_arcmin(drive, DriveErrors.from_matrix(row), geometry)) for row in matrix]
-    return np.reshape(spans, errors.shape)
-
-
 def walked_peak_to_peak_arcmin(
-    drive: Drive, errors: DriveErrors, sampling: float, turns: int, geometry: str | None = None
+    drive: Drive, errors: DriveErrors, sampling: float, turns: float, geometry: str = DEFAULT_METHOD
 ) -> float:
-    """Peak-to-peak only on a grid: every `sampling` rad over `turns` input turns from 0, the end included, arcmin.
+    """Peak-to-peak of `drive` with scalar `errors` only on a grid: every `sampling` rad over `turns` input turns from
+    0, the end included, arcmin; `geometry` is "exact" or "closed form".
 
     This is what Jia 2021 publishes (10 deg, 80 turns); it lies below the converged value.
     """

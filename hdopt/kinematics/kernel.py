@@ -29,10 +29,20 @@ inlined = njit(inline="always", **OPTIONS)
 compiled = njit(**OPTIONS)
 
 rigid_motion = inlined(closed_form.rigid_motion)
+rim_constants = inlined(closed_form.rim_constants)
+motion_at = inlined(closed_form.motion_at)
 rim_depth = inlined(closed_form.rim_depth)
+tooth_deviation = inlined(closed_form.tooth_deviation)
 
 REACH = 0.12
 """How far, in rad, an extreme may lie from its first-order place."""
+NEAR = 0.03
+"""How far, in rad, the parabolas of a polishing step reach."""
+POLISHES = 1
+PARABOLA_SHARE = 0.1
+"""Share of the second-order terms by which a parabola over `REACH` may be wrong: what lies within it is polished."""
+TIE = 1e-10
+"""Stretches shorter than this, rad, are ties of rounding: rims that meet in no real angle."""
 SCRATCH = (16, 3)
 """Work space for the first-order minima: bound, cos, sin."""
 
@@ -82,25 +92,20 @@ def _sinusoid_derivative(cos_part, sin_part, cos, sin):
 
 
 @inlined
-def _rim(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin, s, k):
+def _rim(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, s, k):
     """tau without its FS term, its slope and curvature over theta, the FS offset o' and the depth, of zone s, rim k."""
-    e_a = motion.ea_cos * cos + motion.ea_sin * sin + motion.ea_0
-    e_l = motion.el_cos * cos + motion.el_sin * sin + motion.el_0
-    t_a = motion.ta_cos * cos + motion.ta_sin * sin + motion.ta_0
-    t_l = motion.tl_cos * cos + motion.tl_sin * sin + motion.tl_0
+    e_a, e_l, t_a, t_l = motion_at(motion, cos, sin)
     e_a1 = _sinusoid_derivative(motion.ea_cos, motion.ea_sin, cos, sin)
     e_l1 = _sinusoid_derivative(motion.el_cos, motion.el_sin, cos, sin)
     t_a1 = _sinusoid_derivative(motion.ta_cos, motion.ta_sin, cos, sin)
     t_l1 = _sinusoid_derivative(motion.tl_cos, motion.tl_sin, cos, sin)
-    depth, o, o_fs = rim_depth(tip, e_a, e_l, t_a, t_l, s, k)
-    w2 = tip.half_width * tip.half_width
-    flatness = tip.semi_major - tip.tip_radius
-    q1 = e_l1 + s * k * t_l1 - s * (tip.semi_major + tip.tip_radius) / 2 / w2 * (t_a1 * t_l + t_a * t_l1)
-    depth1 = s * e_a1 + k * t_a1 - tip.semi_major / w2 * t_a * t_a1 + o * q1
+    depth, o, o_fs = rim_depth(rim, e_a, e_l, t_a, t_l, s, k)
+    q1 = e_l1 + s * k * t_l1 - s * rim.tilt_gain * (t_a1 * t_l + t_a * t_l1)
+    depth1 = s * e_a1 + k * t_a1 - 2 * rim.bow * t_a * t_a1 + o * q1
     cs = cs_cos * cos + cs_sin * sin
     cs1 = cs_sin * cos - cs_cos * sin
-    value = tan_alpha * depth + s * (cs * (1 - 0.5 * o * o) + s * o * cs1)
-    slope = tan_alpha * depth1 + s * (cs1 - s * o * cs) * (1 + s * q1 / flatness)
+    value = tan_alpha * depth + tooth_deviation(cs_cos, cs_sin, cos, sin, s, 1 - 0.5 * o * o, o)
+    slope = tan_alpha * depth1 + s * (cs1 - s * o * cs) * (1 + s * q1 * rim.per_flatness)
     bend = -tan_alpha * (s * (e_a - motion.ea_0) + k * (t_a - motion.ta_0)) - s * cs
     return Rim(value, slope, bend, o_fs, depth, depth1)
 
@@ -128,12 +133,12 @@ def _deeper(upper, lower, x):
 
 
 @inlined
-def _four_rims(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin):
+def _four_rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin):
     """Both rims of zone 1, then of zone 2, and the two distances from here, sorted, at which a deepest rim changes."""
-    a = _rim(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin, 1.0, 1.0)
-    b = _rim(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin, 1.0, -1.0)
-    c = _rim(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin, -1.0, 1.0)
-    d = _rim(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin, -1.0, -1.0)
+    a = _rim(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, 1.0, 1.0)
+    b = _rim(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, 1.0, -1.0)
+    c = _rim(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, -1.0, 1.0)
+    d = _rim(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, -1.0, -1.0)
     first, second = _switch(a, b), _switch(c, d)
     return (a, b, c, d), min(first, second), max(first, second)
 
@@ -178,7 +183,7 @@ def _piece(rims, low, high):
 
 @inlined
 def _lowest_of_piece(piece, a_fs, advance, cos, sin):
-    """The lowest driving deviation on one piece, where (cos, sin) is the FS phase at x = 0. Free of branches."""
+    """The lowest driving deviation on one piece and where it lies, with the FS phase (cos, sin) at x = 0."""
     mean = piece.mean + a_fs * cos * piece.h
     gap = piece.gap + a_fs * (sin + cos * piece.d)
     slope = piece.gap_slope + a_fs * advance * cos
@@ -194,7 +199,9 @@ def _lowest_of_piece(piece, a_fs, advance, cos, sin):
     y = -(piece.mean_slope + side * slope) / one_bend if one_bend > 0.0 else 0.0
     y = min(piece.high, max(piece.low, y))
     alone = mean + y * (piece.mean_slope + y * piece.mean_bend / 2) + abs(gap + y * (slope + y * bend / 2))
-    return min(value, alone) if piece.high >= piece.low else math.inf
+    if alone < value:
+        value, x = alone, y
+    return (value, x) if piece.high - piece.low > TIE else (math.inf, 0.0)
 
 
 @inlined
@@ -206,22 +213,37 @@ def _pieces(rims, first, second, reach):
 
 @inlined
 def _lowest(pieces, a_fs, advance, cos, sin):
-    """The lowest driving deviation on all three pieces, where (cos, sin) is the FS phase at x = 0."""
-    return min(
-        _lowest_of_piece(pieces[0], a_fs, advance, cos, sin),
-        _lowest_of_piece(pieces[1], a_fs, advance, cos, sin),
-        _lowest_of_piece(pieces[2], a_fs, advance, cos, sin),
-    )
+    """The lowest driving deviation on all three pieces and where, with the FS phase (cos, sin) at x = 0."""
+    best, place = _lowest_of_piece(pieces[0], a_fs, advance, cos, sin)
+    value, x = _lowest_of_piece(pieces[1], a_fs, advance, cos, sin)
+    if value < best:
+        best, place = value, x
+    value, x = _lowest_of_piece(pieces[2], a_fs, advance, cos, sin)
+    if value < best:
+        best, place = value, x
+    return best, place
 
 
 @compiled
-def _least(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phases, t, d, second_order, scratch):
-    """Infimum over one full relative turn, mm of arc. `t`, `d`: (cos, sin, constant) of the first-order parts."""
+def _polished(rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, advance, cos, sin, fs_cos, fs_sin, x):
+    """The lowest driving deviation near a distance x from (cos, sin), found anew from there, twice."""
+    value = math.inf
+    for step in range(POLISHES):
+        cos, sin = _rotate(cos, sin, x)
+        fs_cos, fs_sin = _rotate(fs_cos, fs_sin, advance * x)
+        rims, first, second = _four_rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin)
+        pieces = _pieces(rims, first, second, NEAR if step == 0 else NEAR / 8)
+        value, x = _lowest(pieces, a_fs, advance, fs_cos, fs_sin)
+    return value
+
+
+@inlined
+def _first_order_minima(t, d, a_fs, scratch):
+    """Fill `scratch` with the angles where the first-order minimum can lie; their number, and the most promising."""
     t_cos, t_sin, t_0 = t
     d_cos, d_sin, d_0 = d
     count, first_place = 0, 0
     best = math.inf
-
     t_size = math.sqrt(t_cos * t_cos + t_sin * t_sin)
     d_size = math.sqrt(d_cos * d_cos + d_sin * d_sin)
     for case in range(7):
@@ -256,16 +278,23 @@ def _least(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phas
                 best, first_place = bound, count
             scratch[count, 0], scratch[count, 1], scratch[count, 2] = bound, cos, sin
             count += 1
+    return count, first_place
 
+
+@compiled
+def _least(rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phases, t, d, second_order, scratch):
+    """Infimum over one full relative turn, mm of arc. `t`, `d`: (cos, sin, constant) of the first-order parts."""
+    d_cos, d_sin, d_0 = d
+    count, first_place = _first_order_minima(t, d, a_fs, scratch)
     spacing = 2 * math.pi / phases
-    least = math.inf
+    least, margin = math.inf, PARABOLA_SHARE * second_order
     for i in range(-1, count):
         # The most promising first: then most of the others cannot sink below what is found already.
         at = first_place if i < 0 else i
         if i == first_place or scratch[at, 0] - second_order > least:
             continue
         cos, sin = scratch[at, 1], scratch[at, 2]
-        rims, first, second = _four_rims(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin)
+        rims, first, second = _four_rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin)
         pieces = _pieces(rims, first, second, REACH)
         phase = advance * _angle(sin, cos) + fs_phase
         # FS phase at which both zones drive equally, or the trough of the zone that drives alone.
@@ -280,12 +309,26 @@ def _least(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phas
             off = (off - math.floor(off)) * spacing
             for neighbour in range(2):
                 fs_cos, fs_sin = _rotate(other, wanted, off - neighbour * spacing)
-                least = min(least, _lowest(pieces, a_fs, advance, fs_cos, fs_sin))
+                value, x = _lowest(pieces, a_fs, advance, fs_cos, fs_sin)
+                if value - margin < least:
+                    found = _polished(
+                        rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, advance, cos, sin, fs_cos, fs_sin, x
+                    )
+                    least = min(least, found)
     return least
 
 
+@inlined
+def _uphill(at, a_fs, advance, x):
+    """The Newton step to the peak of a branch whose FS phase is `x` beyond its own peak, and what it gains."""
+    pull = at.slope - a_fs * advance * math.sin(x)
+    stiffness = a_fs * advance * advance * math.cos(x) - at.bend
+    step = min(REACH, max(-REACH, pull / stiffness)) if stiffness > 0.0 else 0.0
+    return step, step * (pull - step * stiffness / 2)
+
+
 @compiled
-def _greatest(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phases, t, d, second_order):
+def _greatest(rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phases, t, d, second_order):
     """Supremum over one full relative turn, mm of arc."""
     t_cos, t_sin, t_0 = t
     d_cos, d_sin, d_0 = d
@@ -303,16 +346,20 @@ def _greatest(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, p
         if s * d_0 + k * t_0 + size < best - 2 * second_order:
             continue
         cos, sin = (c / size, n / size) if size > 0.0 else (1.0, 0.0)
-        rim = _rim(tip, motion, cs_cos, cs_sin, tan_alpha, cos, sin, s, k)
+        at = _rim(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, s, k)
         # The phase's distance x from the peak of s sin(X + s o') is within half a spacing: take the nearer two.
-        off = (advance * _angle(sin, cos) + fs_phase + s * rim.offset_fs - s * math.pi / 2) / spacing
+        off = (advance * _angle(sin, cos) + fs_phase + s * at.offset_fs - s * math.pi / 2) / spacing
         off = (off - math.floor(off)) * spacing
         for neighbour in range(2):
             x = off - neighbour * spacing
-            pull = rim.slope - a_fs * advance * x
-            stiffness = a_fs * advance * advance - rim.bend
-            gain = pull * pull / (2 * stiffness) if stiffness > 0.0 else 0.0
-            greatest = max(greatest, rim.value + a_fs * (1 - x * x / 2) + gain)
+            step, gain = _uphill(at, a_fs, advance, x)
+            value = at.value + a_fs * math.cos(x)
+            if value + gain + PARABOLA_SHARE * second_order < greatest:
+                continue
+            there_cos, there_sin = _rotate(cos, sin, step)
+            there = _rim(rim, motion, cs_cos, cs_sin, tan_alpha, there_cos, there_sin, s, k)
+            x += advance * step + s * (there.offset_fs - at.offset_fs)
+            greatest = max(greatest, value, there.value + a_fs * math.cos(x) + _uphill(there, a_fs, advance, x)[1])
     return greatest
 
 
@@ -337,11 +384,12 @@ def _one(tip, tan_alpha, advance, phases, row, scratch):
     t_max = math.sqrt(motion.ta_cos**2 + motion.ta_sin**2) + abs(motion.ta_0)
     l_max = math.sqrt(motion.el_cos**2 + motion.el_sin**2) + abs(motion.el_0)
     l_max += math.sqrt(motion.tl_cos**2 + motion.tl_sin**2) + abs(motion.tl_0)
-    offset = l_max / (tip.semi_major - tip.tip_radius)
-    second_order = tan_alpha * (tip.semi_major / 2 * (t_max / tip.half_width) ** 2 + l_max * offset / 2)
+    rim = rim_constants(tip)
+    offset = l_max * rim.per_flatness
+    second_order = tan_alpha * (rim.bow * t_max * t_max + l_max * offset / 2)
     second_order += (row[8] + a_fs) * offset
-    low = _least(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, row[11], advance, phases, t, d, second_order, scratch)
-    high = _greatest(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, row[11], advance, phases, t, d, second_order)
+    low = _least(rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, row[11], advance, phases, t, d, second_order, scratch)
+    high = _greatest(rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, row[11], advance, phases, t, d, second_order)
     return high - low
 
 

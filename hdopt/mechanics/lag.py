@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hdopt.deviations import DriveErrors
-from hdopt.drive import ARCMIN, Drive
+from hdopt.drive.errors import DriveErrors
+from hdopt.drive.geometry import ARCMIN, Drive
 from hdopt.errors import MissingValue
 
 Array = NDArray[np.float64]

@@ -1,0 +1,377 @@
+"""Extremes of the kinematic error with their slopes over the design: what a search with gradients needs.
+
+Over one full relative turn each input angle meets every FS phase. Here the phase is continuous, so that the extremes
+are smooth in the design: an envelope that lies above the converged peak-to-peak by what the gaps between the real
+phases leave out (up to a few thousandths of an arcmin, `tests/unit/test_kinematics_gradients.py`).
+
+The supremum is the largest of four smooth maxima (zone x rim). The infimum is the least of a few local minima of
+    l(theta) = (A_1 + A_2)/2 - a |sin h| sqrt(1 - r^2), r = (A_1 - A_2)/(2 a cos h)    where both zones can drive,
+    l(theta) = max(A_1, A_2) - a                                                         where one drives alone,
+with A_i the zone's deviation without its FS term, a its amplitude and h half the sum of the offsets o'. By the envelope
+theorem an extreme's slope over the design is the partial one at its own angle. At a kink it is the mix of both sides'
+that has no slope over theta; where the deepest rim changes, the angle itself moves with the design.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from hdopt.drive.errors import DriveErrors
+from hdopt.drive.geometry import Drive
+from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
+from hdopt.kinematics.kernel import motion_at, rigid_motion, rim_constants, rim_depth, tooth_deviation
+from hdopt.parallel.shared_memory import in_parts
+
+Array = NDArray[np.float64]
+
+HIGHS, LOWS = 4, 8
+SCAN = 144
+KEPT_RANGE = 0.25
+"""Local minima within this share of the range of l above its lowest scanned value are refined."""
+NEWTON = 12
+GOLDEN = 45
+BESIDE = 1e-7
+"""How far beside a kink, rad, its two sides are looked at."""
+STEEP = 1e-9
+"""A slope over theta, mm/rad, below which an extreme counts as smooth."""
+
+# Columns: value, then slopes over theta, L_W, rho0, b/2, tan(alpha).
+VALUE, THETA, MAJOR, RHO, HALF, TAN = range(6)
+
+
+class Extremes(NamedTuple):
+    """Local maxima (4,) and minima (8,) of tau, mm of arc, and their slopes over (L_W, rho0, b/2, tan alpha)."""
+
+    highs: Array
+    high_slopes: Array
+    lows: Array
+    low_slopes: Array
+
+
+@njit(cache=True, nogil=True)
+def _branch(tip, motion, cs_cos, cs_sin, tan_alpha, theta, s, k, out):
+    """Fill `out` (3, 6): tau without FS term, offset o' and depth of zone s and rim k, with all slopes."""
+    cos, sin = math.cos(theta), math.sin(theta)
+    major, rho, half = tip.semi_major, tip.tip_radius, tip.half_width
+    e_a, e_l, t_a, t_l = motion_at(motion, cos, sin)
+    value, o, o_fs = rim_depth(rim_constants(tip), e_a, e_l, t_a, t_l, s, k)
+    u_a, u_l = t_a / half, t_l / half
+    e_a1 = motion.ea_sin * cos - motion.ea_cos * sin
+    e_l1 = motion.el_sin * cos - motion.el_cos * sin
+    u_a1 = (motion.ta_sin * cos - motion.ta_cos * sin) / half
+    u_l1 = (motion.tl_sin * cos - motion.tl_cos * sin) / half
+    gap = major - rho
+    mean = (major + rho) / 2
+    shift, shift1, shift_half = e_l + s * k * t_l, e_l1 + s * k * half * u_l1, s * k * u_l
+    q_theta = shift1 - s * mean * (u_a1 * u_l + u_a * u_l1)
+    q_major = -s * u_a * u_l / 2
+    depth, offset, tau = out[2], out[1], out[0]
+    depth[VALUE] = value
+    depth[THETA] = s * e_a1 + k * half * u_a1 - major * u_a * u_a1 + o * q_theta
+    depth[MAJOR] = -u_a * u_a / 2 + o * q_major - o * o / 2
+    depth[RHO] = o * q_major + o * o / 2
+    depth[HALF] = k * u_a + o * shift_half
+    depth[TAN] = 0.0
+    offset_cos, offset_sin = math.cos(o), math.sin(o)
+    o_slopes = (0.0, q_theta / gap, (q_major - o) / gap, (q_major + o) / gap, shift_half / gap, 0.0)
+    offset[VALUE] = o_fs
+    offset[THETA] = o_slopes[THETA] - shift1 / major
+    offset[MAJOR] = o_slopes[MAJOR] + shift / major**2
+    offset[RHO] = o_slopes[RHO]
+    offset[HALF] = o_slopes[HALF] - shift_half / major
+    offset[TAN] = 0.0
+    turned = tooth_deviation(cs_cos, cs_sin, cos, sin, s, offset_cos, offset_sin)
+    turned1 = tooth_deviation(cs_sin, -cs_cos, cos, sin, s, offset_cos, offset_sin) * s
+    tau[VALUE] = tan_alpha * depth[VALUE] + turned
+    for j in range(1, 6):
+        tau[j] = tan_alpha * depth[j] + turned1 * o_slopes[j]
+    tau[THETA] += s * turned1
+    tau[TAN] += depth[VALUE]
+
+
+@njit(cache=True, nogil=True)
+def _zones(tip, motion, cs_cos, cs_sin, tan_alpha, theta, side, work):
+    """Deepest rim of both zones into `work` rows 0 and 1; `side` (2,) forces a rim (+-1) or, 0, lets the depth decide.
+
+    Returns by how much the upper rim lies deeper than the lower one in each zone, where the depth decided.
+    """
+    gap_0 = gap_1 = 0.0
+    for case in range(4):
+        zone, k = case // 2, 1.0 if case % 2 == 0 else -1.0
+        if side[zone] == -k:
+            continue
+        into = zone if side[zone] == k or k > 0 else 2
+        _branch(tip, motion, cs_cos, cs_sin, tan_alpha, theta, 1.0 - 2.0 * zone, k, work[into])
+        if into == 2:
+            gap = work[zone, 2, VALUE] - work[2, 2, VALUE]
+            if gap < 0.0:
+                work[zone] = work[2]
+            if zone == 0:
+                gap_0 = gap
+            else:
+                gap_1 = gap
+    return gap_0, gap_1
+
+
+@njit(cache=True, nogil=True)
+def _lowest(work, a_fs, out):
+    """l and its slopes from both zones' rows of `work` into `out` (6,)."""
+    first, second = work[0, 0], work[1, 0]
+    h = (work[0, 1, VALUE] + work[1, 1, VALUE]) / 2
+    gap = first[VALUE] - second[VALUE]
+    cos_h, sin_h = math.cos(h), math.sin(h)
+    if abs(gap) >= 2 * a_fs * cos_h * cos_h:
+        for j in range(6):
+            out[j] = first[j] if gap >= 0 else second[j]
+        out[VALUE] -= a_fs
+        return
+    r = gap / (2 * a_fs * cos_h)
+    c = math.sqrt(max(1 - r * r, 0.0))
+    lean = abs(sin_h) * r / (2 * c * cos_h) if c > 0 else 0.0
+    over_h = -a_fs * math.copysign(cos_h, sin_h) * c
+    if c > 0:
+        over_h += a_fs * abs(sin_h) * r * r * sin_h / (cos_h * c)
+    out[VALUE] = (first[VALUE] + second[VALUE]) / 2 - a_fs * abs(sin_h) * c
+    for j in range(1, 6):
+        slope_h = (work[0, 1, j] + work[1, 1, j]) / 2
+        out[j] = (0.5 + lean) * first[j] + (0.5 - lean) * second[j] + over_h * slope_h
+
+
+@njit(cache=True, nogil=True)
+def _maxima(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, work, values, slopes):
+    """Four smooth maxima, one a zone and rim: Newton from the first-order peak. A branch that is not the deeper rim
+    at its own peak lies below another branch there, so it never wins and does no harm."""
+    index = 0
+    for zone in range(2):
+        s = 1.0 if zone == 0 else -1.0
+        for rim in range(2):
+            k = 1.0 if rim == 0 else -1.0
+            c = tan_alpha * (s * motion.ea_cos + k * motion.ta_cos) + s * cs_cos
+            n = tan_alpha * (s * motion.ea_sin + k * motion.ta_sin) + s * cs_sin
+            size = math.hypot(c, n)
+            theta = math.atan2(n, c) if size > 0 else 0.0
+            best, best_theta = -math.inf, theta
+            step = 1e-4
+            for _ in range(NEWTON):
+                _branch(tip, motion, cs_cos, cs_sin, tan_alpha, theta, s, k, work[zone])
+                value, slope = work[zone, 0, VALUE], work[zone, 0, THETA]
+                if value > best:
+                    best, best_theta = value, theta
+                _branch(tip, motion, cs_cos, cs_sin, tan_alpha, theta + step, s, k, work[2])
+                bend = (work[2, 0, THETA] - slope) / step
+                if bend >= -1e-3 * size or abs(slope) < 1e-13 * size:
+                    break
+                theta += min(max(-slope / bend, -0.3), 0.3)
+            _branch(tip, motion, cs_cos, cs_sin, tan_alpha, best_theta, s, k, work[zone])
+            values[index] = work[zone, 0, VALUE] + a_fs
+            slopes[index] = work[zone, 0, MAJOR:]
+            index += 1
+
+
+@njit(cache=True, nogil=True)
+def _rim_change(tip, motion, cs_cos, cs_sin, tan_alpha, zone, low, high, work):
+    """Angle between `low` and `high` where the deepest rim of a zone changes, by bisection."""
+    free = np.zeros(2)
+    start = False
+    for step in range(54):
+        middle = low if step == 0 else (low + high) / 2
+        gaps = _zones(tip, motion, cs_cos, cs_sin, tan_alpha, middle, free, work)
+        upper = gaps[zone] >= 0
+        if step == 0:
+            start = upper
+        elif upper == start:
+            low = middle
+        else:
+            high = middle
+    return (low + high) / 2
+
+
+@njit(cache=True, nogil=True)
+def _value(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, theta, side, work, out):
+    _zones(tip, motion, cs_cos, cs_sin, tan_alpha, theta, side, work)
+    _lowest(work, a_fs, out)
+    return out[VALUE]
+
+
+@njit(cache=True, nogil=True)
+def _move_with_change(tip, motion, cs_cos, cs_sin, tan_alpha, theta, zone, work, out):
+    """Add to the slopes of l at the angle where a zone's rim changes what that angle's own motion does."""
+    for rim in range(2):
+        _branch(tip, motion, cs_cos, cs_sin, tan_alpha, theta, 1.0 - 2.0 * zone, 1.0 - 2.0 * rim, work[rim])
+    apart = work[0, 2] - work[1, 2]
+    if apart[THETA] != 0.0:
+        for j in range(2, 6):
+            out[j] -= out[THETA] * apart[j] / apart[THETA]
+
+
+@njit(cache=True, nogil=True)
+def _minimum_between(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, low, high, ends, work, out, other):
+    """Least l between two angles with the same rims inside; `ends` the zone whose rim changes there, -1 for none.
+
+    Fills `out` (6,) with value and design slopes. The rims are those of the middle, so that ends are one-sided limits.
+    """
+    side, free = np.zeros(2), np.zeros(2)
+    gaps = _zones(tip, motion, cs_cos, cs_sin, tan_alpha, (low + high) / 2, free, work)
+    for zone in range(2):
+        side[zone] = 1.0 if gaps[zone] >= 0 else -1.0
+    golden = (math.sqrt(5.0) - 1) / 2
+    a, b = low, high
+    x1, x2 = b - golden * (b - a), a + golden * (b - a)
+    f1 = f2 = 0.0
+    at_1 = True
+    theta = x1
+    best = math.inf
+    for step in range(GOLDEN + 4):
+        # The two inner points first, then one a step, at last both ends.
+        last = step >= GOLDEN + 2
+        place = (low if step == GOLDEN + 2 else high) if last else x1 if at_1 else x2
+        value = _value(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, place, side, work, out)
+        if value < best or (last and value <= best + 1e-15):
+            best, theta = value, place
+        if last:
+            continue
+        if at_1:
+            f1 = value
+        else:
+            f2 = value
+        if step == 0:
+            at_1 = False
+            continue
+        if f1 <= f2:
+            b, x2, f2 = x2, x1, f1
+            x1, at_1 = b - golden * (b - a), True
+        else:
+            a, x1, f1 = x1, x2, f2
+            x2, at_1 = a + golden * (b - a), False
+    changed = -1
+    if theta == low or theta == high:
+        changed = ends[0] if theta == low else ends[1]
+    for step in range(2):
+        beside = 0.0 if changed >= 0 else BESIDE * (2 * step - 1)
+        _value(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, theta + beside, side, work, out)
+        if step == 0:
+            other[:] = out
+    if changed >= 0:
+        _move_with_change(tip, motion, cs_cos, cs_sin, tan_alpha, theta, changed, work, out)
+        return
+    rising, falling = out[THETA], other[THETA]
+    share = rising / (rising - falling) if rising > STEEP and falling < -STEEP else 0.5
+    for j in range(2, 6):
+        out[j] = share * other[j] + (1 - share) * out[j]
+    out[VALUE] = best
+
+
+@njit(cache=True, nogil=True)
+def _minima(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, work, values, slopes):
+    """The lowest local minima of l, at most as many as `values` holds, sorted upward."""
+    marks, level, upper = np.empty(SCAN + 1), np.empty(SCAN + 1), np.empty((SCAN + 1, 2), np.bool_)
+    out, other, free = np.empty(6), np.empty(6), np.zeros(2)
+    step = 2 * math.pi / SCAN
+    for i in range(SCAN + 1):
+        marks[i] = i * step
+        gaps = _zones(tip, motion, cs_cos, cs_sin, tan_alpha, marks[i], free, work)
+        upper[i, 0], upper[i, 1] = gaps[0] >= 0, gaps[1] >= 0
+        _lowest(work, a_fs, out)
+        level[i] = out[VALUE]
+    highest_kept = level.min() + KEPT_RANGE * (level.max() - level.min())
+    values[:] = math.inf
+    ends = np.empty(2, np.int64)
+    for i in range(SCAN):
+        if min(level[i], level[i + 1]) > highest_kept:
+            continue
+        before = level[i - 1] if i > 0 else level[SCAN - 1]
+        after = level[i + 2] if i < SCAN - 1 else level[1]
+        change0 = change1 = math.nan
+        if upper[i, 0] != upper[i + 1, 0]:
+            change0 = _rim_change(tip, motion, cs_cos, cs_sin, tan_alpha, 0, marks[i], marks[i + 1], work)
+        if upper[i, 1] != upper[i + 1, 1]:
+            change1 = _rim_change(tip, motion, cs_cos, cs_sin, tan_alpha, 1, marks[i], marks[i + 1], work)
+        dips = (level[i] <= before and level[i] <= level[i + 1]) or (level[i + 1] <= level[i] and level[i + 1] <= after)
+        if not dips and math.isnan(change0) and math.isnan(change1):
+            continue
+        first, second = change0, change1
+        zone_first, zone_second = 0, 1
+        if math.isnan(first) or (not math.isnan(second) and second < first):
+            first, second, zone_first, zone_second = second, first, 1, 0
+        low, zone_low = marks[i], -1
+        for piece in range(3):
+            if piece == 0:
+                high, zone_high = (first, zone_first) if not math.isnan(first) else (marks[i + 1], -1)
+            elif piece == 1:
+                if math.isnan(first):
+                    break
+                high, zone_high = (second, zone_second) if not math.isnan(second) else (marks[i + 1], -1)
+            else:
+                if math.isnan(second) or math.isnan(first):
+                    break
+                high, zone_high = marks[i + 1], -1
+            if high > low:
+                ends[0], ends[1] = zone_low, zone_high
+                _minimum_between(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, low, high, ends, work, out, other)
+                _insert(values, slopes, out)
+            low, zone_low = high, zone_high
+    last = 0
+    for i in range(len(values)):
+        if values[i] < math.inf:
+            last = i
+        else:
+            values[i] = values[last]
+            slopes[i] = slopes[last]
+
+
+@njit(cache=True, nogil=True)
+def _insert(values, slopes, found):
+    """Keep `found` among the lowest, sorted."""
+    place = len(values)
+    while place > 0 and found[VALUE] < values[place - 1]:
+        place -= 1
+    if place < len(values):
+        for i in range(len(values) - 1, place, -1):
+            values[i] = values[i - 1]
+            slopes[i] = slopes[i - 1]
+        values[place] = found[VALUE]
+        slopes[place] = found[MAJOR:]
+
+
+@njit(cache=True, nogil=True)
+def _extremes(tip, tan_alpha, rows, highs, high_slopes, lows, low_slopes):
+    work = np.empty((3, 3, 6))
+    for i in range(rows.shape[0]):
+        row = rows[i]
+        motion = rigid_motion(
+            tip,
+            row[0] * math.sin(row[1]),
+            row[0] * math.cos(row[1]),
+            math.tan(row[3]),
+            math.tan(row[2]),
+            row[4] * math.cos(row[5]),
+            row[4] * math.sin(row[5]),
+            math.tan(row[6]),
+            math.tan(row[7]),
+        )
+        cs_cos, cs_sin = row[8] * math.sin(row[9]), row[8] * math.cos(row[9])
+        _maxima(tip, motion, cs_cos, cs_sin, tan_alpha, row[10], work, highs[i], high_slopes[i])
+        _minima(tip, motion, cs_cos, cs_sin, tan_alpha, row[10], work, lows[i], low_slopes[i])
+
+
+def extremes(drive: Drive, errors: DriveErrors) -> Extremes:
+    """Local extremes of the zones' driving deviation for each drive of `errors` (n of them), mm of arc.
+
+    `highs` (n, 4), `lows` (n, 8) sorted upward (repeated where there are fewer), slopes (n, 4, 4) and (n, 8, 4) over
+    L_W, rho0, b/2 (per mm) and tan(alpha). Smooth-tipped profiles only; valid where the closed form is.
+    """
+    return extremes_of(tip_geometry(drive), math.tan(drive.geometry.pressure_angle), errors.to_matrix())
+
+
+def extremes_of(tip: TipGeometry, tan_alpha: float, rows: Array) -> Extremes:
+    """The same from the constants of the closed form and rows of `DriveErrors.to_matrix`."""
+    rows = np.ascontiguousarray(rows, float)
+    n = len(rows)
+    found = Extremes(np.empty((n, HIGHS)), np.empty((n, HIGHS, 4)), np.empty((n, LOWS)), np.empty((n, LOWS, 4)))
+    in_parts(n, lambda part: _extremes(tip, tan_alpha, rows[part], *(array[part] for array in found)))
+    return found

@@ -1,0 +1,90 @@
+"""What measured teeth do in mesh: the mean over the teeth in contact that share the load.
+
+A deviation known tooth by tooth acts as p_mesh(x) = sum_j w(x - x_j) p_j / sum_j w(x - x_j), where x is the place of
+the deepest point on the spline and x_j that of tooth j. The weights w are even in the middle of the window and fall to
+zero at both ends as a raised cosine (Tukey's window), so that a tooth that enters makes no step. The window is as wide
+as it must be for independent teeth to give 1/sqrt(Z_mp), with Z_mp = Z_CS c/(2 pi) the teeth on one side of the contact
+angle c (Jia 2021, Eq. (13)). It lies evenly about the deepest point: which side carries depends on the torque, and
+would shift the phase of every wave alike.
+
+Deviations of misalignment are common to all teeth: cos psi over the same window, so that their mean is that of one wave
+a turn. They are not random from tooth to tooth, and 1/sqrt(Z_mp) is not for them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.drive.geometry import Drive
+from hdopt.drive.teeth import MeasuredTeeth
+from hdopt.mechanics.contact import contact_angle
+
+Array = NDArray[np.float64]
+
+TAPER = 0.5
+"""Share of the window that falls off, both ends together."""
+PLACES_PER_TOOTH = 12
+"""Places of a table for one tooth; cubics join them."""
+
+
+@dataclass(frozen=True)
+class LoadSharing:
+    """Weights over a window of `width` (rad of the spline) of which the share `taper` falls off; 0 weighs all alike."""
+
+    width: float
+    taper: float = TAPER
+
+    @classmethod
+    def of(cls, drive: Drive, taper: float = TAPER) -> LoadSharing:
+        """The window of `drive` for which independent teeth give 1/sqrt(Z_mp), with this `taper`."""
+        angle = contact_angle(drive.geometry, drive.wave_generator.profile)
+        # (integral of w)^2 over integral of w^2, for a window of width 1.
+        effective = (1 - taper / 2) ** 2 / (1 - 5 * taper / 8)
+        return cls(angle / effective, taper)
+
+    def weights(self, offset: Array) -> Array:
+        """Weight of a tooth `offset` (rad) beside the deepest point; same shape."""
+        inside = np.abs(offset) / (self.width / 2)
+        even = 1 - self.taper
+        falling = np.clip((inside - even) / self.taper, 0.0, 1.0) if self.taper > 0 else np.zeros_like(inside)
+        return np.where(inside <= 1, 0.5 + 0.5 * np.cos(math.pi * falling), 0.0)
+
+    def response(self, waves: float, teeth: int) -> float:
+        """What is left of the amplitude of a sine of so many `waves` a turn over `teeth`, at a tooth's own place.
+
+        For even weights and many teeth it is sin(k c/2)/(k c/2).
+        """
+        offset = np.mod(2 * math.pi * np.arange(teeth) / teeth + math.pi, 2 * math.pi) - math.pi
+        weights = self.weights(offset)
+        return float(np.sum(weights * np.cos(waves * offset)) / np.sum(weights))
+
+    def table(self, teeth: MeasuredTeeth) -> Array:
+        """Mean over the teeth in contact on an even grid of one turn of the spline of `teeth`, mm of arc,
+        (12 Z,)."""
+        z = len(teeth.deviations)
+        n = z * PLACES_PER_TOOTH
+        impulses, ones = np.zeros(n), np.zeros(n)
+        impulses[::PLACES_PER_TOOTH], ones[::PLACES_PER_TOOTH] = teeth.deviations, 1.0
+        offset = np.mod(2 * math.pi * np.arange(n) / n - teeth.first_angle + math.pi, 2 * math.pi) - math.pi
+        window = np.fft.rfft(self.weights(offset))
+        summed, weight = (np.fft.irfft(np.fft.rfft(values) * window, n) for values in (impulses, ones))
+        return np.asarray(summed / weight)
+
+
+NO_TABLE: Array = np.empty(0)
+
+
+def mesh_tables(drive: Drive) -> tuple[Array, Array]:
+    """Tables of the measured teeth of CS and FS of `drive` over one turn of each spline, mm of arc; empty for a spline
+    whose teeth are not measured. Raises `MissingValue` where the contact angle lacks an addendum."""
+    if drive.cs_teeth is None and drive.fs_teeth is None:
+        return NO_TABLE, NO_TABLE
+    sharing = LoadSharing.of(drive)
+    return (
+        NO_TABLE if drive.cs_teeth is None else sharing.table(drive.cs_teeth),
+        NO_TABLE if drive.fs_teeth is None else sharing.table(drive.fs_teeth),
+    )

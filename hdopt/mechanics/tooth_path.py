@@ -1,0 +1,223 @@
+"""How far from the major axis the flanks can carry: what a small pressure angle costs.
+
+A flexspline tooth leaves its space along a path that the deflection prescribes, not the flank: it withdraws by
+d = w(0) - w(psi) while it shifts sideways by t = m psi - integral of w. (With w = kappa m cos 2 psi and
+theta = 2 psi this is the rack approximation that strain-wave tooth forms are designed with, x = m (theta - kappa sin
+theta)/2, y = kappa m cos theta: Musser, US patent 2,906,143, 1959; Ishikawa, US patent 4,823,638, 1989.) A straight
+flank of pressure angle alpha follows only while t <= d tan(alpha) + half the backlash. Beyond that angle the tip must
+be relieved, and a relieved tooth carries nothing. Where w0 exceeds m, the tooth first moves back, t < 0, and the
+trailing flank needs room: that limits the deflection, the more the smaller the pressure angle.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from hdopt.drive.geometry import DriveGeometry
+from hdopt.drive.profiles import WaveGeneratorProfile, polar_curvature
+from hdopt.errors import HdoptError, MissingValue
+from hdopt.mechanics.contact import contact_angle
+
+Array = NDArray[np.float64]
+
+GRID = np.linspace(0.0, math.pi / 2, 91)
+"""Where a profile is sampled with two derivatives: quintics between 1 deg steps keep 1e-13 mm of smooth profiles, and
+3e-9 mm where the two-disk profile's third derivative jumps."""
+CELL = GRID[1]
+NEWTON_STEPS = 12
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """The mesh of one flexspline on one profile; everything here is independent of the wave generator's width."""
+
+    geometry: DriveGeometry
+    profile: WaveGeneratorProfile
+
+    @cached_property
+    def _sampled(self) -> Array:
+        """Deflection w, w', w'' and the integral of w from the major axis on `GRID`, shape (4, 91)."""
+        rows = np.empty((4, len(GRID)))
+        for derivative in range(3):
+            rows[derivative] = self.profile.radius(GRID, derivative)
+        rows[0] -= self.geometry.flexspline_inner_radius
+        _integrate(rows)
+        return rows
+
+    def path(self, psi: float) -> tuple[float, float]:
+        """Withdrawal d and sideways shift t of a flexspline tooth at `psi` rad from the major axis, mm."""
+        w, _, integral = _at(self._sampled, psi)
+        return self._sampled[0, 0] - w, self.geometry.module * psi - integral
+
+    @cached_property
+    def _clearance(self) -> float:
+        """By how much tips would miss each other without deflection, mm: overlap is w less this."""
+        gear = self.geometry
+        if gear.flexspline_addendum is None or gear.circular_spline_addendum is None:
+            raise MissingValue("the mesh", "drive.flexspline_addendum_mm", "drive.circular_spline_addendum_mm")
+        pitch_lines = gear.module * (gear.circular_spline_teeth - gear.flexspline_teeth) / 2
+        return pitch_lines - gear.circular_spline_addendum - gear.flexspline_addendum
+
+    @cached_property
+    def contact_angle(self) -> float:
+        """Half angle over which the tips overlap, rad; the same as `hdopt.mechanics.contact.contact_angle`."""
+        psi = _falls_to(self._sampled, self._clearance)
+        return contact_angle(self.geometry, self.profile) if math.isnan(psi) else psi
+
+    def free_flank_angle(self, pressure_angle: float, backlash: float) -> float:
+        """Largest angle psi (rad) up to which the leading straight flank runs free: t <= d tan(alpha) + backlash/2.
+
+        pi/2 where it always does. Rack approximation: the tooth's own rotation and the curvature of the pitch lines
+        are left out, which is right to the order of the module over the radius.
+        """
+        if backlash < 0:
+            raise HdoptError(f"the backlash is {backlash:g} mm; it must not be negative")
+        return _free_angle(self._sampled, self.geometry.module, math.tan(pressure_angle), backlash / 2)
+
+    def trailing_flank_room(self, pressure_angle: float, backlash: float) -> float:
+        """Least room of the trailing flank on a tooth's way out, mm: the least of backlash/2 + d tan(alpha) + t.
+
+        Below zero the flanks jam near the major axis. It is half the backlash where w0 does not exceed the module.
+        """
+        return backlash / 2 + _least_trailing(self._sampled, self.geometry.module, math.tan(pressure_angle))
+
+    def carrying_angle(self, pressure_angle: float, backlash: float) -> float:
+        """Half angle over which flanks can carry, rad: overlapped tips whose flanks run free."""
+        return min(self.contact_angle, self.free_flank_angle(pressure_angle, backlash))
+
+    def summed_depth(self, angle: float) -> float:
+        """Depth of engagement summed over the teeth up to `angle` on the approaching flank of both zones, mm."""
+        overlap = _at(self._sampled, angle)[2] - angle * self._clearance
+        return 2 * self.geometry.circular_spline_teeth / (2 * math.pi) * overlap
+
+    def flank_pressure(self, torque: float, face_width: float, angle: float) -> float:
+        """Mean pressure on the flanks up to `angle`, N/mm^2: p = 2 T/(d b h z), as `contact.mean_flank_pressure` has it
+        (Shen and Ye 1985), with h z summed over the teeth that can carry instead of all whose tips overlap.
+
+        Infinite for an angle of 0, where no flank carries.
+        """
+        pitch_diameter = self.geometry.module * self.geometry.flexspline_teeth
+        if angle <= 0:
+            return math.inf  # no flank runs free: none carries
+        return 2 * torque / (pitch_diameter * face_width * self.summed_depth(angle))
+
+    @cached_property
+    def largest_curvature_change(self) -> float:
+        """As `hdopt.mechanics.bending.max_curvature_change`, from `GRID` and the end of the wrap, where its kink is."""
+        gear = self.geometry
+        if gear.flexspline_wall is None:
+            raise MissingValue("bending of the ring", "drive.flexspline_wall_mm")
+        neutral = gear.flexspline_inner_radius + gear.flexspline_wall / 2
+        w, slope, bend = self._sampled[:3]
+        change = np.abs(polar_curvature(neutral + w, slope, bend) - 1 / neutral)
+        wrap = getattr(self.profile, "wrap_angle", 0.0)
+        radius, first, second = (self.profile.radius(wrap, derivative) for derivative in range(3))
+        kink = abs(float(polar_curvature(radius + gear.flexspline_wall / 2, first, second)) - 1 / neutral)
+        return max(_peak(change), kink)
+
+
+@njit(cache=True)
+def _integrate(rows):
+    """Fill row 3 with the integral of the quintics through rows 0 to 2."""
+    h = CELL
+    rows[3, 0] = 0.0
+    for i in range(rows.shape[1] - 1):
+        values = (rows[0, i] + rows[0, i + 1]) / 2
+        slopes = (rows[1, i] - rows[1, i + 1]) * h / 10
+        bends = (rows[2, i] + rows[2, i + 1]) * h * h / 120
+        rows[3, i + 1] = rows[3, i] + h * (values + slopes + bends)
+
+
+@njit(cache=True)
+def _at(rows, psi):
+    """w, w' and the integral of w at an angle: the quintic that takes w, w', w'' at both ends of the cell."""
+    h = CELL
+    i = min(max(int(psi / h), 0), rows.shape[1] - 2)
+    x = psi / h - i
+    a0, a1, a2 = rows[0, i], rows[1, i] * h, rows[2, i] * h * h / 2
+    value = rows[0, i + 1] - (a0 + a1 + a2)
+    slope = rows[1, i + 1] * h - (a1 + 2 * a2)
+    bend = rows[2, i + 1] * h * h / 2 - a2
+    a3, a4, a5 = 10 * value - 4 * slope + bend, -15 * value + 7 * slope - 2 * bend, 6 * value - 3 * slope + bend
+    w = a0 + x * (a1 + x * (a2 + x * (a3 + x * (a4 + x * a5))))
+    w1 = (a1 + x * (2 * a2 + x * (3 * a3 + x * (4 * a4 + x * 5 * a5)))) / h
+    integral = x * (a0 + x * (a1 / 2 + x * (a2 / 3 + x * (a3 / 4 + x * (a4 / 5 + x * a5 / 6)))))
+    return w, w1, rows[3, i] + h * integral
+
+
+@njit(cache=True)
+def _falls_to(rows, level):
+    """Angle at which w first falls to `level`; NaN where it starts below, or never gets there."""
+    if rows[0, 0] <= level:
+        return math.nan
+    for i in range(1, rows.shape[1]):
+        if rows[0, i] < level:
+            low, high = (i - 1) * CELL, i * CELL
+            psi = (low + high) / 2
+            for _ in range(NEWTON_STEPS):
+                w, slope, _integral = _at(rows, psi)
+                if slope == 0.0:
+                    break
+                psi = min(max(psi - (w - level) / slope, low), high)
+            return psi
+    return math.nan
+
+
+@njit(cache=True)
+def _free_angle(rows, module, tan_alpha, play):
+    for i in range(1, rows.shape[1]):
+        shift = module * i * CELL - rows[3, i]
+        if play + (rows[0, 0] - rows[0, i]) * tan_alpha - shift < 0:
+            low, high = (i - 1) * CELL, i * CELL
+            psi = (low + high) / 2
+            for _ in range(NEWTON_STEPS):
+                w, slope, integral = _at(rows, psi)
+                room = play + (rows[0, 0] - w) * tan_alpha - (module * psi - integral)
+                change = -slope * tan_alpha - (module - w)
+                if change == 0.0:
+                    break
+                psi = min(max(psi - room / change, low), high)
+            return psi
+    return math.pi / 2
+
+
+@njit(cache=True)
+def _least_trailing(rows, module, tan_alpha):
+    """Least of d tan(alpha) + t; 0 at the major axis itself."""
+    least, at = 0.0, 0
+    for i in range(1, rows.shape[1]):
+        room = (rows[0, 0] - rows[0, i]) * tan_alpha + module * i * CELL - rows[3, i]
+        if room < least:
+            least, at = room, i
+    low, high = max(at - 1, 0) * CELL, (at + 1) * CELL
+    if at == 0:
+        # The least may still lie within the first cell, where the tooth moves back before its depth opens.
+        high = CELL
+    for _ in range(50):
+        psi = (low + high) / 2
+        w, slope, _integral = _at(rows, psi)
+        if -slope * tan_alpha + module - w < 0:
+            low = psi
+        else:
+            high = psi
+    w, slope, integral = _at(rows, high)
+    return min(least, (rows[0, 0] - w) * tan_alpha + module * high - integral)
+
+
+@njit(cache=True)
+def _peak(values):
+    """Largest of equally spaced values, and of the parabola through it and its neighbours."""
+    at = int(np.argmax(values))
+    best = values[at]
+    if 0 < at < len(values) - 1:
+        before, after = values[at - 1], values[at + 1]
+        bend = before - 2 * best + after
+        if bend < 0:
+            best -= (after - before) ** 2 / (8 * bend)
+    return best
