@@ -1,0 +1,117 @@
+"""What an effect knows of a motion: neutral arrays of conditions, row by row, whether recorded or simulated."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Hashable
+
+    from hdopt.effects.term import Term
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+TURN = 2 * math.pi
+"""rad in a turn."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conditions:
+    """Rows of one motion or of several recordings; every array has shape (n,), in order of time.
+
+    `ratio` N; `theta` input angle, rad; `output` output angle as its encoder read it, rad (its zero is arbitrary);
+    `direction` of the motion, +1 or -1; `travel` output angle since the last reversal, deg; `first` rows before the
+    first reversal; `record` the recording, 0, 1, ...; `piece` contiguous rows, 0, 1, ...; `time`, s; `speed` of the
+    input, rad/s, with its sign; `torque` at the output, Nm, above 0 where it opposes positive rotation;
+    `temperature`, deg C, or K from a reference; each of the last four None where nobody knows it. `locked`: the input
+    stands still and the torque moves. `averaged`: samples behind a row, on average.
+    """
+
+    ratio: float
+    theta: Array
+    output: Array
+    direction: Array
+    travel: Array
+    first: NDArray[np.bool_]
+    record: Index
+    piece: Index
+    time: Array | None
+    speed: Array | None
+    torque: Array | None
+    temperature: Array | None
+    locked: bool = False
+    averaged: float = 1.0
+
+    def __len__(self) -> int:
+        return len(self.theta)
+
+    @cached_property
+    def remembered(self) -> dict[Hashable, Term]:
+        """Terms made for these rows at shapes that every search looks at."""
+        return {}
+
+    @property
+    def records(self) -> int:
+        """Number of recordings."""
+        return int(self.record[-1]) + 1
+
+    @property
+    def known_torque(self) -> Array:
+        """The torque, Nm, (n,), of conditions that have one. Raises `ValueError` for others."""
+        return _known("torque", self.torque)
+
+    @property
+    def known_speed(self) -> Array:
+        """The input speed, rad/s, (n,), of conditions that have one. Raises `ValueError` for others."""
+        return _known("speed", self.speed)
+
+    @property
+    def known_time(self) -> Array:
+        """The time, s, (n,), of conditions that have one. Raises `ValueError` for others."""
+        return _known("time", self.time)
+
+    @property
+    def known_temperature(self) -> Array:
+        """The temperature (n,) of conditions that have one. Raises `ValueError` for others."""
+        return _known("temperature", self.temperature)
+
+    @property
+    def reverses(self) -> bool:
+        """Whether both directions are there, one row in fifty each at least."""
+        forward, backward = (self.direction > 0).mean(), (self.direction < 0).mean()
+        return bool(min(forward, backward) > 0.02)
+
+    @property
+    def span_turns(self) -> float:
+        """Input turns between the lowest and the highest angle of any one recording."""
+        return max(float(np.ptp(self.theta[self.record == r])) for r in range(self.records)) / TURN
+
+    @property
+    def rows_per_turn(self) -> float:
+        """Usual number of rows in an input turn."""
+        step = np.abs(np.diff(self.theta))
+        step = step[(np.diff(self.piece) == 0) & (step > 0)]
+        return TURN / float(np.median(step)) if len(step) else 1.0
+
+    @property
+    def are_averages(self) -> bool:
+        """Whether neighbouring samples were averaged into the rows."""
+        return self.averaged > 1.15
+
+    @property
+    def highest_order(self) -> float:
+        """Orders up to which the rows can be trusted: the mean of a few neighbours dims what lies higher."""
+        return self.rows_per_turn * (0.35 if self.are_averages else 0.45)
+
+
+def _known(name: str, values: Array | None) -> Array:
+    if values is None:
+        raise ValueError(f"these conditions have no {name}, which the effect needs; ask `lacks` first")
+    return values

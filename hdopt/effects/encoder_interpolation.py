@@ -1,0 +1,180 @@
+"""Sub-divisional error of an encoder: a ripple at its lines.
+
+Offsets of the sine and cosine signals make an error of one cycle a line, unequal amplitudes and a wrong phase two
+cycles (Heydemann, Applied Optics 20 (1981) 3382). With L lines a turn the orders are L and 2 L of the input (divided
+by N), or L/N and 2 L/N of the output encoder, whose phase follows the angle that it reads itself: with thousands of
+lines an arcmin of kinematic error or drift moves it by a radian. Units: arcmin at the output; lines a whole number.
+Prior: 8 to 20000 lines; fewer than 17 are rare (two to eight poles of a resolver).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.drive.geometry import DriveGeometry
+from hdopt.effects.base import Effect, Keys
+from hdopt.effects.conditions import Array, Conditions
+from hdopt.effects.declared import Category, Quantity, Shaft, Sines, needed, smallest_set
+from hdopt.effects.estimate import FitEstimate, Parameter, counted
+from hdopt.effects.probe import Probe, best_terms
+from hdopt.effects.sines import sine_columns
+from hdopt.effects.term import Shape, Term
+from hdopt.effects.tooth_mesh import mesh_order
+
+LOWEST_ORDER = 8.0
+LOWEST_PAIR = 3.0
+"""Lowest order of an output encoder's lines where both L and 2 L show: one line alone could be anything."""
+MODULATION_PER_OUTPUT_TURN, SIDEBAND_REACH = 3.5, 12.0
+"""Orders that the teeth own: within so many 1/N of a whole sideband, up to so far from the mesh order."""
+CYCLES: tuple[tuple[int, ...], ...] = ((1,), (1, 2), (2,), (1, 2, 3, 4))
+"""Cycles a line of each variant; distorted signals (no pure sines) add the third and fourth."""
+SEARCHED = ((1,), (1, 2), (1, 2, 3, 4))
+"""Two cycles a line without the first cannot be told from one cycle of twice as many lines."""
+SHOWS = 0.01
+"""Power over that of its double or triple from which a line is taken for the encoder's own."""
+HARMONICS_OF_TEETH = 40
+"""Waves round the splines, h and h (1 + 1/N) up to so many, and the mesh order are the teeth's."""
+FEW_LINES, FEW_LINES_ODDS = 17, -8.0
+"""Below so many lines a turn bolts and teeth are likelier than an encoder; log odds."""
+SINES = Sines(
+    {1: ("amplitude_arcmin", "phase_deg")} | {k: (f"amplitude_{k}_arcmin", f"phase_{k}_deg") for k in (2, 3, 4)},
+    "arcmin",
+    "once a line, at the output; K cycles a line",
+    prior=(0.0, 2.0),
+    shown="`amplitude_arcmin`, `phase_deg`; `amplitude_K_arcmin`, `phase_K_deg`, K 2 to 4",
+)
+
+
+def beside_the_mesh(orders: Array, ratio: float) -> NDArray[np.bool_]:
+    """Where one of `orders` (n,) is the tooth mesh of a drive of `ratio` N or a sideband of it, drawn aside by a few
+    output turns' worth of modulation.
+    """
+    near = np.abs(orders - np.round(orders)) < MODULATION_PER_OUTPUT_TURN / ratio
+    return np.asarray(near & (np.abs(orders - mesh_order(ratio)) < SIDEBAND_REACH))
+
+
+def is_of_teeth(order: float, multiples: Sequence[int], ratio: float, output: bool) -> bool:
+    """Whether an encoder's line, at an `order` a turn of the input of a drive of `ratio` N, is where a wave round one
+    of the splines shows (asked of the `output` encoder only), or any of its `multiples` at the mesh of the teeth.
+    """
+    waves = (order, order / (1 + 1 / ratio)) if output else ()
+    round_a_spline = any(abs(wave - round(wave)) < 1e-6 and round(wave) <= HARMONICS_OF_TEETH for wave in waves)
+    return round_a_spline or any(abs(m * order - mesh_order(ratio)) < 1e-6 for m in multiples)
+
+
+class EncoderInterpolation(Effect):
+    id = "encoder_interpolation"
+    place = 90
+    domain = "order"
+    high_order = True
+    leaves_nothing = True
+    separating = (
+        "record at two thirds of the speed and twice the sampling rate: the ripple stays at the encoder's lines"
+    )
+    bench_part = "an encoder"
+    declared = (
+        Category("shaft", Shaft, "the shaft whose encoder it is"),
+        Quantity("lines", "1", "lines a turn", "L", (8, 20_000), at_least=1, at_most=1_000_000, whole=True),
+        SINES,
+    )
+    examples = (
+        {"shaft": "input", "lines": 25, "amplitude_arcmin": 0.05, "phase_deg": 5.0},
+        {"shaft": "output", "lines": 4001, "amplitude_2_arcmin": 0.05, "phase_2_deg": 5.0},
+        {
+            "shaft": "output",
+            "lines": 500,
+            "amplitude_arcmin": 0.05,
+            "phase_deg": 5.0,
+            "amplitude_4_arcmin": 0.01,
+            "phase_4_deg": 15.0,
+        },
+    )
+
+    def lacks(self, conditions: Conditions) -> str | None:
+        if conditions.rows_per_turn < 3 * LOWEST_ORDER:
+            return f"more than {3 * LOWEST_ORDER:.0f} samples an input turn"
+        if conditions.span_turns < 2:
+            return f"at least 2 input turns to count lines (there are {conditions.span_turns:.1f})"
+        return None
+
+    def search(self, probe: Probe) -> Sequence[Term]:
+        found = [term for shaft in Shaft for term in self._of_shaft(probe, shaft)]
+        return best_terms(probe, found, 2) if found else []
+
+    def _of_shaft(self, probe: Probe, shaft: Shaft) -> list[Term]:
+        """Terms of the encoder of one shaft, at its strongest lines."""
+        samples, output = probe.samples, shaft == Shaft.OUTPUT
+        highest = min(probe.order_range[1], 0.49 * samples.rows_per_turn)
+        # Rows that are no averages hold every cycle up to half their number.
+        finest = highest if samples.are_averages else 0.5 * samples.rows_per_turn * (1 + 1e-6)
+        per = samples.ratio if output else 1.0
+        lowest = max(probe.order_range[0], LOWEST_PAIR if output else LOWEST_ORDER)
+        lines = np.arange(np.ceil(lowest * per), np.floor(highest * per) + 1)
+        if output:
+            if samples.span_turns < 0.5 * samples.ratio:
+                return []
+            lines = lines[~beside_the_mesh(lines / per, samples.ratio)]
+        if not len(lines):
+            return []
+        return [
+            self.term(samples, {"lines": int(line), "shaft": shaft, "cycles": cycles}, trials=float(len(lines)))
+            for line in sorted(_strongest_lines(probe, lines, per, highest, output))
+            for cycles in SEARCHED
+            if cycles[-1] * line <= finest * per and (line >= LOWEST_ORDER * per or cycles[:2] == (1, 2))
+        ]
+
+    def term(self, conditions: Conditions, shape: Shape, motion: Array | None = None, trials: float = 1000.0) -> Term:
+        output = shape["shaft"] == Shaft.OUTPUT
+        angle = conditions.output if output else conditions.theta
+        columns = sine_columns(angle, [float(m * shape["lines"]) for m in shape["cycles"]])
+        odds = FEW_LINES_ODDS if shape["lines"] < FEW_LINES else 0.0
+        order = shape["lines"] / (conditions.ratio if output else 1.0)
+        doubtful = is_of_teeth(order, shape["cycles"], conditions.ratio, output)
+        return Term(self.id, dict(shape), columns=columns, trials=trials, odds=odds, doubtful=doubtful)
+
+    def is_part_of(self, shape: Shape, other: Shape) -> bool:
+        """Whether `shape` has the lines of an encoder of which `other` holds a multiple."""
+        return bool(shape["shaft"] == other["shaft"] and other["lines"] % shape["lines"] == 0)
+
+    def orders(self, shape: Shape, ratio: float) -> list[float]:
+        order = shape["lines"] / (ratio if shape["shaft"] == Shaft.OUTPUT else 1.0)
+        return [m * order for m in shape["cycles"]]
+
+    def values(self, keys: Keys, gear: DriveGeometry) -> tuple[Shape, tuple[float, ...]]:
+        given = SINES.given(self.id, keys)
+        SINES.some(self.id, given)
+        cycles = smallest_set(CYCLES, given)
+        shape = {"lines": int(needed(keys, "lines")), "shaft": Shaft(str(keys["shaft"])), "cycles": cycles}
+        return shape, SINES.coefficients(given, cycles)
+
+    def keys(self, shape: Shape, coefficients: Sequence[float], gear: DriveGeometry) -> dict[str, object]:
+        sines = SINES.written(shape["cycles"], coefficients)
+        return {"shaft": str(shape["shaft"]), "lines": int(shape["lines"])} | sines
+
+    def parameters(self, term: Term, estimate: FitEstimate) -> dict[str, Parameter]:
+        return {
+            "lines": counted(term.shape["lines"]),
+            "amplitude_arcmin": estimate.amplitude(0, 1),
+            "phase_deg": estimate.phase_deg(0, 1),
+        }
+
+    def sentence(self, shape: Shape, parameters: Mapping[str, Parameter], rms_arcmin: float) -> str:
+        return (
+            f"The {shape['shaft']} encoder interpolates unevenly between its {parameters['lines'].value:.0f} lines: "
+            f"{parameters['amplitude_arcmin'].value:.2g} arcmin at the output."
+        )
+
+
+def _strongest_lines(probe: Probe, lines: Array, per: float, highest: float, output: bool) -> set[float]:
+    """The strongest numbers of `lines`, `per` input turn each, alone and with their double; and a half or a third of
+    these where that shows too: the strongest line may be the second or third cycle of the encoder's own.
+    """
+    power = probe.spectrum(lines / per, output) ** 2
+    second = probe.spectrum(np.minimum(2 * lines / per, highest), output) ** 2
+    double = np.where(2 * lines / per < highest, second, 0.0)
+    strongest = {float(lines[i]) for score in (power, power + double) for i in np.argsort(score)[-2:]}
+    seen = dict(zip(lines.tolist(), power.tolist(), strict=True))
+    return strongest | {line // k for line in strongest for k in (2, 3) if seen.get(line / k, 0.0) > SHOWS * seen[line]}

@@ -1,0 +1,178 @@
+"""Tooth-to-tooth (short-wave) deviation: a ripple at the tooth-mesh order.
+
+Every input turn the wave generator passes Z_CS teeth of the circular spline and Z_FS (1 + 1/N) = Z_CS of the
+flexspline, so single-pitch and profile deviations (ISO 1328-1, f_pt and F_alpha) ripple at order Z_CS, with sidebands
+where the depth of mesh varies over the turn (orders Z_CS +- 1, +- 2) and, farther out, where the driving zone changes,
+each zone having a phase of its own: the short-wave part that Jia 2021, Sec. 2.2, leaves out. With two lobes and a tooth
+difference of 2, Z_CS = 2 (N + 1). Needs more than 2 Z_CS samples a turn. Units: arcmin at the output, or um of arc
+where it acts inside the zones, and also decides which one drives. Prior: 0 to 2 arcmin, 0 to 20 um.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from hdopt.drive.geometry import DriveGeometry
+from hdopt.effects.base import Effect, Keys
+from hdopt.effects.conditions import Array, Conditions
+from hdopt.effects.declared import UM, Sines, smallest_set
+from hdopt.effects.estimate import FitEstimate, Parameter
+from hdopt.effects.probe import Probe, best_terms
+from hdopt.effects.sines import sine_columns
+from hdopt.effects.term import Shape, Term
+from hdopt.errors import HdoptError
+
+Sides = tuple[int, ...]
+
+SIDEBANDS: tuple[Sides, ...] = (
+    (0,),
+    (0, -2, 2),
+    (0, -1, 1, -2, 2),
+    (0, -2, 2, -4, 4),
+    *((0, *range(-k, 0), *range(1, k + 1)) for k in (4, 7, 11)),
+)
+FEW = SIDEBANDS[:3]
+"""The variants of few lines."""
+ZONE_SIDEBANDS: tuple[Sides, ...] = ((0,), (0, -1, 1), (0, -1, 1, -2, 2))
+"""Inside the zones, whose change needs no sidebands of its own."""
+ZONE = 100
+"""Members ZONE z + k of the sines are the sideband k of the ripple inside zone z."""
+
+
+def _keys_of(offset: int) -> tuple[str, str]:
+    if offset == 0:
+        return "amplitude_arcmin", "phase_deg"
+    side = f"{'plus' if offset > 0 else 'minus'}_{abs(offset)}"
+    return f"amplitude_{side}_arcmin", f"phase_{side}_deg"
+
+
+def _zone_keys(zone: int, offset: int) -> tuple[str, str]:
+    amplitude, phase = _keys_of(offset)
+    return f"zone_{zone}_{amplitude.replace('arcmin', 'um')}", f"zone_{zone}_{phase}"
+
+
+BESIDE = Sines(
+    {k: _keys_of(k) for k in sorted({k for group in SIDEBANDS for k in group}, key=abs)},
+    "arcmin",
+    "at order Z_CS, and K cycles a turn beside it",
+    prior=(0.0, 2.0),
+    shown="`amplitude_arcmin`, `phase_deg`; `amplitude_plus_K_arcmin`, `amplitude_minus_K_arcmin` with phases, "
+    "K 1 to 11",
+)
+INSIDE = Sines(
+    {ZONE * zone + k: _zone_keys(zone, k) for zone in (1, 2) for k in ZONE_SIDEBANDS[-1]},
+    "um",
+    "of arc, the same inside zone Z",
+    prior=(0.0, 20.0),
+    scale=UM,
+    shown="`zone_Z_amplitude_um`, `zone_Z_amplitude_plus_K_um`, ... with phases, Z 1 and 2, K 1 and 2",
+)
+
+
+def mesh_order(ratio: float) -> float:
+    """Z_CS: teeth that the wave generator passes an input turn, for two lobes and a `ratio` N."""
+    return 2.0 * round(ratio + 1)
+
+
+def _zone_members(sides: Sides) -> list[int]:
+    return [ZONE * zone + k for zone in (1, 2) for k in sides]
+
+
+class ToothMesh(Effect):
+    id = "tooth_mesh"
+    place = 30
+    domain = "order"
+    high_order = True
+    needs_strain_wave = True
+    acts = "beside, or zones"
+    separating = "sample more than twice per tooth, at two speeds: the mesh ripple stays at Z_CS cycles a turn"
+    declared = (BESIDE, INSIDE)
+    examples = (
+        {"amplitude_arcmin": 0.05, "phase_deg": 10.0},
+        {
+            "amplitude_arcmin": 0.05,
+            "phase_deg": 10.0,
+            "amplitude_minus_2_arcmin": 0.02,
+            "phase_minus_2_deg": 20.0,
+            "amplitude_plus_2_arcmin": 0.01,
+            "phase_plus_2_deg": 30.0,
+        },
+        {
+            "zone_1_amplitude_um": 1.0,
+            "zone_1_phase_deg": 10.0,
+            "zone_2_amplitude_um": 1.5,
+            "zone_2_phase_deg": 20.0,
+            "zone_2_amplitude_minus_1_um": 0.2,
+            "zone_2_phase_minus_1_deg": 30.0,
+        },
+    )
+
+    def lacks(self, conditions: Conditions) -> str | None:
+        need = 2.05 * mesh_order(conditions.ratio)
+        if conditions.rows_per_turn < need:
+            return f"more than {need:.0f} samples an input turn (there are {conditions.rows_per_turn:.0f})"
+        return None
+
+    def search(self, probe: Probe) -> Sequence[Term]:
+        if not probe.order_range[0] < mesh_order(probe.samples.ratio) < probe.order_range[1]:
+            return []
+        # Not remembered: on the rows as recorded these are the widest columns of all.
+        terms = [self.term(probe.samples, {"sidebands": sides}) for sides in SIDEBANDS]
+        ranked = best_terms(probe, terms, len(terms))
+        # The best of the few-line variants beside the best of all: many sidebands also bend to what is none.
+        few = next(term for term in ranked if term.shape["sidebands"] in FEW)
+        return [few] if few is ranked[0] else [few, ranked[0]]
+
+    def in_zones(self, shape: Shape) -> Sequence[Shape]:
+        return [{"sidebands": sides, "zones": True} for sides in ZONE_SIDEBANDS]
+
+    def term(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
+        waves = sine_columns(conditions.theta, self.orders(shape, conditions.ratio))
+        if "zones" not in shape:
+            return Term(self.id, dict(shape), columns=waves, trials=len(SIDEBANDS))
+        none = np.zeros_like(waves)
+        zones = np.stack([np.column_stack([waves, none]), np.column_stack([none, waves])])
+        return Term(self.id, dict(shape), zones=zones, trials=len(ZONE_SIDEBANDS))
+
+    def orders(self, shape: Shape, ratio: float) -> list[float]:
+        return [mesh_order(ratio) + k for k in shape["sidebands"]]
+
+    def named_orders(self, shape: Shape, ratio: float) -> list[float]:
+        return []
+
+    def values(self, keys: Keys, gear: DriveGeometry) -> tuple[Shape, tuple[float, ...]]:
+        beside, inside = BESIDE.given(self.id, keys), INSIDE.given(self.id, keys)
+        BESIDE.some(self.id, beside | inside)
+        if not inside:
+            sides = smallest_set(SIDEBANDS, beside)
+            return {"sidebands": sides}, BESIDE.coefficients(beside, sides)
+        if beside:
+            raise HdoptError(
+                f"effects.{self.id} has both sines at the output and sines inside the zones; give those in _arcmin or "
+                "in _um"
+            )
+        sides = smallest_set(ZONE_SIDEBANDS, [member - ZONE * round(member / ZONE) for member in inside])
+        return {"sidebands": sides, "zones": True}, INSIDE.coefficients(inside, _zone_members(sides))
+
+    def keys(self, shape: Shape, coefficients: Sequence[float], gear: DriveGeometry) -> dict[str, object]:
+        if "zones" in shape:
+            return dict(INSIDE.written(_zone_members(shape["sidebands"]), coefficients))
+        return dict(BESIDE.written(shape["sidebands"], coefficients))
+
+    def parameters(self, term: Term, estimate: FitEstimate) -> dict[str, Parameter]:
+        if "zones" in term.shape:
+            second = term.width // 2
+            return {
+                "zone_1_amplitude_um": estimate.amplitude(0, 1, "um", scale=1e3),
+                "zone_1_phase_deg": estimate.phase_deg(0, 1),
+                "zone_2_amplitude_um": estimate.amplitude(second, second + 1, "um", scale=1e3),
+                "zone_2_phase_deg": estimate.phase_deg(second, second + 1),
+            }
+        return {"amplitude_arcmin": estimate.amplitude(0, 1), "phase_deg": estimate.phase_deg(0, 1)}
+
+    def sentence(self, shape: Shape, parameters: Mapping[str, Parameter], rms_arcmin: float) -> str:
+        return (
+            f"A ripple at the tooth-mesh order, {rms_arcmin:.2g} arcmin rms: tooth-to-tooth pitch or profile deviation."
+        )
