@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hdopt.diagnosis.samples import Samples
-
-Array = NDArray[np.float64]
+from hdopt.effects.conditions import Array, Conditions
 
 RPM = 2 * np.pi / 60
 """rad/s in a revolution per minute."""
@@ -37,11 +34,11 @@ class Operation:
     def directions(self) -> tuple[float, ...]:
         return MOTIONS[self.motion]
 
-    def rows(self, ratio: float, theta: Array, direction: float, span: float) -> Samples:
-        """What an effect knows of the input angles `theta` (rad, shape (n,)), passed in `direction` (+1, -1).
+    def conditions(self, ratio: float, theta: Array, direction: float, span: float) -> Conditions:
+        """What an effect knows of input angles `theta` (rad, (n,)) passed in `direction` (+1, -1), at `ratio` N.
 
         A pass runs from 0 to `span` (rad) or back. Of a motion in both directions the first row is an extra one, the
-        end of the pass before, from which friction and play take their start; `rows_of_pass` leaves it out again.
+        end of the pass before, from which friction and play take their start; `of_pass` leaves it out again.
         """
         reverses = self.motion == "both"
         start = 0.0 if direction > 0 else span
@@ -57,28 +54,23 @@ class Operation:
             waited = span if reverses and direction < 0 else 0.0
             time = (self.time or 0.0) + (waited + travel) / self.speed
         one = np.zeros(n, np.int64)
-        return Samples(
+        return Conditions(
             ratio=ratio,
             theta=theta,
-            error=np.zeros(n),
             direction=way,
             travel=np.degrees(travel) / ratio,
             first=first,
             record=one,
             piece=one,
-            block=one,
-            weight=np.ones(n),
             time=time,
             speed=None if self.speed is None else way * self.speed,
             torque=_constant(self.torque, n),
             temperature=_constant(self.temperature_difference, n),
-            locked=False,
-            quantum=0.0,
             output=theta / ratio,  # its reading lacks the error itself, a phase of the encoder's lines
         )
 
-    def rows_of_pass(self, values: Array) -> Array:
-        """`values` along `rows` (last axis) without the row that only stands for the pass before."""
+    def of_pass(self, values: Array) -> Array:
+        """`values` along `conditions` (last axis) without the row that only stands for the pass before."""
         return values[..., 1:] if self.motion == "both" else values
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hdopt.extended.model import ExtendedModel
 from hdopt.kinematics.extremes import CANDIDATES, zoom_lowest
+from hdopt.simulation.model import ExtendedModel
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ def extremes_arcmin(model: ExtendedModel) -> tuple[float, float]:
 
 
 def peak_to_peak_arcmin(model: ExtendedModel) -> float:
-    """Supremum less infimum, arcmin."""
+    """Supremum less infimum of the kinematic error of `model` over one full relative turn, arcmin."""
     low, high = extremes_arcmin(model)
     return high - low
 

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hdopt.deviations import DriveErrors
-from hdopt.drive import Drive
+from hdopt.drive.errors import DriveErrors
+from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
-from hdopt.extended.effects import AddedEffect
-from hdopt.extended.model import ExtendedModel
-from hdopt.extended.operation import Operation
 from hdopt.kinematics.closed_form import tip_geometry
 from hdopt.kinematics.waveform import full_turn
+from hdopt.parallel.shared_memory import in_blocks
+from hdopt.simulation.effect_values import EffectValues
+from hdopt.simulation.model import ExtendedModel
+from hdopt.simulation.operation import Operation
 
 Array = NDArray[np.float64]
 
@@ -57,8 +56,8 @@ class AddedTable:
         return float(np.ptp(self.zones))
 
 
-def tabulate(drive: Drive, effects: Sequence[AddedEffect], operation: Operation) -> AddedTable:
-    """The table of these effects for a drive's ratio and operating condition.
+def tabulate(drive: Drive, effects: Sequence[EffectValues], operation: Operation) -> AddedTable:
+    """The table of these `effects` for the ratio of `drive` at the condition `operation`.
 
     Raises `HdoptError` for effects that are no function of the angle alone, or too fine for the table.
     """
@@ -72,6 +71,10 @@ def tabulate(drive: Drive, effects: Sequence[AddedEffect], operation: Operation)
         raise HdoptError(
             f"{', '.join(effect.id for effect in model.too_fine)} is a ripple too fine for tolerances and searches; "
             "leave the bench out with operation.include=drive, or remove the effect"
+        )
+    if drive.has_measured_teeth:
+        raise HdoptError(
+            "effects and measured teeth go together in ke only; leave either out, as with operation.include=none"
         )
     if not drive.wave_generator.profile.tip_is_smooth:
         raise HdoptError(
@@ -90,33 +93,24 @@ def tabulate(drive: Drive, effects: Sequence[AddedEffect], operation: Operation)
     )
 
 
-def matrix_peak_to_peak_arcmin(
-    drive: Drive, matrix: Array, added: AddedTable, homogenization: float = 1.0, workers: int | None = None
-) -> Array:
-    """Peak-to-peak (arcmin) of drives with errors as rows of `DriveErrors.to_matrix`, (n, 12) -> (n,), and effects.
+def matrix_peak_to_peak_arcmin(drive: Drive, matrix: Array, added: AddedTable, homogenization: float = 1.0) -> Array:
+    """Peak-to-peak (arcmin) of drives with errors as rows of `matrix` (`DriveErrors.to_matrix`), (n, 12) -> (n,), and
+    the effects of the table `added`.
 
-    `homogenization` is k_e, which evens out what the zones drive. Within 1e-3 arcmin of `extended.extremes` in the
-    closed form (a test measures it). `workers` threads, all cores if None.
+    `homogenization` is k_e, which evens out what the zones drive. Within 1e-3 arcmin of `simulation.extremes` in the
+    closed form (a test measures it).
     """
-    from hdopt.extended.kernel import extended_block
+    from hdopt.simulation.walk_kernel import extended_block
 
     matrix = np.ascontiguousarray(matrix, dtype=np.float64)
     out = np.empty(len(matrix))
     constants = _constants(drive, homogenization)
     coarse_zones, coarse_beside = added.walked
 
-    def fill(start: int) -> None:
-        rows = slice(start, start + BLOCK)
+    def fill(rows: slice) -> None:
         extended_block(*constants, matrix[rows], added.zones, added.beside, coarse_zones, coarse_beside, out[rows])
 
-    starts = range(0, len(matrix), BLOCK)
-    workers = min(workers or os.cpu_count() or 1, len(starts))
-    if workers <= 1:
-        for start in starts:
-            fill(start)
-    else:
-        with ThreadPoolExecutor(workers) as pool:
-            list(pool.map(fill, starts))
+    in_blocks(len(matrix), BLOCK, fill)
     return out
 
 
@@ -147,9 +141,9 @@ class LocalExtremes:
 def local_extremes(drive: Drive, row: Array, added: AddedTable, most: int) -> tuple[LocalExtremes, LocalExtremes]:
     """The lowest minima and the highest maxima of one drive, each at another place of the input turn, `most` of each.
 
-    `row` (12) holds its errors as in ERROR_NAMES.
+    `row` (12) holds its errors as in ERROR_NAMES, `added` the table of its effects.
     """
-    from hdopt.extended.kernel import extended_walk
+    from hdopt.simulation.walk_kernel import extended_walk
 
     values = extended_walk(*_constants(drive), np.ascontiguousarray(row), *added.walked)
     step = 2 * math.pi * drive.geometry.beat_phases / values.shape[1]
@@ -174,7 +168,7 @@ def local_extremes(drive: Drive, row: Array, added: AddedTable, most: int) -> tu
 
 
 def _near(drive: Drive, row: Array, added: AddedTable, at: LocalExtremes, half: float) -> Array:
-    from hdopt.extended.kernel import extended_near
+    from hdopt.simulation.walk_kernel import extended_near
 
     row = np.ascontiguousarray(row)
     return extended_near(
@@ -185,6 +179,6 @@ def _near(drive: Drive, row: Array, added: AddedTable, at: LocalExtremes, half: 
 def _constants(drive: Drive, homogenization: float = 1.0):
     """What the compiled walk knows of a drive besides its errors."""
     gear = drive.geometry
-    advance = gear.circular_spline_teeth / gear.flexspline_teeth
+    advance = gear.flexspline_advance
     scale = homogenization * gear.arcmin_per_mm
     return tip_geometry(drive), math.tan(gear.pressure_angle), advance, gear.beat_phases, scale

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hdopt.deviations import DriveErrors
-from hdopt.drive import Drive
+from hdopt.drive.errors import DriveErrors
+from hdopt.drive.geometry import Drive
+from hdopt.effects.term import Term
 from hdopt.errors import MissingValue
-from hdopt.extended.effects import AddedEffect
-from hdopt.extended.operation import NO_LOAD, Operation
 from hdopt.kinematics.waveform import full_turn, relative_turn_deviation, zone_deviation
+from hdopt.simulation.effect_values import EffectValues
+from hdopt.simulation.operation import NO_LOAD, Operation
 
 Array = NDArray[np.float64]
 
@@ -38,7 +39,7 @@ class ExtendedModel:
 
     drive: Drive
     errors: DriveErrors
-    effects: tuple[AddedEffect, ...]
+    effects: tuple[EffectValues, ...]
     operation: Operation = NO_LOAD
     homogenization: float = 1.0
     geometry: str = "exact"
@@ -65,12 +66,12 @@ class ExtendedModel:
         return int(np.clip(math.ceil(PER_PERIOD * highest), FEWEST_PER_TURN, MOST_PER_TURN))
 
     @property
-    def too_fine(self) -> tuple[AddedEffect, ...]:
+    def too_fine(self) -> tuple[EffectValues, ...]:
         """Effects whose ripple is finer than the grid over the relative turn resolves."""
         most = self.samples_per_turn / FEWEST_PER_PERIOD
         return tuple(effect for effect in self.effects if effect.highest_order(self.ratio) > most)
 
-    def with_effects(self, effects: Sequence[AddedEffect]) -> ExtendedModel:
+    def with_effects(self, effects: Sequence[EffectValues]) -> ExtendedModel:
         """The same drive with these effects only."""
         return replace(self, effects=tuple(effects))
 
@@ -89,14 +90,14 @@ class ExtendedModel:
     def driven(self, theta: Array, deviation: Array, direction: float = 1.0) -> Array:
         """What the driving zone makes of the base's `deviation`, mm, shape (2, n), and the zones' effects, arcmin."""
         driving = np.max(deviation + self.in_zones(theta, direction), axis=0)
-        return self.homogenization * self.drive.geometry.arcmin_per_mm * driving
+        return np.asarray(self.homogenization * self.drive.geometry.arcmin_per_mm * driving)
 
     def in_zones(self, theta: Array, direction: float = 1.0) -> Array:
         """What effects add to the deviation of each meshing zone, mm of arc, shape (2, n)."""
         added = np.zeros((2, len(theta)))
         for effect, term in self._terms(theta, direction):
             if term.zones is not None:
-                added += self.operation.rows_of_pass(term.zones @ np.array(effect.coefficients))
+                added += self.operation.of_pass(term.zones @ np.array(effect.coefficients))
         return added
 
     def beside(self, theta: Array, direction: float = 1.0) -> Array:
@@ -106,14 +107,14 @@ class ExtendedModel:
             added += np.interp(theta, grid, values, period=self.span)
         return added
 
-    def _columns(self, theta: Array, direction: float):
+    def _columns(self, theta: Array, direction: float) -> Iterator[tuple[EffectValues, Array]]:
         """The effects that add to the kinematic error itself, and what each adds, arcmin, (n,)."""
         for effect, term in self._terms(theta, direction):
             if term.columns is not None:
-                yield effect, self.operation.rows_of_pass(term.columns @ np.array(effect.coefficients))
+                yield effect, self.operation.of_pass(term.columns @ np.array(effect.coefficients))
 
-    def _terms(self, theta: Array, direction: float):
-        rows = self.operation.rows(self.ratio, theta, direction, self.span)
+    def _terms(self, theta: Array, direction: float) -> list[tuple[EffectValues, Term]]:
+        rows = self.operation.conditions(self.ratio, theta, direction, self.span)
         return [(effect, effect.term(rows)) for effect in self.effects if not effect.follows_base]
 
     @cached_property
@@ -130,7 +131,7 @@ class ExtendedModel:
             order = slice(None, None, int(direction))
             moving = [values for effect, values in self._columns(theta, direction) if effect.moves_the_output]
             excitation = sum(moving, self.driven(theta, deviation, direction))[order]
-            rows = running.rows(self.ratio, full_turn(self.drive, self.samples_per_turn), 1.0, self.span)
+            rows = running.conditions(self.ratio, full_turn(self.drive, self.samples_per_turn), 1.0, self.span)
             settled[direction] = tuple(
                 (theta, (effect.term(rows, excitation).columns @ np.array(effect.coefficients))[order])
                 for effect in followers

@@ -1,0 +1,315 @@
+"""The compiled walk: converged peak-to-peak of one drive with effects, whose values over a relative turn are a table.
+
+Effects break the order that lets the base's kernel look at one input turn only, so every turn is walked: on a grid of
+angles first, then by golden section around the best local extremes. The base is the closed form
+(Jia 2021, Eqs. (16) to (32)); effects are interpolated in their table.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from hdopt.kinematics import closed_form
+
+OPTIONS = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "afn"}}
+inlined = njit(inline="always", **OPTIONS)
+compiled = njit(**OPTIONS)
+
+rigid_motion = inlined(closed_form.rigid_motion)
+rim_constants = inlined(closed_form.rim_constants)
+motion_at = inlined(closed_form.motion_at)
+rim_depth = inlined(closed_form.rim_depth)
+tooth_deviation = inlined(closed_form.tooth_deviation)
+
+CANDIDATES = 40
+"""Local extremes of the grid that are followed, on either side."""
+STEPS = 16
+"""Golden-section steps: a cell of 2 deg shrinks to 1e-3 deg."""
+GOLDEN = (math.sqrt(5) - 1) / 2
+CELLS, BISECTIONS, MOST_CUTS = 120, 34, 16
+"""Cells of an input turn in which changes of rim are looked for, halvings that place one (within 1e-11 rad), and most.
+"""
+EDGE = 1e-9
+"""Distance from a change of rim (rad) at which either side is evaluated: slopes of 10 arcmin/rad move it by 1e-8."""
+
+
+@inlined
+def _rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, s):
+    """Deviation (mm of arc) of zone s (+1, -1) without its FS teeth, and the FS offset o', at the deeper rim."""
+    e_a, e_l, t_a, t_l = motion_at(motion, cos, sin)
+    depth, o, o_fs = rim_depth(rim, e_a, e_l, t_a, t_l, s, 1.0)
+    other, o_other, o_fs_other = rim_depth(rim, e_a, e_l, t_a, t_l, s, -1.0)
+    if other > depth:
+        depth, o, o_fs = other, o_other, o_fs_other
+    return tan_alpha * depth + tooth_deviation(cs_cos, cs_sin, cos, sin, s, math.cos(o), math.sin(o)), o_fs
+
+
+@compiled
+def _at(drive, theta, zones, beside):
+    """Kinematic error (arcmin) at `theta` (rad), with effects interpolated in `zones` (2, n, mm) and `beside` (n)."""
+    rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, scale, span = drive
+    cos, sin = math.cos(theta), math.sin(theta)
+    one, o_one = _rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, 1.0)
+    two, o_two = _rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, -1.0)
+    n = len(beside)
+    place = theta / span
+    place = (place - math.floor(place)) * n
+    i = int(place) % n
+    share = place - int(place)
+    j = (i + 1) % n
+    phase = advance * theta + fs_phase
+    one += a_fs * math.sin(phase + o_one) + zones[0, i] + share * (zones[0, j] - zones[0, i])
+    two += -a_fs * math.sin(phase - o_two) + zones[1, i] + share * (zones[1, j] - zones[1, i])
+    return scale * max(one, two) + beside[i] + share * (beside[j] - beside[i])
+
+
+@inlined
+def _rims_apart(drive, theta, s):
+    """How much deeper (mm) rim 1 than rim 2 lies in zone s at `theta`."""
+    e_a, e_l, t_a, t_l = motion_at(drive[1], math.cos(theta), math.sin(theta))
+    depth, _, _ = rim_depth(drive[0], e_a, e_l, t_a, t_l, s, 1.0)
+    other, _, _ = rim_depth(drive[0], e_a, e_l, t_a, t_l, s, -1.0)
+    return depth - other
+
+
+@compiled
+def _switches(drive, cuts):
+    """Angles of an input turn (rad) at which the deeper rim of a zone changes, into `cuts`; how many.
+
+    There the deepest point jumps along the tooth, and with it what the teeth add: an extreme may stand at either side.
+    """
+    found, cell = 0, 2 * math.pi / CELLS
+    for s in (1.0, -1.0):
+        before = _rims_apart(drive, 0.0, s) > 0
+        for k in range(1, CELLS + 1):
+            right = k * cell
+            after = _rims_apart(drive, right, s) > 0
+            if after != before and found < len(cuts):
+                left = right - cell
+                for _ in range(BISECTIONS):
+                    middle = 0.5 * (left + right)
+                    if (_rims_apart(drive, middle, s) > 0) == before:
+                        left = middle
+                    else:
+                        right = middle
+                cuts[found] = 0.5 * (left + right)
+                found += 1
+            before = after
+    return found
+
+
+@compiled
+def _between(cuts, centre, half, ends):
+    """`centre` - `half`, those of `cuts` (one turn's) that lie within, rising, and `centre` + `half`; how many."""
+    ends[0] = centre - half
+    found = 1
+    for k in range(len(cuts)):
+        off = cuts[k] - centre
+        off -= 2 * math.pi * round(off / (2 * math.pi))
+        if abs(off) < half:
+            at = found
+            while at > 1 and ends[at - 1] > centre + off:
+                ends[at] = ends[at - 1]
+                at -= 1
+            ends[at] = centre + off
+            found += 1
+    ends[found] = centre + half
+    return found + 1
+
+
+@compiled
+def _lowest_between(drive, low, high, sign, zones, beside, steps):
+    """Least of sign times the kinematic error between `low` and `high`, ends included, and where, by golden section."""
+    left, right = sign * _at(drive, low, zones, beside), sign * _at(drive, high, zones, beside)
+    least, where = (left, low) if left < right else (right, high)
+    x, y = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    at_x, at_y = sign * _at(drive, x, zones, beside), sign * _at(drive, y, zones, beside)
+    for _ in range(steps):
+        if at_x < at_y:
+            high, y, at_y = y, x, at_x
+            x = high - GOLDEN * (high - low)
+            at_x = sign * _at(drive, x, zones, beside)
+        else:
+            low, x, at_x = x, y, at_y
+            y = low + GOLDEN * (high - low)
+            at_y = sign * _at(drive, y, zones, beside)
+    inner, place = (at_x, x) if at_x < at_y else (at_y, y)
+    return (inner, place) if inner < least else (least, where)
+
+
+@compiled
+def _lowest_near(drive, cuts, centre, half, sign, zones, beside, steps):
+    """Least of sign times the kinematic error within `half` of `centre`, and where: between the changes of rim."""
+    ends = np.empty(len(cuts) + 2)
+    count = _between(cuts, centre, half, ends)
+    least, where = math.inf, centre
+    for k in range(count - 1):
+        if ends[k + 1] - ends[k] > 4 * EDGE:
+            low, high = ends[k] + EDGE, ends[k + 1] - EDGE
+            value, place = _lowest_between(drive, low, high, sign, zones, beside, steps)
+            if value < least:
+                least, where = value, place
+    return least, where
+
+
+@compiled
+def _follow(drive, cuts, values, sign, zones, beside, best, places, least):
+    """Least of sign times the kinematic error over the turn, from its `values` on an even grid of the turn; `least` is
+    one that is known already.
+
+    Local extremes of the grid are followed in order of how deep they may reach: within a cell a kink or a trough lies
+    no deeper than the steeper of its sides falls.
+    """
+    n, kept = len(values), 0
+    worst_kept = math.inf
+    for i in range(n):
+        value, before, after = sign * values[i], sign * values[i - 1], sign * values[(i + 1) % n]
+        if value > before or value > after:
+            continue
+        reach = 2 * value - max(before, after)
+        if reach >= worst_kept:
+            continue
+        at = kept if kept < CANDIDATES else CANDIDATES - 1
+        while at > 0 and best[at - 1] > reach:
+            best[at], places[at] = best[at - 1], places[at - 1]
+            at -= 1
+        best[at], places[at] = reach, i
+        kept = min(kept + 1, CANDIDATES)
+        if kept == CANDIDATES:
+            worst_kept = best[kept - 1]
+    step = drive[9] / n
+    for k in range(kept):
+        if best[k] >= least:
+            break
+        found, _ = _lowest_near(drive, cuts, places[k] * step, step, sign, zones, beside, STEPS)
+        least = min(least, found, sign * values[places[k]])
+    return least
+
+
+@compiled
+def _extremes_at_switches(drive, cuts, turns, zones, beside):
+    """Least and largest kinematic error (arcmin) at either side of every change of rim, over all turns: these lie at
+    the same input angles in every turn, and only the phase of the FS teeth moves on.
+    """
+    rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, scale, span = drive
+    n, least, largest = len(beside), math.inf, -math.inf
+    for k in range(2 * len(cuts)):
+        theta = cuts[k // 2] + (EDGE if k % 2 else -EDGE)
+        cos, sin = math.cos(theta), math.sin(theta)
+        one, o_one = _rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, 1.0)
+        two, o_two = _rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, -1.0)
+        phase = advance * theta + fs_phase
+        one_sin, one_cos = a_fs * math.sin(phase + o_one), a_fs * math.cos(phase + o_one)
+        two_sin, two_cos = -a_fs * math.sin(phase - o_two), -a_fs * math.cos(phase - o_two)
+        start = theta / span
+        start = (start - math.floor(start)) * n
+        for t in range(turns):
+            turned = 2 * math.pi * advance * t
+            cos_t, sin_t = math.cos(turned), math.sin(turned)
+            place = start + t * (n / turns)
+            i = int(place)
+            share = place - i
+            i %= n
+            j = (i + 1) % n
+            first = one + cos_t * one_sin + sin_t * one_cos + zones[0, i] + share * (zones[0, j] - zones[0, i])
+            second = two + cos_t * two_sin + sin_t * two_cos + zones[1, i] + share * (zones[1, j] - zones[1, i])
+            value = scale * max(first, second) + beside[i] + share * (beside[j] - beside[i])
+            least, largest = min(least, value), max(largest, value)
+    return least, largest
+
+
+@compiled
+def _walk(drive, per_turn, turns, zones, beside, grid, values):
+    """Fill `values` (turns * per_turn) with the kinematic error (arcmin) on an even grid of the relative turn.
+
+    Without its FS teeth a zone repeats every input turn; their phase moves on by as much from turn to turn. `grid`
+    (6, per_turn) holds, for both zones, that part and the FS teeth's sine and cosine part.
+    """
+    rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, scale, _ = drive
+    for g in range(per_turn):
+        theta = 2 * math.pi * g / per_turn
+        cos, sin = math.cos(theta), math.sin(theta)
+        one, o_one = _rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, 1.0)
+        two, o_two = _rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, -1.0)
+        phase = advance * theta + fs_phase
+        grid[0, g], grid[1, g] = one, two
+        grid[2, g], grid[3, g] = a_fs * math.sin(phase + o_one), a_fs * math.cos(phase + o_one)
+        grid[4, g], grid[5, g] = -a_fs * math.sin(phase - o_two), -a_fs * math.cos(phase - o_two)
+    for t in range(turns):
+        turned = 2 * math.pi * advance * t
+        cos, sin = math.cos(turned), math.sin(turned)
+        start = t * per_turn
+        for g in range(per_turn):
+            one = grid[0, g] + cos * grid[2, g] + sin * grid[3, g] + zones[0, start + g]
+            two = grid[1, g] + cos * grid[4, g] + sin * grid[5, g] + zones[1, start + g]
+            driving = one if one > two else two
+            values[start + g] = scale * driving + beside[start + g]
+
+
+@compiled
+def _drive_of(tip, tan_alpha, advance, turns, scale, e):
+    """All that the kinematic error at one angle needs; `e` (12) holds the errors as in ERROR_NAMES."""
+    motion = rigid_motion(
+        tip,
+        e[0] * math.sin(e[1]),
+        e[0] * math.cos(e[1]),
+        math.tan(e[3]),
+        math.tan(e[2]),
+        e[4] * math.cos(e[5]),
+        e[4] * math.sin(e[5]),
+        math.tan(e[6]),
+        math.tan(e[7]),
+    )
+    cs_cos, cs_sin = e[8] * math.sin(e[9]), e[8] * math.cos(e[9])
+    return (rim_constants(tip), motion, cs_cos, cs_sin, tan_alpha, e[10], e[11], advance, scale, 2 * math.pi * turns)
+
+
+@njit(cache=True, nogil=True, **OPTIONS)
+def extended_block(tip, tan_alpha, advance, turns, scale, matrix, zones, beside, coarse_zones, coarse_beside, out):
+    """Fill `out` (n,) with the peak-to-peak (arcmin) of each row of `matrix` (n, 12), errors as in ERROR_NAMES.
+
+    `zones` (d, 2, m) in mm and `beside` (d, m) in arcmin are the effects on an even grid of the relative turn of
+    `turns` input turns, for each of d directions of motion; `coarse_...` the same on the grid that is walked first.
+    """
+    directions, walked = coarse_beside.shape
+    per_turn = walked // turns
+    values, grid = np.empty(walked), np.empty((6, per_turn))
+    best, places, every_cut = np.empty(CANDIDATES), np.empty(CANDIDATES, np.int64), np.empty(MOST_CUTS)
+    for row in range(matrix.shape[0]):
+        drive = _drive_of(tip, tan_alpha, advance, turns, scale, matrix[row])
+        cuts = every_cut[: _switches(drive, every_cut)]
+        lowest, highest = math.inf, -math.inf
+        for d in range(directions):
+            _walk(drive, per_turn, turns, coarse_zones[d], coarse_beside[d], grid, values)
+            low, high = _extremes_at_switches(drive, cuts, turns, zones[d], beside[d])
+            lowest = min(lowest, _follow(drive, cuts, values, 1.0, zones[d], beside[d], best, places, low))
+            highest = max(highest, -_follow(drive, cuts, values, -1.0, zones[d], beside[d], best, places, -high))
+        out[row] = highest - lowest
+
+
+@njit(cache=True, nogil=True, **OPTIONS)
+def extended_walk(tip, tan_alpha, advance, turns, scale, row, coarse_zones, coarse_beside):
+    """Kinematic error (arcmin) of one drive on the grid of the first walk, for each direction: shape (d, walked)."""
+    directions, walked = coarse_beside.shape
+    values, grid = np.empty((directions, walked)), np.empty((6, walked // turns))
+    drive = _drive_of(tip, tan_alpha, advance, turns, scale, row)
+    for d in range(directions):
+        _walk(drive, walked // turns, turns, coarse_zones[d], coarse_beside[d], grid, values[d])
+    return values
+
+
+@njit(cache=True, nogil=True, **OPTIONS)
+def extended_near(tip, tan_alpha, advance, turns, scale, row, zones, beside, way, theta, half, sign, steps):
+    """Least of sign times the kinematic error (arcmin) within `half` (rad) of each of `theta` (k) in the direction
+    `way` (k), and where: shape (2, k)."""
+    found = np.empty((2, len(theta)))
+    drive = _drive_of(tip, tan_alpha, advance, turns, scale, row)
+    every_cut = np.empty(MOST_CUTS)
+    cuts = every_cut[: _switches(drive, every_cut)]
+    for k in range(len(theta)):
+        d = way[k]
+        found[0, k], found[1, k] = _lowest_near(drive, cuts, theta[k], half, sign, zones[d], beside[d], steps)
+    return found
