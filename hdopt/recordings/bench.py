@@ -1,0 +1,151 @@
+"""A bench file (`bench.toml`): what holds for all recordings of one bench, said once.
+
+Columns with units, signs, counts a turn, gears, sensor steps and calibration; the ratio; the sign of the torque.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from hdopt.errors import HdoptError, unknown_name
+from hdopt.recordings.columns import Column
+from hdopt.recordings.units import CHANNEL_UNITS, parse_unit
+
+BENCH_KEYS = ("name", "ratio", "columns")
+COLUMN_KEYS = ("column", "unit", "counts_per_turn", "gear", "sign", "step_deg", "uncertainty_arcsec", "calibration")
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A bench: its columns by channel, and the `ratio` of its drive where all its recordings share one."""
+
+    name: str = ""
+    ratio: float | None = None
+    columns: Mapping[str, Column] = field(default_factory=dict)
+
+
+def load_bench(path: Path) -> Bench:
+    """A bench file, checked; raises `HdoptError` with the file and the key where it is not sound.
+
+    `path` is the TOML file.
+    """
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise HdoptError(f"no file {path}; give a bench file, or make one with hdopt inspect --write-bench") from error
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise HdoptError(f"{path.name} cannot be read as TOML: {str(error).splitlines()[0][:200]}") from error
+    for key in content:
+        if key not in BENCH_KEYS:
+            raise HdoptError(f"{path.name}: {unknown_name('key', key, BENCH_KEYS)}")
+    ratio = content.get("ratio")
+    if ratio is not None and not _is_positive(ratio):
+        raise HdoptError(f"{path.name}: ratio is {ratio!r}; give a finite number above 0")
+    columns = content.get("columns", {})
+    if not isinstance(columns, dict):
+        raise HdoptError(f"{path.name}: columns must be tables [columns.input], [columns.output], ...")
+    return Bench(
+        str(content.get("name", "")),
+        None if ratio is None else float(ratio),
+        {channel: _column(path.name, channel, entry) for channel, entry in columns.items()},
+    )
+
+
+def _is_positive(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and value > 0
+
+
+def _column(file: str, channel: str, entry: Any) -> Column:
+    where = f"{file}: [columns.{channel}]"
+    if channel not in CHANNEL_UNITS:
+        raise HdoptError(f"{file}: {unknown_name('channel', channel, CHANNEL_UNITS)}")
+    if not isinstance(entry, dict) or not isinstance(entry.get("column"), str):
+        raise HdoptError(f"{where} needs column = the column's name or path in the file")
+    for key in entry:
+        if key not in COLUMN_KEYS:
+            raise HdoptError(f"{where}: {unknown_name('key', key, COLUMN_KEYS)}")
+    for key in ("counts_per_turn", "gear"):
+        if key in entry and not _is_positive(entry[key]):
+            raise HdoptError(f"{where} {key} is {entry[key]!r}; give a finite number above 0")
+    sign = entry.get("sign", 1)
+    if sign not in (1, -1):
+        raise HdoptError(f"{where} sign is {sign!r}; give 1 or -1")
+    unit = str(entry.get("unit", ""))
+    if "counts_per_turn" in entry:
+        unit = f"counts/{entry['counts_per_turn']}"
+    if "gear" in entry and entry["gear"] != 1:
+        unit += f"/gear{entry['gear']}"
+    try:
+        if unit:
+            parse_unit(channel, unit)
+    except HdoptError as error:
+        raise HdoptError(f"{where}: {error}") from error
+    return Column(
+        entry["column"],
+        unit,
+        float(sign),
+        _calibration(where, entry.get("calibration", [])),
+        _not_negative(where, "step_deg", entry),
+        _not_negative(where, "uncertainty_arcsec", entry),
+    )
+
+
+def _not_negative(where: str, key: str, entry: Mapping[str, Any]) -> float:
+    value = entry.get(key, 0.0)
+    if value != 0 and not _is_positive(value):
+        raise HdoptError(f"{where} {key} is {value!r}; give a finite number, 0 or above")
+    return float(value)
+
+
+def _calibration(where: str, pairs: Any) -> tuple[tuple[float, float], ...]:
+    try:
+        found = tuple((float(angle), float(off)) for angle, off in pairs)
+    except (TypeError, ValueError) as error:
+        raise HdoptError(f"{where} calibration must be pairs [reading_deg, deviation_arcsec]") from error
+    angles = [angle for angle, _ in found]
+    if any(not math.isfinite(a + b) for a, b in found) or angles != sorted(set(angles)):
+        raise HdoptError(f"{where} calibration needs finite numbers, its angles rising and each once")
+    if found and not (angles[0] >= 0 and angles[-1] < 360):
+        raise HdoptError(f"{where} calibration runs from {angles[0]:g} to {angles[-1]:g} deg; keep to 0 to below 360")
+    return found
+
+
+def bench_text(columns: Mapping[str, Column], ratio: float | None, name: str = "") -> str:
+    """The text of a bench file that says what `columns` and `ratio` say.
+
+    `name` is what the bench is called.
+    """
+    import tomlkit
+
+    document = tomlkit.document()
+    document.add(tomlkit.comment("A bench, for hdopt --bench: what holds for all of its recordings."))
+    if name:
+        document["name"] = name
+    if ratio is not None:
+        document["ratio"] = ratio
+    tables = tomlkit.table(is_super_table=True)
+    for channel, column in columns.items():
+        entry = tomlkit.table()
+        entry["column"] = column.name
+        word, *parts = column.unit.split("/")
+        if word == "counts":
+            entry["counts_per_turn"] = float(parts.pop(0))
+        elif word:
+            entry["unit"] = word
+        for part in parts:
+            entry["gear"] = float(part.removeprefix("gear"))
+        entry["sign"] = int(column.sign)
+        if column.step_deg:
+            entry["step_deg"] = column.step_deg
+        if column.uncertainty_arcsec:
+            entry["uncertainty_arcsec"] = column.uncertainty_arcsec
+        if column.calibration:
+            entry["calibration"] = [list(pair) for pair in column.calibration]
+        tables[channel] = entry
+    document["columns"] = tables
+    return tomlkit.dumps(document)

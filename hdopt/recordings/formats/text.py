@@ -1,0 +1,245 @@
+"""Tables as text, as loggers and people write them.
+
+Separator, decimal sign, encoding, comment lines, a preamble, a row of units beneath the header and a missing header are
+told from the first lines; what was told is said in the notes. PHD2 guide logs are text too and go to their own reader.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import gzip
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hdopt.errors import HdoptError
+from hdopt.recordings.table import Channel, Table
+
+SAMPLE_BYTES = 65_536
+COMMENTS = ("#", "%", "//", '"#', "!")
+SEPARATORS = (";", "\t", "|", ",", " ")
+SEPARATOR_NAMES = {";": "semicolon", "\t": "tab", "|": "bar", ",": "comma", " ": "blanks"}
+NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?|[-+]?(nan|inf|infinity)", re.IGNORECASE)
+MISSING = ("", "na", "n/a", "null", "none", "-", "--", "nan")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a text file is written: `separator`, `decimal` sign, `header` names, `units` beneath them (empty where there
+    is no such row), and the number of the first line of numbers."""
+
+    encoding: str
+    separator: str
+    decimal: str
+    header: tuple[str, ...]
+    units: tuple[str, ...]
+    first_row: int
+    comments: int
+
+
+def read(path: Path, wanted: Sequence[str] | None) -> Table:
+    """A text table; only the `wanted` columns where they are all there.
+
+    `path` of the file; `wanted` names the columns that will be used, None for all.
+    """
+    import pandas as pd
+
+    raw = _open(path)
+    encoding = _encoding(raw)
+    lines = raw.decode(encoding, errors="replace").splitlines()
+    if lines and lines[0].startswith("PHD2 version"):
+        from hdopt.recordings.formats.phd2 import read as read_guide_log
+
+        return read_guide_log(path, wanted)
+    layout = find_layout(lines if len(raw) < SAMPLE_BYTES else lines[:-1], encoding, path.name)
+    names = list(layout.header)
+    use = list(wanted) if wanted and set(wanted) <= set(names) else None
+    frame = pd.read_csv(
+        path,
+        sep=r"\s+" if layout.separator == " " else layout.separator,
+        decimal=layout.decimal,
+        encoding=layout.encoding,
+        compression="gzip" if path.suffix.lower() == ".gz" else None,
+        header=None,
+        names=names,
+        index_col=False,
+        usecols=use,
+        skiprows=layout.first_row,
+        comment="#",
+        skipinitialspace=True,
+        low_memory=False,
+        on_bad_lines="skip",
+        na_values=["-", "--"],
+    )
+    units = dict(zip(names, layout.units, strict=False))
+    channels: dict[str, Channel] = {}
+    for name in [str(column) for column in frame]:
+        channels[name] = Channel(_values(frame.pop(name), layout.decimal), units.get(name, ""))
+    return Table(channels, _notes(layout))
+
+
+def _notes(layout: Layout) -> tuple[str, ...]:
+    separator = SEPARATOR_NAMES[layout.separator]
+    text = f"text in {layout.encoding.removesuffix('-sig')}, separated by {separator}"
+    if layout.decimal == ",":
+        text += ", with decimal commas"
+    if layout.units:
+        text += ", units in a row of their own"
+    if layout.comments:
+        text += f", {layout.comments} lines of comment or preamble left out"
+    return (text,)
+
+
+def _values(column: Any, decimal: str) -> Any:
+    """A column as numbers where it can be; text stays text (times, words)."""
+    import pandas as pd
+
+    if column.dtype.kind in "fiub":
+        return column.to_numpy()
+    text = column.astype(object)
+    if decimal == ",":
+        swapped = text.map(lambda cell: cell.replace(",", ".") if isinstance(cell, str) else cell)
+        numbers = pd.to_numeric(swapped, errors="coerce")
+    else:
+        numbers = pd.to_numeric(text, errors="coerce")
+    return numbers.to_numpy(float) if numbers.notna().mean() > 0.3 else text.to_numpy(object)
+
+
+def _open(path: Path) -> bytes:
+    """The first bytes of a file, unpacked."""
+    if path.suffix.lower() == ".gz":
+        with gzip.open(path, "rb") as stream:
+            return stream.read(SAMPLE_BYTES)
+    with path.open("rb") as plain:
+        return plain.read(SAMPLE_BYTES)
+
+
+def _encoding(raw: bytes) -> str:
+    for mark, name in (
+        (codecs.BOM_UTF8, "utf-8-sig"),
+        (codecs.BOM_UTF16_LE, "utf-16"),
+        (codecs.BOM_UTF16_BE, "utf-16"),
+    ):
+        if raw.startswith(mark):
+            return name
+    if len(raw) > 3 and raw[1:4:2] == b"\0\0":
+        return "utf-16-le"
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(raw)
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8"
+
+
+def split(line: str, separator: str) -> list[str]:
+    """The cells of one line.
+
+    `line` is cut at `separator`.
+    """
+    if separator == " ":
+        return line.split()
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+
+
+def find_layout(lines: Sequence[str], encoding: str, name: str) -> Layout:
+    """How the lines of a text file are written; raises `HdoptError` where no table is found in them.
+
+    `lines` decoded from `encoding`; `name` of the file, for messages.
+    """
+    numbered = [(i, line) for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith(COMMENTS)]
+    if not numbered:
+        raise HdoptError(f"{name} holds no rows; give a recording with samples in it")
+    body = [line for _, line in numbered]
+    separator = _separator(body)
+    cells = [split(line, separator) for line in body]
+    widths = [len(row) for row in cells]
+    tail = widths[len(widths) // 2 :]
+    width = max(set(tail), key=tail.count)
+    table = [k for k in range(len(cells)) if widths[k] == width or (separator != " " and widths[k] == width + 1)]
+    start = next((k for k in table if _is_data(cells[k])), None)
+    if start is None:
+        if not table:
+            raise HdoptError(f"{name} holds no table; give a file with one row a sample")
+        start = table[-1] + 1 if len(table) < 3 else table[1]
+    head = [k for k in table if k < start]
+    units: tuple[str, ...] = ()
+    if len(head) >= 2 and _is_units(cells[head[-1]]):
+        units = tuple(cell.strip("[]()") for cell in cells[head[-1]])
+        head = head[:-1]
+    header = cells[head[-1]] if head else [str(k + 1) for k in range(width)]
+    rows = [row for row in cells[start : start + 200] if len(row) == width]
+    return Layout(
+        encoding=encoding,
+        separator=separator,
+        decimal=_decimal(rows, separator),
+        header=_unique([cell.strip().strip('"') for cell in header]),
+        units=units,
+        first_row=numbered[start][0] if start < len(numbered) else len(lines),
+        comments=(numbered[start][0] if start < len(numbered) else len(lines)) - bool(head) - bool(units),
+    )
+
+
+def _separator(body: Sequence[str]) -> str:
+    """The first separator that cuts most lines into the same number of cells, two at least."""
+    sample = list(body[-200:]) if len(body) > 3 else list(body)
+    for separator in SEPARATORS:
+        widths = [len(split(line, separator)) for line in sample]
+        usual = max(set(widths), key=widths.count)
+        if usual >= 2 and widths.count(usual) >= 0.8 * len(widths):
+            return separator
+    return ","
+
+
+def _is_number(cell: str) -> bool:
+    return bool(NUMBER.fullmatch(cell.strip().strip('"')))
+
+
+def _is_data(row: Sequence[str]) -> bool:
+    """Whether a row holds samples: numbers, missing values and times, and at least one number."""
+    numbers = sum(_is_number(cell) for cell in row)
+    blank = sum(cell.strip().lower() in MISSING for cell in row)
+    times = sum(bool(re.match(r"\d{1,4}[-:./]\d", cell.strip())) and not _is_number(cell) for cell in row)
+    return numbers > 0 and numbers + blank + times >= 0.5 * len(row)
+
+
+def _is_units(row: Sequence[str]) -> bool:
+    from hdopt.recordings.units import CHANNEL_UNITS, stated_unit
+
+    return sum(any(stated_unit(channel, cell) for channel in CHANNEL_UNITS) for cell in row) >= 0.5 * len(row)
+
+
+def _decimal(rows: Sequence[Sequence[str]], separator: str) -> str:
+    if separator == ",":
+        quoted = any(re.fullmatch(r"[-+]?\d+,\d+", cell) for row in rows for cell in row)
+        return "," if quoted else "."
+    with_comma = sum(bool(re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", cell)) for row in rows for cell in row)
+    with_point = sum(bool(re.fullmatch(r"[-+]?\d*\.\d+([eE][-+]?\d+)?", cell)) for row in rows for cell in row)
+    return "," if with_comma > with_point else "."
+
+
+def _unique(names: Sequence[str]) -> tuple[str, ...]:
+    """Column names, a second one of a name numbered, an empty one named by its place."""
+    seen: dict[str, int] = {}
+    found = []
+    for place, given in enumerate(names, start=1):
+        name = given or str(place)
+        seen[name] = seen.get(name, 0) + 1
+        found.append(name if seen[name] == 1 else f"{name}.{seen[name] - 1}")
+    return tuple(found)
+
+
+def as_numbers(values: Any) -> Any:
+    """Values as float64 (n,), NaN where a cell is no number.
+
+    `values` (n,) of any type.
+    """
+    import pandas as pd
+
+    if getattr(values, "dtype", np.dtype(object)).kind in "fiub":
+        return np.asarray(values, float)
+    return pd.to_numeric(pd.Series(values), errors="coerce").to_numpy(float)

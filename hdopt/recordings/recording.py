@@ -1,0 +1,54 @@
+"""A recording of a drive as every later step takes it: checked arrays in base units, with what was done to them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+TURN = 2 * math.pi
+LOCKED_TURNS = 0.02
+"""Input turns below which the input counts as locked: only torque or time moved."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One checked recording; all arrays have shape (n,).
+
+    `input_angle` rad, unwrapped; `error_arcmin` KE at the output; `time` s, `torque` Nm at the output, `temperature`
+    deg C or None; `segment` counts up at each gap. `quantum_arcmin` is the step of the coarser encoder at the output, 0
+    where none shows. `warnings` say what was repaired, `understood` how the file was read, a plain sentence each.
+    `sensor_arcmin` is the encoders' standard uncertainty at the output, 0 where nobody stated it; `output_reversed`
+    says that the output was counted against the input.
+    """
+
+    name: str
+    ratio: float
+    input_angle: Array
+    error_arcmin: Array
+    time: Array | None = None
+    torque: Array | None = None
+    temperature: Array | None = None
+    segment: NDArray[np.int64] | None = None
+    quantum_arcmin: float = 0.0
+    warnings: tuple[str, ...] = field(default=())
+    understood: tuple[str, ...] = field(default=())
+    sensor_arcmin: float = 0.0
+    output_reversed: bool = False
+
+    def __len__(self) -> int:
+        return len(self.input_angle)
+
+    @property
+    def turns(self) -> float:
+        """Input turns between the lowest and the highest input angle."""
+        return float(np.ptp(self.input_angle)) / TURN
+
+    @property
+    def input_locked(self) -> bool:
+        """Whether the input hardly moves (a torque sweep against a locked input)."""
+        return self.turns < LOCKED_TURNS
