@@ -1,0 +1,1 @@
+"""How a response spreads when its inputs spread as the tolerances say."""

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from hdopt.errors import HdoptError
+from hdopt.errors import HdoptError, shown
+from hdopt.files import read_text
 
 Array = NDArray[np.float64]
 INFINITY = math.inf
@@ -310,9 +311,9 @@ class MeasuredSample(Truncated):
         """Read one number a line (a header line is allowed, `#` starts a comment)."""
         path = Path(path)
         try:
-            lines = path.read_text(encoding="utf-8-sig").splitlines()
-        except (OSError, UnicodeDecodeError) as error:
-            raise HdoptError(f"measured sample {path}: cannot be read ({error}); give a CSV text file") from error
+            lines = read_text(path, "a CSV text file").splitlines()
+        except HdoptError as error:
+            raise HdoptError(f"measured sample {path}: cannot be read ({error})") from error
         values: list[float] = []
         for number, line in enumerate(lines, 1):
             cell = line.split("#")[0].strip().rstrip(",")
@@ -323,7 +324,7 @@ class MeasuredSample(Truncated):
             except ValueError:
                 require(
                     not values and number == 1,
-                    f"measured sample {path}, line {number}: {line!r}; each line must hold one number",
+                    f"measured sample {path}, line {number}: {shown(line)}; each line must hold one number",
                 )
         return cls(values=values, source=str(path), lower=lower, upper=upper)
 

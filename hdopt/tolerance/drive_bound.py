@@ -1,20 +1,27 @@
-"""A proven upper bound of the peak-to-peak over a box of errors.
+"""A proven upper bound of the peak-to-peak over a box of errors, for the exact geometry of Jia 2021, Eqs. (16)-(32).
 
-With the closed form of the deepest points (`hdopt.kinematics.closed_form`) and the zone-wise deviations tau_1, tau_2
-of Jia 2021, Eqs. (24)-(32), for any drive in the box:
+M is the in-plane part of the rotation that carries the wave generator, tau its tilt, c its centre in the plane, P a
+contour point, b the width. tau is at most the sum of both tilts, |c| at most e1 + e2, nil for the automatic structure.
 
-  E_a <= e1 + e2,  |T_a| <= |t1| + t2_y,  |q| <= E_l + T_l + (L_W/2)(1 + rho0/L_W) T_a T_l/(b/2)^2 = Q, so
+Supremum. A projected point of a rim is A + c with A = M P +- (b/2) M z. A projection lengthens nothing and |M z| =
+sin(tau), so |A| <= L_W + (b/2) sin(tau), the longest radius being L_W, and |A + c| <= |A| + c.A/|A| + |c|^2/(2 |A|).
+With c.A/|A| <= |c|, or where the structure leaves only the part across the major axis <= |c| sin(o_A):
 
-  sup max(tau_1, tau_2) <= tan(alpha) [E_a + |T_a| - (L_W/2)(T_a/(b/2))^2 + Q^2/(2 G)] + a_CS + a_FS.
+  sup max(tau_1, tau_2) <= tan(alpha) [c.A/|A| + |c|^2/(2 |A|) + (b/2) sin(tau)] + a_CS + a_FS.
 
-The deepest rim lies at least as deep as the one on the lifted side, so (delta_1 + delta_2)/2 >= |T_a| -
-(L_W/2)(T_a/(b/2))^2 >= 0 while |T_a| <= 2 (b/2)^2/L_W; and the two zones meet opposite teeth, of which only the offsets
-remain:
+(Where c.A/|A| is taken as |c|, |A + c| <= |A| + |c| does without the quadratic term.)
 
-  inf max(tau_1, tau_2) >= inf (tau_1 + tau_2)/2 >= -(a_CS Q/G + a_FS (Q/G + (E_l + T_l)/L_W)).
+Infimum. The tips of opposite rims project to c + V and c - V with V = L_W M y +- (b/2) M z; then delta_1 + delta_2 >=
+|V + c| + |V - c| - 2 L_W >= 2 (|V| - L_W), and of both pairs of rims one has |V| >= L_W as long as tan(tau) <= b/L_W,
+because y and z stay orthogonal: |V|^2 >= L_W^2 + |y_3| (L_W b cos(tau) - L_W^2 |y_3|) with |y_3| <= sin(tau). The two
+zones meet opposite teeth, of which only the offsets o, o' of the deepest points remain:
 
-The difference of both bounds the peak-to-peak of the closed form; the closed form itself is right to about 3e-3 arcmin
-at three times the shipped tolerances.
+  inf max(tau_1, tau_2) >= inf (tau_1 + tau_2)/2 >= -(a_CS sin(o_max) + a_FS sin(o'_max)).
+
+At a deepest point the distance is stationary along the contour, H.H' = 0. There P.P' = r r', and all else is at most
+|P'| (|c| + (b/2) sin(tau) + r sin(tau)^2), so |r'| <= sqrt(1 + (r'/r)^2) (|c| + (b/2) sin(tau) + L_W sin(tau)^2): near
+the tip, where alone |r'| is that small, this limits o', which is the contour angle itself. o differs from it by the
+direction of c, of the lifted rim and of M, which is within 2 tau^2 of a plain turn.
 """
 
 from __future__ import annotations
@@ -24,11 +31,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from hdopt.deviations import ERROR_NAMES, DriveErrors
-from hdopt.drive import Drive
-from hdopt.profiles import tip_radius_of_curvature
+from hdopt.drive.errors import ERROR_NAMES, DriveErrors
+from hdopt.drive.geometry import Drive
+from hdopt.drive.profiles import WaveGeneratorProfile
+from hdopt.kinematics.exact import ZONE_HALF_WIDTH
 
 Array = NDArray[np.float64]
+
+CONTOUR_POINTS = 20_001
+"""Places of the contour within a zone where its slope is looked at; between them the second derivative limits it."""
 
 
 def widest_errors(response, lower: Array, upper: Array) -> DriveErrors:
@@ -44,26 +55,51 @@ def widest_errors(response, lower: Array, upper: Array) -> DriveErrors:
 
 
 def peak_to_peak_bound_arcmin(drive: Drive, widest: DriveErrors) -> float | None:
-    """Bound (arcmin, k_e = 1) for all drives whose errors are at most `widest`, in any direction and phase.
+    """Bound (arcmin, k_e = 1) for every `drive` whose errors are at most `widest`, in any direction and phase.
 
-    None where the tilts leave the closed form's range (lift above 2 (b/2)^2/L_W).
+    Proven for the exact geometry, deepest points within 60 deg of the major axis, and profiles whose longest radius is
+    at the major axis. None where the tilts are too large for the proof: above b/L_W, 16 deg for the shipped drive.
     """
     wave_generator, geometry = drive.wave_generator, drive.geometry
-    profile, half_width = wave_generator.profile, wave_generator.width / 2
-    semi_major, rho = profile.semi_major, tip_radius_of_curvature(profile)
-    flatness = semi_major - rho
-    eccentricity = widest.axis_eccentricity + widest.wg_eccentricity
-    e_a = eccentricity * wave_generator.structure.passes_major
-    e_l = eccentricity * wave_generator.structure.passes_minor
-    axis_lift = half_width * math.hypot(math.tan(widest.axis_tilt_x), math.tan(widest.axis_tilt_y))
-    t_a = axis_lift + half_width * math.tan(widest.wg_tilt_major)
-    t_l = axis_lift + half_width * math.tan(widest.wg_tilt_minor)
-    if t_a > 2 * half_width**2 / semi_major:
+    profile, width, structure = wave_generator.profile, wave_generator.width, wave_generator.structure
+    aligned = not (structure.passes_major or structure.passes_minor)
+    centre = 0.0 if aligned else float(widest.axis_eccentricity + widest.wg_eccentricity)
+    tilt = sum(
+        math.atan(math.hypot(math.tan(major), math.tan(minor)))
+        for major, minor in (
+            (widest.axis_tilt_y, widest.axis_tilt_x),
+            (widest.wg_tilt_major, widest.wg_tilt_minor),
+        )
+    )
+    if tilt >= math.pi / 4 or math.tan(tilt) > width / profile.semi_major or centre > profile.semi_minor / 4:
         return None
-    q = e_l + t_l + (semi_major + rho) / 2 * t_a * t_l / half_width**2
-    deepest_lift = min(t_a, half_width**2 / semi_major)
-    depth = e_a + deepest_lift - semi_major / 2 * (deepest_lift / half_width) ** 2 + q * q / (2 * flatness)
-    teeth = widest.cs_tooth_amplitude + widest.fs_tooth_amplitude
-    highest = math.tan(geometry.pressure_angle) * depth + teeth
-    lowest = -(teeth * q / flatness + widest.fs_tooth_amplitude * (e_l + t_l) / semi_major)
+    reach = centre + width / 2 * math.sin(tilt)
+    offset_fs = _largest_offset(profile, reach + profile.semi_major * math.sin(tilt) ** 2)
+    if offset_fs is None:
+        return None
+    lift = width / 2 * math.sin(tilt)
+    nearest = profile.semi_minor * math.cos(tilt) - lift
+
+    def turned(shift: float) -> float:
+        """How far a `shift` (mm) and the twist of M can turn a point as seen from the centre, rad."""
+        return math.asin(min((shift + 2 * profile.semi_major * tilt**2) / (nearest - centre), 1.0))
+
+    offset_cs = min(offset_fs + turned(reach), math.pi / 2)
+    radial = centre
+    if structure.passes_minor and not structure.passes_major:
+        radial = min(centre, centre * math.sin(min(offset_fs + turned(lift), math.pi / 2)) + centre**2 / (2 * nearest))
+    cs, fs = float(widest.cs_tooth_amplitude), float(widest.fs_tooth_amplitude)
+    highest = math.tan(geometry.pressure_angle) * (radial + lift) + cs + fs
+    lowest = -(cs * math.sin(offset_cs) + fs * math.sin(offset_fs))
     return geometry.arcmin_per_mm * (highest - lowest)
+
+
+def _largest_offset(profile: WaveGeneratorProfile, slope: float) -> float | None:
+    """The largest contour angle (rad) off the major axis at which |r'| can be as small as a deepest point needs with
+    `slope` (mm); None where no place within a zone is excluded."""
+    phi = np.linspace(0.0, ZONE_HALF_WIDTH, CONTOUR_POINTS)
+    radius, first, second = (profile.radius(phi, derivative) for derivative in range(3))
+    between = float(np.abs(second).max()) * phi[1] / 2
+    allowed = np.abs(first) - between <= slope * np.sqrt(1 + (first / radius) ** 2)
+    last = int(np.flatnonzero(allowed)[-1])
+    return None if last == len(phi) - 1 else float(phi[last + 1]) if slope > 0 else 0.0

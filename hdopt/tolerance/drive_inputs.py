@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from hdopt.deviations import ERROR_GROUPS, ERROR_NAMES, PHASE_OF, STUDY_KEYS, DriveErrors, study_key
-from hdopt.drive import Drive
+from hdopt.drive.errors import ERROR_GROUPS, ERROR_NAMES, PHASE_OF, STUDY_KEYS, DriveErrors, study_key
+from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.tolerance.contributors import TILT, VECTORS, Contributor
 from hdopt.tolerance.copula import CorrelationGroup
@@ -106,7 +106,8 @@ class DriveResponse:
 
         if not self.drive.wave_generator.profile.tip_is_smooth:
             return None
-        return self.homogenization * peak_to_peak_bound_arcmin(self.drive, widest_errors(self, lower, upper))
+        bound = peak_to_peak_bound_arcmin(self.drive, widest_errors(self, lower, upper))
+        return None if bound is None else self.homogenization * bound
 
     def matrix(self, inputs: Array) -> Array:
         """The same as rows of `DriveErrors.to_matrix`, without making twelve columns of what does not vary."""
@@ -134,6 +135,8 @@ class DriveProblem:
     space: InputSpace
     replaced: tuple[str, ...] = field(default=())
     """Tolerances that callouts took the place of."""
+    freed: tuple[str, ...] = ()
+    """Directions and phases that no tolerance says anything of: they are free over the full turn."""
 
 
 def tolerance_of(error: str, distribution: Distribution) -> Tolerance:
@@ -154,10 +157,14 @@ def drive_problem(
 ) -> DriveProblem:
     """The stack of a drive from the distributions of its errors by study key (mm, deg) and of its callouts (mm).
 
-    An error that callouts feed is theirs alone. Raises `HdoptError` for a key that is not an error, and for a magnitude
-    that could be negative.
+    An error that callouts feed is theirs alone. A direction or phase that is not given is free over the full turn where
+    its magnitude varies; what is given nowhere keeps its value in `held`. `correlations` group inputs that vary
+    together, `homogenization` is k_e. Raises `HdoptError` for a key that is not an error, and for a magnitude that
+    could
+    be negative.
     """
     contributors = contributors or {}
+    tolerances, freed = with_free_directions(tolerances)
     fed = {error for contributor in contributors for error in VECTORS[contributor.feeds][1:]}
     inputs: dict[str, Tolerance] = {}
     feeds: list[Feed] = []
@@ -168,7 +175,8 @@ def drive_problem(
             raise HdoptError(f"[tolerances]: {unknown_name('error', key, STUDY_KEYS)}")
         error = STUDY_KEYS[key]
         if error in fed:
-            replaced.append(key)
+            if key not in freed:
+                replaced.append(key)
             continue
         if error in PHASE_OF and distribution.support[0] < 0:
             raise HdoptError(
@@ -178,8 +186,30 @@ def drive_problem(
         feeds.append(Direct(len(inputs), error))
         inputs[key] = tolerance_of(error, distribution)
         groups[_group_of(error)].append(key)
+    terms, free = _add_callouts(contributors, inputs, groups)
+    feeds += [VectorSum(vector, tuple(parts)) for vector, parts in terms.items()]
+    space = InputSpace(
+        inputs,
+        tuple(correlations),
+        {group: tuple(names) for group, names in groups.items() if names},
+        folded=frozenset(study_key(name) for name in TILTS) & set(inputs),
+        turning=frozenset(name for name in inputs if STUDY_KEYS.get(name) in TURNING or name in free),
+    )
+    return DriveProblem(
+        DriveResponse(drive, held or DriveErrors(), tuple(feeds), homogenization),
+        space,
+        tuple(replaced),
+        tuple(key for key in freed if key in inputs),
+    )
+
+
+def _add_callouts(
+    contributors: Mapping[Contributor, Distribution], inputs: dict[str, Tolerance], groups: dict[str, list[str]]
+) -> tuple[dict[str, list[tuple[int, int, float]]], set[str]]:
+    """Add each callout and its free direction to `inputs` and `groups`: the terms of each vector sum, the
+    directions."""
     terms: dict[str, list[tuple[int, int, float]]] = {}
-    free = set()
+    free: set[str] = set()
     for contributor, distribution in contributors.items():
         direction = f"{contributor.name}_direction_deg"
         for name in (contributor.name, direction):
@@ -190,17 +220,20 @@ def drive_problem(
         inputs[direction] = Tolerance(FULL_TURN, None)
         free.add(direction)
         groups[_group_of(VECTORS[contributor.feeds][1])] += [contributor.name, direction]
-    feeds += [VectorSum(vector, tuple(parts)) for vector, parts in terms.items()]
-    space = InputSpace(
-        inputs,
-        tuple(correlations),
-        {group: tuple(names) for group, names in groups.items() if names},
-        folded=frozenset(study_key(name) for name in TILTS) & set(inputs),
-        turning=frozenset(name for name in inputs if STUDY_KEYS.get(name) in TURNING or name in free),
-    )
-    return DriveProblem(
-        DriveResponse(drive, held or DriveErrors(), tuple(feeds), homogenization), space, tuple(replaced)
-    )
+    return terms, free
+
+
+def with_free_directions(tolerances: Mapping[str, Distribution]) -> tuple[dict[str, Distribution], tuple[str, ...]]:
+    """`tolerances` by study key, with a direction free over the full turn after each magnitude that has none; and which
+    were added."""
+    made, freed = dict[str, Distribution](), []
+    for key, distribution in tolerances.items():
+        made[key] = distribution
+        direction = PHASE_OF.get(STUDY_KEYS.get(key, ""))
+        if direction is not None and study_key(direction) not in tolerances:
+            made[study_key(direction)] = FULL_TURN
+            freed.append(study_key(direction))
+    return made, tuple(freed)
 
 
 def _group_of(error: str) -> str:

@@ -14,7 +14,7 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
-class Estimate:
+class IntervalEstimate:
     """A value with its two-sided interval, and how the interval was made."""
 
     value: float
@@ -26,10 +26,10 @@ class Estimate:
     def to_dict(self) -> dict[str, float]:
         return {"value": self.value, "low": self.low, "high": self.high}
 
-    def map(self, function) -> Estimate:
+    def map(self, function) -> IntervalEstimate:
         """The estimate of a monotone function of the value."""
         low, high = sorted((function(self.low), function(self.high)))
-        return Estimate(function(self.value), low, high, self.interval, self.confidence)
+        return IntervalEstimate(function(self.value), low, high, self.interval, self.confidence)
 
 
 def student_half_width(replicates: Sequence[float], confidence: float = CONFIDENCE) -> float:
@@ -41,19 +41,21 @@ def student_half_width(replicates: Sequence[float], confidence: float = CONFIDEN
 
 def over_scramblings(
     replicates: Sequence[float], value: float | None = None, confidence: float = CONFIDENCE
-) -> Estimate:
+) -> IntervalEstimate:
     """t-interval over scramblings; `value` is the estimate of all points together where that differs from the mean."""
     half = student_half_width(replicates, confidence)
     value = float(np.mean(replicates)) if value is None else value
-    return Estimate(value, value - half, value + half, f"t over {len(replicates)} independent scramblings", confidence)
+    return IntervalEstimate(
+        value, value - half, value + half, f"t over {len(replicates)} independent scramblings", confidence
+    )
 
 
-def clopper_pearson(hits: int, n: int, confidence: float = CONFIDENCE) -> Estimate:
+def clopper_pearson(hits: int, n: int, confidence: float = CONFIDENCE) -> IntervalEstimate:
     """Share of `hits` in `n` independent trials with its exact interval (Clopper and Pearson 1934)."""
     tail = (1 - confidence) / 2
     low = 0.0 if hits == 0 else float(special.betaincinv(hits, n - hits + 1, tail))
     high = 1.0 if hits == n else float(special.betaincinv(hits + 1, n - hits, 1 - tail))
-    return Estimate(hits / n, low, high, "Clopper-Pearson", confidence)
+    return IntervalEstimate(hits / n, low, high, "Clopper-Pearson", confidence)
 
 
 def order_statistic_ranks(q: float, n: int, confidence: float = CONFIDENCE) -> tuple[int, int]:

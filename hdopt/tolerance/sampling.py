@@ -32,8 +32,10 @@ class Sampling(Protocol):
     replicates: int
     independent_points: bool
 
-    def blocks(self, seed: int, replicate: int, n: int, dimension: int) -> Iterator[Array]:
-        """The `n` points of one replicate in blocks of shape (at most BLOCK, dimension), inside (0, 1)."""
+    def blocks(self, seed: int, replicate: int, n: int, dimension: int, start: int = 0) -> Iterator[Array]:
+        """Points `start` to `n` of one replicate in blocks of shape (at most BLOCK, dimension), inside (0, 1).
+
+        They are the same whether a replicate is made in one go or from several starts, multiples of BLOCK."""
 
 
 def replicate_generator(seed: int, replicate: int) -> np.random.Generator:
@@ -58,7 +60,7 @@ class ScrambledSobol:
     name: str = "scrambled Sobol' points"
     independent_points = False
 
-    def blocks(self, seed: int, replicate: int, n: int, dimension: int) -> Iterator[Array]:
+    def blocks(self, seed: int, replicate: int, n: int, dimension: int, start: int = 0) -> Iterator[Array]:
         from scipy.stats import qmc
 
         if n > 2**SOBOL_BITS:
@@ -69,10 +71,12 @@ class ScrambledSobol:
         rng = replicate_generator(seed, replicate)
         engine = qmc.Sobol(dimension, scramble=True, bits=SOBOL_BITS, rng=rng)
         half_step = 0.5**SOBOL_BITS / 2  # the points lie on a grid that holds 0: move them to the middle of its cells
-        for start in range(0, n, BLOCK):
-            size = min(BLOCK, n - start)
+        if start:
+            engine.fast_forward(start)
+        for first in range(start, n, BLOCK):
+            size = min(BLOCK, n - first)
             # a first draw that is no power of two makes scipy warn: round it up and leave the rest unused
-            points = engine.random(size if start else 1 << (size - 1).bit_length())[:size]
+            points = engine.random(size if first else 1 << (size - 1).bit_length())[:size]
             points += half_step
             yield points
 
@@ -85,10 +89,12 @@ class PlainMonteCarlo:
     name: str = "plain Monte Carlo"
     independent_points = True
 
-    def blocks(self, seed: int, replicate: int, n: int, dimension: int) -> Iterator[Array]:
+    def blocks(self, seed: int, replicate: int, n: int, dimension: int, start: int = 0) -> Iterator[Array]:
         rng = replicate_generator(seed, replicate)
-        for start in range(0, n, BLOCK):
-            points = rng.random((min(BLOCK, n - start), dimension))
+        if start:
+            rng.bit_generator.advance(start * dimension)  # type: ignore[attr-defined]  # PCG64's: one step a number
+        for first in range(start, n, BLOCK):
+            points = rng.random((min(BLOCK, n - first), dimension))
             yield np.maximum(points, 2.0**-54, out=points)  # (0, 1) instead of [0, 1)
 
 

@@ -7,18 +7,19 @@ block, so memory does not grow with the sample. Every figure carries the interva
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from hdopt.engine import Engine, engine_from
 from hdopt.errors import HdoptError
+from hdopt.parallel.engine import Engine, engine_from
 from hdopt.tolerance import capability
 from hdopt.tolerance.empirical import Bins, CountInBins, Empirical, KeepAll, merge
 from hdopt.tolerance.intervals import (
-    Estimate,
+    IntervalEstimate,
     clopper_pearson,
     order_statistic_ranks,
     over_scramblings,
@@ -27,13 +28,19 @@ from hdopt.tolerance.intervals import (
 )
 from hdopt.tolerance.linearise import Linearisation, linearise
 from hdopt.tolerance.response import Response, evaluate
-from hdopt.tolerance.sampling import Sampling, ScrambledSobol, replicate_sizes
+from hdopt.tolerance.sampling import BLOCK, Sampling, ScrambledSobol, replicate_sizes
 from hdopt.tolerance.space import InputSpace
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 
 KEPT_VALUES = 2**24
 """Up to here every value is kept (128 MiB); a larger sample is counted in bins."""
+PART = 2**20
+"""Points of one task at least; up to 16 of them in all, a task is a replicate."""
+MOST_PARTS = 4096
 PILOT = 2**12
 FEW = 4
 """Fewer points than this beyond a quantile per scrambling, and its interval is made from ranks instead."""
@@ -53,6 +60,8 @@ class ReplicateTask:
     n: int
     limit: float
     bins: Bins | None
+    start: int = 0
+    """The first point of this task; `n` is the point after its last. A long replicate is several."""
 
 
 @dataclass(frozen=True)
@@ -70,12 +79,12 @@ def run_replicate(task: ReplicateTask) -> Replicate:
     """Sample one replicate block by block."""
     collector = KeepAll() if task.bins is None else CountInBins(task.bins)
     count, mean, squares, above = 0, 0.0, 0.0, 0
-    for u in task.sampling.blocks(task.seed, task.replicate, task.n, task.space.dimension):
+    for u in task.sampling.blocks(task.seed, task.replicate, task.n, task.space.dimension, task.start):
         values = evaluate(
             task.response,
             task.space.sample(u),
             task.space.names,
-            f"replicate {task.replicate} of seed {task.seed}, counted from {count}",
+            f"replicate {task.replicate} of seed {task.seed}, counted from {task.start + count}",
         )
         collector.add(values)
         above += int(np.count_nonzero(values > task.limit))
@@ -86,6 +95,32 @@ def run_replicate(task: ReplicateTask) -> Replicate:
         mean += shift * len(values) / total
         count = total
     return Replicate(count, mean, squares / count, above, collector.finish())
+
+
+def _replicates(tasks: Sequence[ReplicateTask], engine: Engine) -> list[Replicate]:
+    """Every replicate, sampled in parts of a size that depends on the number of points alone: so do the numbers."""
+    size = part_size(sum(task.n for task in tasks))
+    pieces = [
+        replace(task, start=start, n=min(start + size, task.n)) for task in tasks for start in range(0, task.n, size)
+    ]
+    found: dict[int, Replicate] = {}
+    for piece, part in zip(pieces, engine.map(run_replicate, pieces), strict=True):
+        before = found.get(piece.replicate)
+        found[piece.replicate] = part if before is None else _together(before, part)
+    return [found[task.replicate] for task in tasks]
+
+
+def part_size(n: int) -> int:
+    """Points that one task samples of `n` in all: a second's work or so, in 4096 tasks and a few at most."""
+    return -(-max(PART, n // MOST_PARTS) // BLOCK) * BLOCK
+
+
+def _together(one: Replicate, two: Replicate) -> Replicate:
+    """Two parts of a replicate as one (Chan, Golub and LeVeque 1983)."""
+    n, shift = one.n + two.n, two.mean - one.mean
+    squares = one.variance * one.n + two.variance * two.n + shift * shift * one.n * two.n / n
+    values = merge([one.values, two.values])
+    return Replicate(n, one.mean + shift * two.n / n, squares / n, one.above_limit + two.above_limit, values)
 
 
 @dataclass(frozen=True)
@@ -102,27 +137,27 @@ class Stack:
     unit: str
     limit: float
     required_yield: float
-    mean: Estimate
-    std: Estimate
-    quantiles: dict[float, Estimate]
-    conforming: Estimate
-    ppk: Estimate | None
+    mean: IntervalEstimate
+    std: IntervalEstimate
+    quantiles: dict[float, IntervalEstimate]
+    conforming: IntervalEstimate
+    ppk: IntervalEstimate | None
     linearisation: Linearisation
     rss: float
     histogram: tuple[Array, Array] = field(repr=False)
     notes: tuple[str, ...] = ()
 
     @property
-    def ppm(self) -> Estimate:
+    def ppm(self) -> IntervalEstimate:
         """Parts per million beyond the limit."""
         return self.conforming.map(lambda share: 1e6 * (1 - share))
 
     @property
-    def required_quantile(self) -> Estimate:
+    def required_quantile(self) -> IntervalEstimate:
         """The quantile at the required yield: it must not exceed the limit."""
         return self.quantiles[self.required_yield]
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, Any]:
         line, unit = self.linearisation, self.unit
         return {
             "n": self.n,
@@ -163,7 +198,7 @@ class Stack:
             "notes": list(self.notes),
         }
 
-    def to_frame(self):
+    def to_frame(self) -> pd.DataFrame:
         """A pandas table: one row a figure, with its interval."""
         import pandas as pd
 
@@ -178,49 +213,56 @@ class Stack:
         ).set_index("figure")
 
 
-def run_stack(
-    response: Response,
-    space: InputSpace,
-    *,
-    limit: float,
-    required_yield: float = 0.9973,
-    n: int = 2**18,
-    sampling: Sampling | None = None,
-    seed: int = 1,
-    engine: Engine | str | None = None,
-    quantiles: Sequence[float] = (),
-    unit: str = "arcmin",
-) -> Stack:
-    """Sample `response` over `space` with `n` points in all and report its distribution against the upper `limit`.
+@dataclass(frozen=True)
+class StackRequest:
+    """What is asked of a stack.
 
-    Raises `HdoptError` where `n` is too small for a quantile asked for, or a response is not finite.
+    `limit` is the upper limit in `unit`, `required_yield` the share that must keep it, `n` the samples in all, drawn by
+    `sampling` with `seed`; `quantiles` are reported beside the usual ones; `engine` computes the replicates.
     """
-    sampling = sampling or ScrambledSobol()
-    if not 0 < required_yield < 1:
-        raise HdoptError(f"the required yield is {required_yield!r}; it must lie between 0 and 1, such as 0.9973")
-    asked = sorted({required_yield, *quantiles, *REPORTED_QUANTILES})
-    _check_size(n, sampling, [required_yield, *quantiles])
-    asked = [q for q in asked if n >= smallest_n(q)]
+
+    limit: float
+    required_yield: float = 0.9973
+    n: int = 2**18
+    sampling: Sampling = field(default_factory=ScrambledSobol)
+    seed: int = 1
+    engine: Engine | str | None = None
+    quantiles: Sequence[float] = ()
+    unit: str = "arcmin"
+
+
+def run_stack(response: Response, space: InputSpace, request: StackRequest) -> Stack:
+    """Sample `response` over `space` and report its distribution against the limit, as `request` asks.
+
+    Raises `HdoptError` where n is too small for a quantile asked for, or a response is not finite.
+    """
+    sampling, n, seed, required = request.sampling, request.n, request.seed, request.required_yield
+    if not 0 < required < 1:
+        raise HdoptError(f"the required yield is {required!r}; it must lie between 0 and 1, such as 0.9973")
+    _check_size(n, sampling, [required, *request.quantiles])
+    asked = [q for q in sorted({required, *request.quantiles, *REPORTED_QUANTILES}) if n >= smallest_n(q)]
     sizes = replicate_sizes(n, sampling.replicates)
     bins = None if n <= KEPT_VALUES else Bins.around(_pilot(response, space, sampling, seed, sizes[0]))
-    tasks = [
-        ReplicateTask(response, space, sampling, seed, replicate, size, limit, bins)
-        for replicate, size in enumerate(sizes)
-    ]
-    parts = list(engine_from(engine).map(run_replicate, tasks))
+    parts = _replicates(
+        [
+            ReplicateTask(response, space, sampling, seed, replicate, size, request.limit, bins)
+            for replicate, size in enumerate(sizes)
+        ],
+        engine_from(request.engine),
+    )
     pooled = merge(part.values for part in parts)
     # a two-sided response is the size of a signed one, which is the straighter of both
     signed = getattr(response, "signed", None)
     line = linearise(signed or response, space, seed)
-    z = float(special.ndtri((1 + required_yield) / 2 if signed else required_yield))
-    performance, notes = _performance(parts, pooled, sampling, limit)
+    z = float(special.ndtri((1 + required) / 2 if signed else required))
+    performance, notes = _performance(parts, pooled, sampling, request.limit)
     return Stack(
         n=n,
         sampling=f"{sampling.replicates} x {sampling.name}" if not sampling.independent_points else sampling.name,
         seed=seed,
-        unit=unit,
-        limit=limit,
-        required_yield=required_yield,
+        unit=request.unit,
+        limit=request.limit,
+        required_yield=required,
         mean=over_scramblings([part.mean for part in parts], _pooled_mean(parts)),
         std=over_scramblings([part.variance**0.5 for part in parts], _pooled_std(parts)),
         quantiles={q: quantile_estimate(parts, pooled, q, sampling) for q in asked},
@@ -259,7 +301,7 @@ def _pooled_std(parts: Sequence[Replicate]) -> float:
     return float(np.sqrt(np.average([part.variance + (part.mean - mean) ** 2 for part in parts], weights=weights)))
 
 
-def yield_estimate(parts: Sequence[Replicate], sampling: Sampling) -> Estimate:
+def yield_estimate(parts: Sequence[Replicate], sampling: Sampling) -> IntervalEstimate:
     """Share within the limit. Over scramblings by Student's t, unless hardly any point lies beyond the limit (or
     within): then Clopper-Pearson as for independent points, which scrambled ones, being more even, keep."""
     n = sum(part.n for part in parts)
@@ -269,12 +311,12 @@ def yield_estimate(parts: Sequence[Replicate], sampling: Sampling) -> Estimate:
     if min(above, n - above) < FEW * len(parts):
         exact = clopper_pearson(n - above, n)
         few = "Clopper-Pearson (too few beyond the limit to compare scramblings)"
-        return Estimate(exact.value, exact.low, exact.high, few)
+        return IntervalEstimate(exact.value, exact.low, exact.high, few)
     shares = over_scramblings([1 - part.above_limit / part.n for part in parts], 1 - above / n)
-    return Estimate(shares.value, max(shares.low, 0.0), min(shares.high, 1.0), shares.interval)
+    return IntervalEstimate(shares.value, max(shares.low, 0.0), min(shares.high, 1.0), shares.interval)
 
 
-def quantile_estimate(parts: Sequence[Replicate], pooled: Empirical, q: float, sampling: Sampling) -> Estimate:
+def quantile_estimate(parts: Sequence[Replicate], pooled: Empirical, q: float, sampling: Sampling) -> IntervalEstimate:
     """Quantile of all values together. Over scramblings: the t-interval of the share below it, turned back into values
     (Woodruff 1952), which is right for skewed tails. For independent points: order statistics."""
     n = pooled.n
@@ -283,10 +325,12 @@ def quantile_estimate(parts: Sequence[Replicate], pooled: Empirical, q: float, s
     if not sampling.independent_points and beyond >= FEW * len(parts):
         half = student_half_width([part.values.at_most(value) / part.n for part in parts])
         low, high = _rank(max(q - half, 0.0), n), _rank(min(q + half, 1.0), n)
-        return Estimate(value, pooled.ranked(low), pooled.ranked(high), f"t over {len(parts)} scramblings, inverted")
+        return IntervalEstimate(
+            value, pooled.ranked(low), pooled.ranked(high), f"t over {len(parts)} scramblings, inverted"
+        )
     low, high = order_statistic_ranks(q, n)
     kind = "order statistics" if sampling.independent_points else "order statistics (too few points beyond)"
-    return Estimate(value, pooled.ranked(max(low, 1)), pooled.ranked(min(high, n)), kind)
+    return IntervalEstimate(value, pooled.ranked(max(low, 1)), pooled.ranked(min(high, n)), kind)
 
 
 def _rank(q: float, n: int) -> int:
@@ -295,7 +339,7 @@ def _rank(q: float, n: int) -> int:
 
 def _performance(
     parts: Sequence[Replicate], pooled: Empirical, sampling: Sampling, limit: float
-) -> tuple[Estimate | None, tuple[str, ...]]:
+) -> tuple[IntervalEstimate | None, tuple[str, ...]]:
     """Ppk; over scramblings by Student's t, otherwise from the intervals of both percentiles, each at half the risk."""
     needed, n = smallest_n(capability.UPPER_PERCENTILE, 0.975), pooled.n
     if n < needed:
@@ -307,10 +351,10 @@ def _performance(
 
     value = performance(pooled)
     if not np.isfinite(value):
-        return Estimate(value, value, value, "nothing varies"), ()
+        return IntervalEstimate(value, value, value, "nothing varies"), ()
     if not sampling.independent_points and n * (1 - capability.UPPER_PERCENTILE) >= FEW * len(parts):
         return over_scramblings([performance(part.values) for part in parts], value), ()
     ranks = [order_statistic_ranks(q, n, 0.975) for q in (capability.MEDIAN, capability.UPPER_PERCENTILE)]
     medians, uppers = ([pooled.ranked(min(max(rank, 1), n)) for rank in pair] for pair in ranks)
     corners = [capability.ppk(limit, median, upper) for median in medians for upper in uppers]
-    return Estimate(value, min(corners), max(corners), "order statistics of both percentiles"), ()
+    return IntervalEstimate(value, min(corners), max(corners), "order statistics of both percentiles"), ()

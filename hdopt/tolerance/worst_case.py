@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,7 @@ class WorstCase:
     def certificate(self) -> str:
         return BEST_FOUND if self.bound is None else PROVEN
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, Any]:
         return {
             "value": self.value,
             "bound": self.bound,
@@ -45,14 +46,19 @@ class WorstCase:
         }
 
 
+class Unbounded(HdoptError):
+    """An input can be arbitrarily large, so that there is no worst case."""
+
+
 def find_worst_case(
     response: Response, space: InputSpace, seed: int = 1, *, corners: int = CORNERS, generations: int = GENERATIONS
 ) -> WorstCase:
     """Largest response over the box: corners of all magnitudes with directions free, then differential evolution
     (Storn and Price 1997, scipy.optimize) over the whole box from the best of them.
 
-    A response that knows a bound over a box (`upper_bound(lower, upper)`) certifies it. Raises `HdoptError` where an
-    input is unbounded: there is no worst case then.
+    `corners` points of `space` start `generations` of evolution, all with `seed`. A `response` that knows a bound
+    over a
+    box (`upper_bound(lower, upper)`) certifies it. Raises `Unbounded` where an input is: there is no worst case then.
     """
     lower, upper = space.box
     check_bounded(space)
@@ -105,11 +111,11 @@ def find_worst_case(
 
 
 def check_bounded(space: InputSpace) -> None:
-    """Raise `HdoptError` unless every input has finite bounds."""
+    """Raise `Unbounded` unless every input of `space` has finite bounds."""
     lower, upper = space.box
     loose = [n for n, a, b in zip(space.names, lower, upper, strict=True) if not (np.isfinite(a) and np.isfinite(b))]
     if loose:
-        raise HdoptError(
+        raise Unbounded(
             f"the worst case needs bounded inputs; {', '.join(loose)} can be arbitrarily large; "
             "truncate the distribution with lower and upper"
         )

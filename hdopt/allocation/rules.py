@@ -15,16 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from hdopt.engine import Engine
+from hdopt.allocation.convex import Infeasible, Item, Requirement, Solution, solve, total_cost
+from hdopt.allocation.cost import GradeTable
 from hdopt.errors import HdoptError
-from hdopt.tolerance.allocate import Infeasible, Item, Requirement, Solution, solve, total_cost
-from hdopt.tolerance.cost import GradeTable
-from hdopt.tolerance.intervals import Estimate
+from hdopt.parallel.engine import Engine
+from hdopt.tolerance.intervals import IntervalEstimate
 from hdopt.tolerance.linearise import linearise
 from hdopt.tolerance.response import Response, evaluate
 from hdopt.tolerance.sampling import ScrambledSobol
 from hdopt.tolerance.space import InputSpace
-from hdopt.tolerance.stack import Stack, run_stack
+from hdopt.tolerance.stack import Stack, StackRequest, run_stack
 from hdopt.tolerance.worst_case import find_worst_case
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ CLOSE = 1e-4
 
 
 @dataclass(frozen=True)
-class Problem:
+class AllocationProblem:
     """A response with its inputs, the tolerances that may change, and what is required of it."""
 
     response: Response
@@ -88,8 +88,8 @@ class Allocation:
     grades: dict[str, str]
     total_cost: float
     modelled: float
-    conforming: Estimate
-    required_quantile: Estimate
+    conforming: IntervalEstimate
+    required_quantile: IntervalEstimate
     judged_n: int
     marginal_cost: float | None = None
     steps: int = 0
@@ -122,7 +122,7 @@ def yield_margin(required_yield: float, design_n: int, verify_n: int, scrambling
     return margin
 
 
-def allocate_by_yield(problem: Problem, seed: int = 1, verify_n: int = DESIGN_POINTS) -> Allocation:
+def allocate_by_yield(problem: AllocationProblem, seed: int = 1, verify_n: int = DESIGN_POINTS) -> Allocation:
     """Least cost under P(response <= limit) >= yield, with the margin of `yield_margin`.
 
     Successive linear models of the quantile on one fixed sample, whose slope is the mean slope of the drives next to
@@ -146,7 +146,7 @@ def allocate_by_yield(problem: Problem, seed: int = 1, verify_n: int = DESIGN_PO
     return _allocation("yield", problem, solution, measured(tolerances), judged[tolerances.tobytes()], steps)
 
 
-def allocate_by_worst_case(problem: Problem, seed: int = 1) -> Allocation:
+def allocate_by_worst_case(problem: AllocationProblem, seed: int = 1) -> Allocation:
     """Least cost while the largest response over the tolerance box (as far as the search finds it) keeps the limit."""
     space, items = problem.space, problem.items
     columns = [space.index(item.name) for item in items]
@@ -175,7 +175,7 @@ def allocate_by_worst_case(problem: Problem, seed: int = 1) -> Allocation:
     return _by_rule(problem, _Constraint("worst case", model, value), seed)
 
 
-def allocate_by_rss(problem: Problem, seed: int = 1) -> Allocation:
+def allocate_by_rss(problem: AllocationProblem, seed: int = 1) -> Allocation:
     """Least cost under the root-sum-square stack, its line drawn at the tolerances it leads to."""
     z = float(special.ndtri(problem.required_yield))
     names = [item.name for item in problem.items]
@@ -203,7 +203,7 @@ def allocate_by_rss(problem: Problem, seed: int = 1) -> Allocation:
     return _by_rule(problem, _Constraint("rss", model, value), seed)
 
 
-def allocate_by_equal_scaling(problem: Problem, seed: int = 1) -> Allocation:
+def allocate_by_equal_scaling(problem: AllocationProblem, seed: int = 1) -> Allocation:
     """All tolerances times one factor, the largest that meets the yield: no cost is looked at."""
     from scipy.optimize import brentq
 
@@ -238,27 +238,29 @@ def allocate_by_equal_scaling(problem: Problem, seed: int = 1) -> Allocation:
     )
 
 
-def verify(problem: Problem, tolerances: Mapping[str, float], seed: int, n: int) -> Stack:
+def verify(problem: AllocationProblem, tolerances: Mapping[str, float], seed: int, n: int) -> Stack:
     """The one verification: a stack of the allocated tolerances with `n` fixed beforehand and a seed of its own."""
     at = np.array([tolerances[item.name] for item in problem.items])
     return _judge(problem, at, n, seed)
 
 
-def _judge(problem: Problem, tolerances: Array, n: int, seed: int, quantiles: Sequence[float] = ()) -> Stack:
+def _judge(problem: AllocationProblem, tolerances: Array, n: int, seed: int, quantiles: Sequence[float] = ()) -> Stack:
     return run_stack(
         problem.response,
         problem.space_at(tolerances),
-        limit=problem.limit,
-        required_yield=problem.required_yield,
-        n=n,
-        seed=seed,
-        engine=problem.engine,
-        quantiles=quantiles,
-        unit=problem.unit,
+        StackRequest(
+            limit=problem.limit,
+            required_yield=problem.required_yield,
+            n=n,
+            seed=seed,
+            engine=problem.engine,
+            quantiles=quantiles,
+            unit=problem.unit,
+        ),
     )
 
 
-def _refuse_unreachable(problem: Problem, best: float) -> None:
+def _refuse_unreachable(problem: AllocationProblem, best: float) -> None:
     if best > problem.limit:
         bounds = ", ".join(f"{item.name} >= {item.bounds[0]:g}" for item in problem.items)
         held = [name for name in problem.space.names if name not in {item.name for item in problem.items}]
@@ -271,11 +273,13 @@ def _refuse_unreachable(problem: Problem, best: float) -> None:
         )
 
 
-def _tangent(problem: Problem, rule: str, value: float, slopes: Array, at: Array) -> Requirement:
+def _tangent(problem: AllocationProblem, rule: str, value: float, slopes: Array, at: Array) -> Requirement:
     return Requirement(problem.limit, slopes, np.zeros_like(slopes), value - float(slopes @ at), rule=rule)
 
 
-def _quantile_constraint(problem: Problem, target: float, seed: int, points: int = MODEL_POINTS) -> _Constraint:
+def _quantile_constraint(
+    problem: AllocationProblem, target: float, seed: int, points: int = MODEL_POINTS
+) -> _Constraint:
     """The target quantile of the response on one fixed sample, as a function of the tolerances, with its tangents."""
     names = problem.space.names
     replicates = 4
@@ -314,7 +318,9 @@ def _quantile_constraint(problem: Problem, target: float, seed: int, points: int
     return _Constraint("yield", model, value)
 
 
-def _successive(problem: Problem, constraint: _Constraint, measured: Callable[[Array], float]) -> tuple[Solution, int]:
+def _successive(
+    problem: AllocationProblem, constraint: _Constraint, measured: Callable[[Array], float]
+) -> tuple[Solution, int]:
     """Renew the convex model at its own solution until it stays there, then correct the last model's limit until the
     response as `measured` keeps the limit. A shrinking reach keeps the steps within what a model can know."""
     at, reach, cost, step = problem.current, REACH, math.inf, 0
@@ -350,7 +356,7 @@ def _chosen(item: Item, tolerance: float) -> Item:
 
 
 def _corrected(
-    problem: Problem, items: Sequence[Item], requirement: Requirement, measured: Callable[[Array], float]
+    problem: AllocationProblem, items: Sequence[Item], requirement: Requirement, measured: Callable[[Array], float]
 ) -> Solution:
     """Solutions of one convex model under a limit moved by what the response is measured to exceed it."""
     limit, best, value = problem.limit, None, math.inf
@@ -381,7 +387,7 @@ def _within(item: Item, tolerance: float, reach: float) -> Item:
     return replace(item, lower=min(max(tolerance / reach, low), high * 0.999), upper=min(tolerance * reach, high))
 
 
-def _by_rule(problem: Problem, constraint: _Constraint, seed: int) -> Allocation:
+def _by_rule(problem: AllocationProblem, constraint: _Constraint, seed: int) -> Allocation:
     solution, steps = _successive(problem, constraint, constraint.value)
     tolerances = np.array(list(solution.tolerances.values()))
     judged = _judge(problem, tolerances, COMPARE_POINTS, seed + 1)
@@ -389,7 +395,7 @@ def _by_rule(problem: Problem, constraint: _Constraint, seed: int) -> Allocation
 
 
 def _allocation(
-    rule: str, problem: Problem, solution: Solution, modelled: float, judged: Stack, steps: int
+    rule: str, problem: AllocationProblem, solution: Solution, modelled: float, judged: Stack, steps: int
 ) -> Allocation:
     return Allocation(
         rule=rule,
@@ -407,7 +413,7 @@ def _allocation(
     )
 
 
-def yield_cost_curve(problem: Problem, limits: Sequence[float], seed: int = 1) -> list[tuple[float, float]]:
+def yield_cost_curve(problem: AllocationProblem, limits: Sequence[float], seed: int = 1) -> list[tuple[float, float]]:
     """Least cost by the yield rule at each limit, NaN where it cannot be met; as the rule's models see it, with its
     margin but without the correction by a larger sample (within about 1 % of the limit)."""
     target = problem.required_yield + yield_margin(problem.required_yield, DESIGN_POINTS, DESIGN_POINTS)

@@ -11,12 +11,13 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hdopt.allocation.cost import CostModel, GradeTable, Piecewise
 from hdopt.errors import HdoptError
-from hdopt.tolerance.cost import CostModel, GradeTable, Piecewise
 
 Array = NDArray[np.float64]
 
@@ -225,7 +226,7 @@ def _solve_convex(items: Sequence[Item], requirement: Requirement) -> Solution:
     with warnings.catch_warnings():
         # asked for more digits than it may reach, the solver says so; slack and gap are computed anew below
         warnings.filterwarnings("ignore", "Solution may be inaccurate")
-        problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-12, tol_gap_rel=1e-12, tol_feas=1e-12, max_iter=500)
+        _solve(problem, cp.CLARABEL, tol_gap_abs=1e-12, tol_gap_rel=1e-12, tol_feas=1e-12, max_iter=500)
     if problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
         raise HdoptError(f"the solver ended with {problem.status!r}; check the cost data and the bounds")
     multiplier = float(meets.dual_value) * cost_unit / unit
@@ -233,6 +234,19 @@ def _solve_convex(items: Sequence[Item], requirement: Requirement) -> Solution:
     tolerances = _pull_inside(items, requirement, tolerances)
     bound = _lagrange_bound(items, requirement, multiplier, tolerances)
     return _finish(items, requirement, tolerances, lower_bound=bound, marginal_cost=multiplier, solver="Clarabel")
+
+
+def _solve(problem: Any, solver: str, **options: Any) -> None:
+    """Solve a CVXPY problem; a solver that gives up on its numbers is unusable input."""
+    import cvxpy as cp
+
+    try:
+        problem.solve(solver=solver, **options)
+    except cp.error.SolverError as error:
+        raise HdoptError(
+            f"the solver {solver} gave up on these costs and tolerances; see whether each has the unit its name says "
+            "and none is a million times another"
+        ) from error
 
 
 def _pull_inside(items: Sequence[Item], requirement: Requirement, tolerances: Array) -> Array:
@@ -275,26 +289,13 @@ def _solve_with_choices(items: Sequence[Item], requirement: Requirement) -> Solu
     scale, unit = _scales(items), max(abs(requirement.limit), 1e-300)
     low, high = _scaled_bounds(items, scale)
     t, cost = cp.Variable(len(items)), cp.Variable(len(items))
-    constraints = [t <= high, t >= low]
-    curved: list[int] = []
-    for i, item in enumerate(items):
-        if isinstance(item.cost, GradeTable):
-            allowed = [g for g in item.cost.grades if item.lower <= g.tolerance <= item.upper]
-            pick = cp.Variable(len(allowed), boolean=True)
-            tolerances = np.array([g.tolerance for g in allowed]) / item.scale
-            costs = np.array([g.cost for g in allowed])
-            constraints += [cp.sum(pick) == 1, t[i] == tolerances @ pick, cost[i] == costs @ pick]
-        elif isinstance(item.cost, Piecewise) and not item.cost.convex:
-            constraints += _piecewise_choice(item, t[i], cost[i])
-        else:
-            curved.append(i)
-            constraints += [_cost_tangent(items[i], t[i], cost[i], x) for x in _first_tangents(low[i], high[i])]
+    constraints, curved = _choices(items, t, cost, low, high)
     constraints.append(_requirement_tangent(requirement, scale, unit, t, np.clip(np.ones(len(items)), low, high)))
     best: tuple[float, Array, float | None] | None = None
     bound, tried = -math.inf, set()
     for _ in range(ROUNDS):
         problem = cp.Problem(cp.Minimize(cp.sum(cost)), constraints)
-        problem.solve(solver=cp.HIGHS, mip_rel_gap=1e-9, mip_abs_gap=1e-12)
+        _solve(problem, cp.HIGHS, mip_rel_gap=1e-9, mip_abs_gap=1e-12)
         if problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
             break  # no choice is left that the tangents allow
         bound = max(bound, float(problem.value))
@@ -331,6 +332,28 @@ def _solve_with_choices(items: Sequence[Item], requirement: Requirement) -> Solu
         marginal_cost=best[2],
         solver="HiGHS and Clarabel",
     )
+
+
+def _choices(items: Sequence[Item], t: Any, cost: Any, low: Array, high: Array) -> tuple[list[Any], list[int]]:
+    """Constraints of the master problem: one grade or segment of each item that has some, first tangents below the
+    cost of the others; and which those others are. `t` and `cost` are CVXPY's variables, which have no types."""
+    import cvxpy as cp
+
+    constraints: list[Any] = [t <= high, t >= low]
+    curved: list[int] = []
+    for i, item in enumerate(items):
+        if isinstance(item.cost, GradeTable):
+            allowed = [g for g in item.cost.grades if item.lower <= g.tolerance <= item.upper]
+            pick = cp.Variable(len(allowed), boolean=True)
+            tolerances = np.array([g.tolerance for g in allowed]) / item.scale
+            costs = np.array([g.cost for g in allowed])
+            constraints += [cp.sum(pick) == 1, t[i] == tolerances @ pick, cost[i] == costs @ pick]
+        elif isinstance(item.cost, Piecewise) and not item.cost.convex:
+            constraints += _piecewise_choice(item, t[i], cost[i])
+        else:
+            curved.append(i)
+            constraints += [_cost_tangent(items[i], t[i], cost[i], x) for x in _first_tangents(low[i], high[i])]
+    return constraints, curved
 
 
 def _choice(item: Item, tolerance: float) -> float | tuple[tuple[float, float], ...] | None:

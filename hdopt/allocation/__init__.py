@@ -1,0 +1,1 @@
+"""Least-cost tolerances: what they cost, the rules they keep, and the solvers."""

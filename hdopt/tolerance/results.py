@@ -1,0 +1,69 @@
+"""What a stack and a sensitivity analysis of a study leave."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from hdopt.kinematics.model_error import ModelError
+from hdopt.tolerance.sensitivity import Shapley, Sobol
+from hdopt.tolerance.stack import Stack
+from hdopt.tolerance.tail import Tail
+from hdopt.tolerance.worst_case import WorstCase
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class StackResult:
+    """A stack with what was asked for beside it."""
+
+    study: str
+    stack: Stack
+    worst_case: WorstCase | None = None
+    tail: Tail | None = None
+    notes: tuple[str, ...] = ()
+    method: str | None = None
+    """closed form or exact: the geometry of the drives' kinematic error; None where there is no drive."""
+    model_error: ModelError | None = None
+    """Of the closed form against the exact geometry, for a pilot of the drives."""
+
+    def to_dict(self) -> dict[str, Any]:
+        result = {"study": self.study, "method": self.method, **self.stack.to_dict()}
+        if self.model_error is not None:
+            result["model_error"] = self.model_error.to_dict()
+        result["notes"] = [*result["notes"], *self.notes]
+        if self.worst_case is not None:
+            result[f"worst_case_{self.stack.unit}"] = self.worst_case.to_dict()
+        if self.tail is not None:
+            result["tail"] = self.tail.to_dict()
+        return result
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a figure, with its interval."""
+        return self.stack.to_frame()
+
+
+@dataclass(frozen=True)
+class SobolResult:
+    """Sobol' indices of independent inputs, or Shapley effects; either may be absent."""
+
+    study: str
+    sobol: Sobol | None = None
+    shapley: Shapley | None = None
+    notes: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        result: dict[str, Any] = {"study": self.study}
+        if self.shapley is not None:
+            result |= self.shapley.to_dict()
+        if self.sobol is not None:
+            result |= self.sobol.to_dict()
+        return {"groups": {}, **result, "notes": list(self.notes)}
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row an input or group; of the Shapley effects where there are no Sobol' indices."""
+        table = self.sobol or self.shapley
+        assert table is not None, "a result holds indices, effects, or both"
+        return table.to_frame()
