@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 from hdopt.errors import HdoptError
 
 if TYPE_CHECKING:
-    from hdopt.diagnosis.verdict import Diagnosis
-    from hdopt.drive import Drive
-    from hdopt.recording import Recording
+    from hdopt.diagnosis.settings import DiagnosisSettings
+    from hdopt.diagnosis.verdict.diagnosis import Diagnosis
+    from hdopt.drive.geometry import Drive
+    from hdopt.recordings.read import Recording
 
 
 def diagnose(
@@ -21,26 +22,32 @@ def diagnose(
     columns: str | None = None,
     seed: int = 1,
     nuisance: Sequence[str] = (),
+    settings: DiagnosisSettings | None = None,
 ) -> Diagnosis:
     """Say whether the model of `drive` explains the recordings, and if not, what physics was left out.
 
-    `recordings`: files, or `hdopt.recording.Recording`s, of one drive, fitted jointly. `drive` None diagnoses a gear of
-    `ratio` without a harmonic-drive model. `nuisance` ("drift", "time-warp") is fitted beside every model and never
-    named: for recordings without a sensor at the input. The same seed gives the same answer.
-    """
-    from threadpoolctl import threadpool_limits
+    `recordings`: files, or `hdopt.recordings.read.Recording`s, of one drive, fitted jointly; `columns` says which
+    column of a file is what (as `--columns`). `drive` None diagnoses a gear of `ratio` without a harmonic-drive model.
+    `nuisance` ("drift", "time-warp") is fitted beside every model and never named: for recordings without a sensor at
+    the input. The same `seed` gives the same answer. `settings` are the thresholds (None: as shipped).
 
+    Raises `HdoptError` where there is no recording, the ratio is unknown or contradicts the drive's, or a recording
+    cannot be used.
+    """
+    from hdopt.diagnosis.numerical import RATIO_DIGITS
     from hdopt.diagnosis.pipeline import gather_evidence
-    from hdopt.diagnosis.verdict import draw_verdict
+    from hdopt.diagnosis.settings import DEFAULT
+    from hdopt.diagnosis.verdict.draw import draw_verdict
     from hdopt.kinematics.cartesian import CartesianModel
-    from hdopt.recording import Recording, read_recording
+    from hdopt.parallel.workers import one_linear_algebra_thread
+    from hdopt.recordings.read import Recording, read_recording
 
     if isinstance(recordings, Recording | str | Path):
         recordings = [recordings]
     if not recordings:
         raise HdoptError("no recordings were given; give at least one file")
     if drive is not None:
-        if ratio is not None and abs(ratio - drive.geometry.ratio) > 1e-9:
+        if ratio is not None and abs(ratio - drive.geometry.ratio) > RATIO_DIGITS:
             raise HdoptError(
                 f"the ratio given is {ratio:g}, the drive's is {drive.geometry.ratio:g}; leave --ratio out, or give "
                 "--drive none with it"
@@ -49,9 +56,10 @@ def diagnose(
     if ratio is None:
         raise HdoptError("the ratio is not known; give --drive NAME, or --drive none with --ratio X")
     read = [r if isinstance(r, Recording) else read_recording(r, ratio, columns) for r in recordings]
-    if any(abs(r.ratio - ratio) > 1e-9 for r in read):
+    if any(abs(r.ratio - ratio) > RATIO_DIGITS for r in read):
         raise HdoptError("the recordings were read with different ratios; all must be of one drive")
     # Many small matrices: threads of the linear algebra would only wait for each other.
-    with threadpool_limits(1, user_api="blas"):
-        evidence = gather_evidence(read, None if drive is None else CartesianModel.of(drive), seed, nuisance)
+    base = None if drive is None else CartesianModel.of(drive)
+    with one_linear_algebra_thread():
+        evidence = gather_evidence(read, base, seed, nuisance, settings or DEFAULT)
         return draw_verdict(evidence, tuple(w for r in read for w in r.warnings))

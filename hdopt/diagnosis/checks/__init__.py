@@ -1,0 +1,1 @@
+"""What a found explanation must stand: rivals, wander, steps, and what remains."""

@@ -1,0 +1,207 @@
+"""The numbers that carry the verdict: held-out errors, the placebo, what is left, false alarms, limits of detection."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.diagnosis.checks.scale import Scale, fitted_scale
+from hdopt.diagnosis.checks.slow_wander import SlowWave, slow_wave
+from hdopt.diagnosis.checks.step_detection import Steps, sudden_steps
+from hdopt.diagnosis.inference.catalogue import STRAIN_WAVE_ONLY
+from hdopt.diagnosis.inference.conditions import AcrossConditions, across_conditions
+from hdopt.diagnosis.inference.cross_validation import HeldOut, family_wise_p, held_out, paired_t, turn_folds
+from hdopt.diagnosis.inference.fit import Fit, term_columns
+from hdopt.diagnosis.inference.generic_basis import useful_columns
+from hdopt.diagnosis.inference.nuisance import Nuisances
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.numerical import MAD_TO_SIGMA, SMALLEST_POWER, TINY
+from hdopt.diagnosis.orientation import Orientation
+from hdopt.diagnosis.search.candidates import scale_of, search_terms
+from hdopt.diagnosis.search.penalty import Scale as PenaltyScale
+from hdopt.diagnosis.search.penalty import penalty
+from hdopt.diagnosis.search.subset_search import Selection
+from hdopt.diagnosis.settings import DiagnosisSettings
+from hdopt.diagnosis.state import State
+from hdopt.effects import EFFECTS, HIGH_ORDER
+from hdopt.effects.probe import strongest_orders
+from hdopt.effects.term import Term
+from hdopt.recordings.recording import Recording
+from hdopt.recordings.rows import Rows
+
+Array = NDArray[np.float64]
+
+SECOND_DIFFERENCE = 6
+"""Variance of a second difference of white noise over the noise's own: 1 + 4 + 1."""
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What a fit leaves, as seen by the generic basis: its held-out error, the t of its win, its largest domain."""
+
+    held_out: HeldOut
+    t: float
+    domains: dict[str, float]
+    orders: tuple[float, ...]
+    columns: Array
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Everything the verdict is drawn from."""
+
+    rows: Rows
+    selection: Selection
+    high: Selection | None
+    nuisances: Nuisances
+    base_held_out: HeldOut
+    extended_held_out: HeldOut
+    generic_held_out: HeldOut
+    placebo_held_out: HeldOut
+    placebo: str | None
+    across_conditions: AcrossConditions | None
+    remainder: Remainder
+    noise_floor: float
+    false_alarm_p: float
+    inflation: float
+    lacking: dict[str, str]
+    below_detection: dict[str, float]
+    steps: Steps
+    wave: SlowWave | None
+    orientation: Orientation
+    neighbours_arcmin: float
+    sensor_arcmin: float
+    scale: Scale | None
+
+    @property
+    def settings(self) -> DiagnosisSettings:
+        """Thresholds of this diagnosis."""
+        return self.selection.base.problem.settings
+
+
+def assess(state: State) -> Evidence:
+    """The evidence on the last state of a diagnosis."""
+    rng, selection = state.draws(), state.selection
+    base, best, inflation = selection.base, selection.best.fit, state.inflation
+    folds = turn_folds(base, rng)
+    base_out = held_out(base, None, folds)
+    best_out = base_out if best is base else held_out(best, None, folds)
+    remainder = look_at_remainder(best, folds, inflation)
+    generic_out = remainder.held_out
+    if best is not base:
+        generic_out = held_out(base, useful_columns(FitProbe(base), inflation)[0], folds)
+    probe = FitProbe(base)
+    strange = STRAIN_WAVE_ONLY if base.problem.base is None else ()
+    pool = search_terms(probe, skip=(*state.nuisances.hidden, *strange))
+    scale = scale_of(base.problem, inflation)
+    penalties = [penalty([term], 0.0, scale) for term in pool]
+    observed = max(
+        [
+            *(probe.gain(t) / 2 / inflation - paid for t, paid in zip(pool, penalties, strict=True)),
+            selection.best.log_bayes_factor if best is not base else -np.inf,
+        ],
+        default=-np.inf,
+    )
+    placebo = best_placebo(probe, pool, best)
+    return Evidence(
+        rows=state.problem.rows,
+        selection=selection,
+        high=state.high,
+        nuisances=state.nuisances,
+        base_held_out=base_out,
+        extended_held_out=best_out,
+        generic_held_out=generic_out,
+        placebo_held_out=base_out if placebo is None else placebo_error(probe, placebo, folds),
+        placebo=None if placebo is None else placebo.effect,
+        across_conditions=across_conditions(base, best),
+        remainder=remainder,
+        noise_floor=float(np.sqrt(min(remainder.held_out.variance, best_out.variance))),
+        false_alarm_p=family_wise_p(probe, pool, penalties, rng, observed, inflation) if pool else 1.0,
+        inflation=inflation,
+        lacking=lacking_effects(state, strange),
+        below_detection=detection_limits(FitProbe(best), pool, scale),
+        steps=sudden_steps(best),
+        wave=slow_wave(best),
+        orientation=state.orientation,
+        neighbours_arcmin=noise_between_neighbours(state.recordings),
+        sensor_arcmin=max(one.quantum_arcmin for one in state.recordings),
+        scale=fitted_scale(best),
+    )
+
+
+def best_placebo(probe: FitProbe, pool: Sequence[Term], best: Fit) -> Term | None:
+    """Of the terms in `pool` the single one of the catalogue that explains most of what `probe` sees and is no part of
+    the `best` fit.
+    """
+    found = {t.effect for t in best.terms}
+    others = [t for t in pool if t.effect not in found and t.effect in EFFECTS]
+    return max(others, key=probe.gain, default=None)
+
+
+def placebo_error(probe: FitProbe, placebo: Term, folds: NDArray[np.int64]) -> HeldOut:
+    """Held-out error, on `folds` (n,), with the `placebo` beside the base that `probe` looks at."""
+    return held_out(probe.fit, term_columns(placebo, probe.fit.zone, probe.fit.problem.base), folds)
+
+
+def noise_between_neighbours(recordings: Sequence[Recording]) -> float:
+    """Standard deviation (arcmin) of the noise of one sample of the `recordings` as recorded, from second differences
+    of neighbours, in which whatever is smooth over three samples vanishes: the median over the recordings.
+    """
+    sizes = [np.median(np.abs(np.diff(one.error_arcmin, 2))) for one in recordings]
+    return float(np.median(sizes)) * MAD_TO_SIGMA / math.sqrt(SECOND_DIFFERENCE)
+
+
+def lacking_effects(state: State, strange: Sequence[str]) -> dict[str, str]:
+    """What the recording lacks for each effect that it cannot show; `strange` are those that its gear cannot have.
+    `state` is the last one.
+    """
+    has_base, rows = state.problem.base is not None, state.problem.rows
+    lacking = {}
+    for effect in EFFECTS.values():
+        reason = effect.lacks(rows) if has_base or not effect.needs_base else "a harmonic-drive model (--drive)"
+        if reason:
+            lacking[effect.id] = reason
+    lacking |= {name: "a harmonic drive (--drive)" for name in strange}
+    lacking |= {name: "a fit without a free drift (--nuisance)" for name in state.nuisances.hidden}
+    if state.high is not None:
+        # What only needs more rows a turn was looked for on the rows as recorded.
+        raw = state.high.base.problem.rows
+        return {name: reason for name, reason in lacking.items() if name not in HIGH_ORDER or EFFECTS[name].lacks(raw)}
+    return lacking
+
+
+def look_at_remainder(fit: Fit, folds: NDArray[np.int64], inflation: float) -> Remainder:
+    """Held-out gain of the generic basis beside `fit`, on `folds` (n,) of its rows, in noise rougher by `inflation`."""
+    settings = fit.problem.settings.held_out
+    probe = FitProbe(fit)
+    columns, domains = useful_columns(probe, inflation)
+    orders = () if fit.problem.rows.locked else tuple(strongest_orders(probe, settings.remainder_orders))
+    own = held_out(fit, None, folds)
+    generic = held_out(fit, columns, folds)
+    gains = {}
+    for domain in dict.fromkeys(domains):
+        chosen = [i for i, d in enumerate(domains) if d == domain]
+        alone = held_out(fit, columns[:, chosen], folds)
+        gains[domain] = own.variance - alone.variance
+    t = paired_t(own.white, generic.white, settings)
+    return Remainder(generic, t, gains, orders, columns)
+
+
+def detection_limits(probe: FitProbe, terms: Sequence[Term], scale: PenaltyScale) -> dict[str, float]:
+    """Smallest rms (arcmin) of each effect of `terms` that would have been found in the residual of `probe`: where its
+    gain just pays its penalty by `scale`.
+    """
+    limits: dict[str, float] = {}
+    for term in terms:
+        raw = term_columns(term, probe.fit.zone, probe.fit.problem.base)
+        left = (probe.columns(term) ** 2).sum(0)
+        power = np.maximum((raw**2).mean(0), TINY)
+        visible = float(np.mean(left / power))
+        needed = 2 * scale.inflation * penalty([term], 0.0, scale) * probe.noise.sigma**2
+        limit = math.sqrt(needed / max(visible, SMALLEST_POWER))
+        limits[term.effect] = min(limit, limits.get(term.effect, math.inf))
+    return limits

@@ -1,0 +1,140 @@
+"""Which other effects could be mistaken for the ones found, on the recording at hand.
+
+Two effects are confounded as far as the columns of one lie in the span of the other's, once both are whitened and
+freed of what the base, the offsets and the other effects of the fit can absorb. The smallest principal angle between
+the two spans (Bjoerck, Golub, "Numerical methods for computing angles between linear subspaces", Math. Comp. 27, 1973)
+says how near their nearest members are; how much of the found effect's own contribution the other could imitate says
+what that means for this drive, and what is left of it over the noise says whether this recording still tells the two
+apart. All follow from the recording: two speeds part what one speed leaves alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.numerical import SPAN_RANK
+from hdopt.diagnosis.search.candidates import search_terms
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.effects import EFFECTS
+from hdopt.effects.term import Term
+
+Array = NDArray[np.float64]
+
+RIGHT_ANGLE_DEG = 90.0
+
+
+@dataclass(frozen=True)
+class Confounding:
+    """How far the effect `other` could pass for the `effect` found.
+
+    `angle_deg` is the smallest principal angle between their columns; `imitates` the share, 0 to 1, of the power of the
+    effect's contribution that the other could take over; `evidence_apart` the log evidence that the rest of it holds
+    against the other; `separating` the measurement that would part them.
+    """
+
+    effect: str
+    other: str
+    angle_deg: float
+    imitates: float
+    evidence_apart: float
+    separating: str
+
+    def to_dict(self) -> dict[str, object]:
+        """As in the JSON."""
+        return {
+            "pair": [self.effect, self.other],
+            "angle_deg": self.angle_deg,
+            "imitates": self.imitates,
+            "evidence_apart": self.evidence_apart,
+            "separating": self.separating,
+        }
+
+
+def remaining_span(white: Array, projected: Array, absorbed: float = DEFAULT.verdict.absorbed) -> Array:
+    """Orthonormal basis (n, r) of what a projection left of the columns `white` (n, p): of `projected` (n, p). Of a
+    column shorter than `absorbed` of its length before, nothing is left but rounding.
+    """
+    before, after = np.linalg.norm(white, axis=0), np.linalg.norm(projected, axis=0)
+    kept = after > absorbed * before
+    if not kept.any():
+        return np.empty((len(white), 0))
+    basis, size, _ = np.linalg.svd(projected[:, kept] / after[kept], full_matrices=False)
+    return basis[:, size > SPAN_RANK * size[0]]
+
+
+def smallest_angle_deg(one: Array, other: Array) -> float:
+    """Smallest principal angle between the spans of two orthonormal bases, (n, p) and (n, q), deg; 90 for an empty
+    one. `one` and `other` hold them as columns.
+    """
+    if one.shape[1] == 0 or other.shape[1] == 0:
+        return RIGHT_ANGLE_DEG
+    return float(np.degrees(np.arccos(np.clip(np.linalg.norm(one.T @ other, 2), 0.0, 1.0))))
+
+
+def share_in_span(contribution: Array, basis: Array) -> float:
+    """Share of the power of `contribution` (n,) that lies in the span of an orthonormal `basis` (n, q)."""
+    power = float(contribution @ contribution)
+    return min(float(np.sum((basis.T @ contribution) ** 2)) / power, 1.0) if power > 0 else 0.0
+
+
+def confounded_with(
+    fit: Fit,
+    index: int,
+    inflation: float = 1.0,
+    others: Sequence[str] | None = None,
+    order_range: tuple[float, float] | None = None,
+) -> list[Confounding]:
+    """Every other effect against term `index` of `fit`, the one that could imitate most of it first.
+
+    The term stands at its fitted shape. An effect of `others` (ids; None for the whole catalogue) that is in the
+    fit too stands at its own; any other at the shape that comes closest to the term's contribution. An effect
+    that the recording cannot show is left out: `Effect.lacks` says so elsewhere. `inflation` is how much rougher
+    the noise is, turn by turn, than the fit's noise model has it. Orders in `order_range` are searched (None:
+    all).
+    """
+    term = fit.terms[index]
+    fitted = {t.effect: i for i, t in enumerate(fit.terms)}
+    names = [name for name in (EFFECTS if others is None else others) if name != term.effect]
+    found = []
+    probe = FitProbe(_only_contribution(fit, index, ()), order_range=order_range)
+    for name in names:
+        if name in fitted:
+            seen = FitProbe(_only_contribution(fit, index, [fitted[name]]), order_range=order_range)
+            candidates = [fit.terms[fitted[name]]]
+        else:
+            seen = probe
+            candidates = search_terms(probe, only=[name])
+        own = _basis(seen, term)
+        contribution = seen.white_residual
+        compared = [
+            (share_in_span(contribution, basis), smallest_angle_deg(own, basis))
+            for basis in (_basis(seen, candidate) for candidate in candidates)
+        ]
+        if compared:
+            imitates, angle = max(compared)
+            power = float(contribution @ contribution) / fit.problem.noise.sigma**2
+            apart = (1 - imitates) * power / 2 / inflation
+            found.append(Confounding(term.effect, name, angle, imitates, apart, EFFECTS[term.effect].separating))
+    return sorted(found, key=lambda pair: -pair.imitates)
+
+
+def _only_contribution(fit: Fit, index: int, without: Sequence[int]) -> Fit:
+    """`fit` freed of term `index` (and those `without`), on data that are that term's contribution and nothing else."""
+    kept = [i for i in range(len(fit.terms)) if i != index and i not in without]
+    return replace(
+        fit,
+        terms=tuple(fit.terms[i] for i in kept),
+        coefficients=tuple(fit.coefficients[i] for i in kept),
+        prediction=fit.problem.rows.error - fit.contribution(index),
+    )
+
+
+def _basis(probe: FitProbe, term: Term) -> Array:
+    white = probe.white_columns(term)
+    return remaining_span(white, probe.project(white), probe.fit.problem.settings.verdict.absorbed)

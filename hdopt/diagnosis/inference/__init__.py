@@ -1,0 +1,1 @@
+"""Fits of models to recordings: noise, held-out error, and what may enter a fit."""

@@ -1,0 +1,58 @@
+"""What passes the drive's torsional spring: the motion of teeth and bearings excites whatever swings behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.diagnosis.inference.catalogue import properties_of
+from hdopt.effects.term import Term
+from hdopt.recordings.rows import Rows
+
+Array = NDArray[np.float64]
+
+
+def excites(term: Term) -> bool:
+    """Whether a term moves the drive's output itself: it acts in the meshing zones, or its effect `excites`."""
+    return term.zones is not None or properties_of(term.effect).excites
+
+
+def is_driven(term: Term) -> bool:
+    """Whether a term's columns follow the motion of the drive."""
+    return properties_of(term.effect).driven
+
+
+def motion_of(base_value: Array, terms: Sequence[Term], coefficients: Sequence[Array]) -> Array:
+    """The drive's motion before its spring, arcmin, (n,): `base_value`, which holds what acts in the zones, and what
+    the other exciting terms add. `coefficients` holds those of each term.
+    """
+    motion = base_value
+    for term, c in zip(terms, coefficients, strict=True):
+        if term.columns is not None and excites(term):
+            motion = motion + term.columns @ c
+    return motion
+
+
+def driven_by(motion: Array, rows: Rows, terms: Sequence[Term]) -> tuple[Term, ...]:
+    """`terms` with the columns of the driven ones as `motion` excites them. `rows` are those of the recordings."""
+    return tuple(
+        replace(term, columns=properties_of(term.effect).term(rows, term.shape, motion).columns)
+        if is_driven(term)
+        else term
+        for term in terms
+    )
+
+
+def transmitted(columns: Array, rows: Rows, terms: Sequence[Term], coefficients: Sequence[Array]) -> Array:
+    """Columns of the drive's motion (n, k) as the output shows them: with what the driven ones of `terms` add.
+    `columns` are in arcmin per coefficient. `rows` are those of the recordings. `coefficients` holds those of
+    each term.
+    """
+    seen = columns
+    for term, c in zip(terms, coefficients, strict=True):
+        if is_driven(term) and columns.shape[1]:
+            seen = seen + properties_of(term.effect).response(rows, term.shape, c, columns)
+    return seen

@@ -1,0 +1,164 @@
+"""Base fit: the kinematic-error model's twelve errors, estimated from recordings.
+
+What Jia 2021 did by hand for its Table 5. The waveform is the larger of two zones, so it is not smooth and has
+several minima: the fit starts from many random drives on thinned rows, keeps those that come out best, and refines
+them on all rows.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
+from hdopt.diagnosis.numerical import HALF, NORMAL_95, SMALLEST_POWER
+from hdopt.diagnosis.settings import DEFAULT, BaseSettings
+from hdopt.drive.errors import ERROR_NAMES, DriveErrors
+from hdopt.effects.estimate import Parameter
+from hdopt.effects.sines import sine_columns
+from hdopt.effects.term import Term
+from hdopt.kinematics.cartesian import CARTESIAN_NAMES, PARAMETERS, to_drive_errors
+from hdopt.recordings.rows import Rows
+
+Array = NDArray[np.float64]
+
+
+def fit_base(
+    problem: FitProblem,
+    rng: np.random.Generator,
+    starts: int | None = None,
+    terms: tuple[Term, ...] = (),
+    near: Fit | None = None,
+) -> Fit:
+    """The best fit of the base of `problem`, with `terms` beside it, from so many random drives (`starts`; None: as
+    set) drawn by `rng`, and from `near` where given.
+    """
+    settings = problem.settings.base
+    starts = settings.starts if starts is None else starts
+    zeros = [np.zeros(term.width) for term in terms]
+    offsets = np.zeros(problem.nuisance.shape[1])
+    if problem.base is None:
+        return refine(evaluate(problem, np.zeros(0), offsets, terms, zeros))
+    stride = max(1, len(problem.rows) // settings.rows_for_starts)
+    mask = np.zeros(len(problem.rows), bool)
+    mask[::stride] = True
+    thin = problem.only(mask)
+    thin_terms = [_thin(term, mask) for term in terms]
+    candidates: list[Fit] = []
+    for index in range(starts):
+        errors = rng.normal(size=PARAMETERS) * problem.prior
+        errors = errors * rng.uniform(settings.smallest_start, settings.largest_start)
+        start = evaluate(thin, errors, offsets, thin_terms, zeros)
+        start = _solve_offsets(start)
+        candidates.append(refine(start, settings.start_iterations, settings.start_tolerance, move_shapes=False))
+        candidates.sort(key=lambda fit: fit.objective)
+        # Enough starts have met in the same best minimum.
+        met = sum(c.objective < settings.same_minimum * candidates[0].objective for c in candidates)
+        if index + 1 >= settings.fewest_starts and met >= settings.same_minimum_starts:
+            break
+    finals = []
+    for candidate in candidates[: settings.kept_starts]:
+        full = evaluate(problem, candidate.errors, candidate.offsets, terms, candidate.coefficients)
+        finals.append(refine(full, settings.full_iterations, move_shapes=False))
+    if near is not None:
+        again = evaluate(problem, near.errors, near.offsets, terms, near.coefficients if near.terms else zeros)
+        finals.append(refine(again, settings.full_iterations, move_shapes=False))
+    return min(finals, key=lambda fit: fit.objective)
+
+
+def _thin(term: Term, mask: NDArray[np.bool_]) -> Term:
+    return replace(
+        term,
+        columns=None if term.columns is None else term.columns[mask],
+        zones=None if term.zones is None else term.zones[:, mask],
+    )
+
+
+def _solve_offsets(fit: Fit) -> Fit:
+    nuisance = fit.problem.nuisance
+    offsets = fit.offsets + np.linalg.lstsq(nuisance, fit.residual, rcond=None)[0]
+    return evaluate(fit.problem, fit.errors, offsets, fit.terms, fit.coefficients)
+
+
+@dataclass(frozen=True)
+class BaseEstimate:
+    """The base's errors as a drive's: parameters with intervals, and combinations that the recording leaves open."""
+
+    errors: DriveErrors
+    parameters: dict[str, Parameter]
+    open_combinations: tuple[str, ...]
+    rms_arcmin: float
+
+
+def base_estimate(fit: Fit) -> BaseEstimate:
+    """What the fit says of the drive's errors, with 95 % intervals and what it leaves open."""
+    base = fit.problem.base
+    rms = float(np.std(fit.base_value)) if base is not None else 0.0
+    if base is None:
+        return BaseEstimate(DriveErrors(), {}, (), rms)
+    half_width, step = base.half_width, fit.problem.settings.base.slope_step_mm
+    covariance = fit.covariance()[:PARAMETERS, :PARAMETERS]
+    errors = to_drive_errors(fit.errors, half_width)
+    values = errors.to_matrix()[0]
+    jacobian = np.empty((PARAMETERS, PARAMETERS))
+    for i in range(PARAMETERS):
+        up, down = fit.errors.copy(), fit.errors.copy()
+        up[i] += step
+        down[i] -= step
+        change = to_drive_errors(up, half_width).to_matrix()[0] - to_drive_errors(down, half_width).to_matrix()[0]
+        change = np.where(np.abs(change) > np.pi, change - np.sign(change) * 2 * np.pi, change)
+        jacobian[:, i] = change / (2 * step)
+    spread = NORMAL_95 * np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0))
+    parameters = {}
+    for name, value, half in zip(ERROR_NAMES, values, spread, strict=True):
+        length = name in ("axis_eccentricity", "wg_eccentricity", "cs_tooth_amplitude", "fs_tooth_amplitude")
+        factor, unit, suffix = (1.0, "mm", "mm") if length else (math.degrees(1), "deg", "deg")
+        low = value - half
+        if length:
+            low = max(low, 0.0)
+        parameters[f"{name}_{suffix}"] = Parameter(factor * value, factor * low, factor * (value + half), unit)
+    return BaseEstimate(
+        errors, parameters, open_combinations(covariance, fit.problem.prior, fit.problem.settings.base), rms
+    )
+
+
+def open_combinations(covariance: Array, prior: Array, settings: BaseSettings = DEFAULT.base) -> tuple[str, ...]:
+    """Combinations of Cartesian errors that the data leave uncertain by a good part of their prior, largest members
+    named: from their `covariance` (12, 12) in mm^2 and the standard deviations of their `prior` (12,) in mm.
+    `settings` are the thresholds.
+    """
+    values, vectors = np.linalg.eigh(covariance / np.outer(prior, prior))
+    found = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value > settings.open_share:
+            order = np.argsort(-np.abs(vector))
+            least = settings.open_member * abs(vector[order[0]])
+            members = [i for i in order if abs(vector[i]) > least][: settings.open_members]
+            found.append(" with ".join(CARTESIAN_NAMES[i] for i in members))
+    return tuple(found)
+
+
+def beat_warning(rows: Rows, settings: BaseSettings = DEFAULT.base) -> str | None:
+    """What a record shorter than an output turn cannot carry: whole orders k and those of the flexspline, k (1 + 1/N).
+
+    Both together beat once an output turn. The standard error of either grows, against a whole output turn at the
+    same sampling, by the root of N/turns and of what order 2 keeps of its power once 2 (1 + 1/N) is taken out.
+    None where that is less than the `settings` say (3). `rows` are those of the recordings.
+    """
+    order, other = 2.0, 2.0 * (1 + 1 / rows.ratio)
+    beside = np.column_stack([sine_columns(rows.theta, [other]), np.ones(len(rows))])
+    own = sine_columns(rows.theta, [order])
+    left = own - beside @ np.linalg.lstsq(beside, own, rcond=None)[0]
+    kept = max(float(np.min(np.linalg.eigvalsh(left.T @ left))) / len(rows) / HALF, SMALLEST_POWER)
+    part = rows.span_turns / rows.ratio
+    growth = math.sqrt(1 / kept / min(part, 1.0))
+    if growth < settings.beat_growth:
+        return None
+    return (
+        f"{rows.span_turns:.2g} input turns are {part:.2g} of an output turn: orders k and k (1 + 1/N) are told "
+        f"apart {growth:.2g} times worse than by a whole one; what stands there may be the circular spline's or the "
+        "flexspline's"
+    )

@@ -1,0 +1,329 @@
+"""Joint fit: the base model's errors, offsets, and the terms of any effects, all at once.
+
+Levenberg-Marquardt on whitened rows. The base enters through its Cartesian errors with a wide prior (it keeps
+combinations that the recording cannot tell apart from running off); effects that act inside the meshing zones take
+part in the choice of the driving zone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.diagnosis.inference.base_excitation import driven_by, excites, motion_of, transmitted
+from hdopt.diagnosis.inference.catalogue import explanations
+from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.numerical import TINY
+from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
+from hdopt.effects.base import Explanation
+from hdopt.effects.estimate import FitEstimate
+from hdopt.effects.term import Term
+from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel
+from hdopt.recordings.rows import Rows
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FitProblem:
+    """What is fitted: `rows`, the `base` model (None for a gear without one), `nuisance` columns that are always free
+    (n, q), arcmin per coefficient, the `noise`, and `prior_scale`, by which the base's prior is widened.
+
+    `settings` reach everything that is computed from the problem.
+    """
+
+    rows: Rows
+    base: CartesianModel | None
+    nuisance: Array
+    noise: Noise
+    prior_scale: float = 1.0
+    settings: DiagnosisSettings = DEFAULT
+
+    @cached_property
+    def whitened(self) -> dict[int, tuple[Term, Array, Array]]:
+        """Whitened columns and their inner products of the terms that the rows remember, by identity."""
+        return {}
+
+    @property
+    def explanations(self) -> Mapping[str, Explanation]:
+        """Everything that may enter the fit, by id."""
+        return explanations(self.settings.alternatives)
+
+    @cached_property
+    def rotation(self) -> Array:
+        """The rows' angles as the base takes them, (n, 4); none for a gear without a base."""
+        return np.empty((len(self.rows), 0)) if self.base is None else self.base.rotation(self.rows.theta)
+
+    @property
+    def base_width(self) -> int:
+        return PARAMETERS if self.base is not None else 0
+
+    @property
+    def weighed_rows(self) -> float:
+        """Rows that the noise gives a weight."""
+        return float((self.noise.root_weight > 0).sum())
+
+    @property
+    def prior(self) -> Array:
+        """Standard deviations of the base's Cartesian errors, (12,) mm."""
+        return np.array(self.settings.base.prior_mm) * self.prior_scale
+
+    @property
+    def box(self) -> Array:
+        """Bounds of the base's Cartesian errors, (12,) mm."""
+        return np.array(self.settings.base.box_mm) * self.prior_scale
+
+    def with_noise(self, noise: Noise) -> FitProblem:
+        return replace(self, noise=noise)
+
+    def only(self, mask: NDArray[np.bool_]) -> FitProblem:
+        """The same problem on the rows in `mask` (n,), with white noise."""
+        rows = self.rows.rows(mask)
+        return replace(self, rows=rows, nuisance=self.nuisance[mask], noise=Noise.white(rows, self.noise.sigma))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model: base errors (mm), offsets, terms with coefficients; prediction and residual in arcmin;
+    `objective` the whitened sum of squares plus the prior's, `design` the columns of the linearised model."""
+
+    problem: FitProblem
+    errors: Array
+    offsets: Array
+    terms: tuple[Term, ...]
+    coefficients: tuple[Array, ...]
+    base_value: Array
+    zone: NDArray[np.int64]
+    prediction: Array
+    objective: float
+    base_jacobian: Array
+
+    @property
+    def residual(self) -> Array:
+        return self.problem.rows.error - self.prediction
+
+    @cached_property
+    def motion(self) -> Array:
+        """The drive's motion before its spring, arcmin, (n,): what excites a resonance."""
+        return motion_of(self.base_value, self.terms, self.coefficients)
+
+    def all_but(self, index: int) -> list[int]:
+        """The numbers of the terms without `index`: what to keep beside it."""
+        return [i for i in range(len(self.terms)) if i != index]
+
+    def contribution(self, index: int) -> Array:
+        """What term `index` adds to the prediction, arcmin: with its zones' driving switched as fitted."""
+        return term_columns(self.terms[index], self.zone, self.problem.base) @ self.coefficients[index]
+
+    @property
+    def contributions(self) -> Array:
+        """What all terms add, arcmin."""
+        return sum((self.contribution(i) for i in range(len(self.terms))), np.zeros(len(self.problem.rows)))
+
+    def seen(self, columns: Array, keep: Sequence[int] | None = None) -> Array:
+        """Columns of the drive's motion (n, k) as its output shows them beside the terms of `keep`, all by default."""
+        kept = range(len(self.terms)) if keep is None else keep
+        terms, coefficients = [self.terms[i] for i in kept], [self.coefficients[i] for i in kept]
+        return transmitted(columns, self.problem.rows, terms, coefficients)
+
+    def columns_of(self, term: Term, keep: Sequence[int] | None = None) -> Array:
+        """A term's columns as the output shows them beside the terms of `keep`, all by default, (n, p)."""
+        columns = term_columns(term, self.zone, self.problem.base)
+        return self.seen(columns, keep) if excites(term) else columns
+
+    def design(self, keep: Sequence[int] | None = None, move_shapes: bool = True) -> Array:
+        """Columns: base errors, offsets, then for each term of `keep` (all by default) its coefficients and, with
+        `move_shapes`, its free shape parameters; (n, q).
+        """
+        blocks = [self.seen(self.base_jacobian, keep), self.problem.nuisance]
+        for i in range(len(self.terms)) if keep is None else keep:
+            term = self.terms[i]
+            blocks.append(self.columns_of(term, keep))
+            if move_shapes and term.steps:
+                columns = shape_columns(self, i)
+                blocks.append(self.seen(columns, keep) if excites(term) else columns)
+        return np.column_stack(blocks)
+
+    def prior_precision(self, width: int) -> Array:
+        precision = np.zeros(width)
+        if self.problem.base is not None:
+            precision[:PARAMETERS] = 1 / self.problem.prior**2
+        return precision
+
+    def covariance(self) -> Array:
+        """Covariance of all parameters, robust against what the noise model misses: the larger, parameter by parameter,
+        of the model-based one and the sandwich over whole turns."""
+        settings = self.problem.settings.fit
+        design = self.problem.noise.whiten(self.design())
+        residual = self.problem.noise.whiten(self.residual)
+        sigma2 = max(float(residual @ residual) / max(len(residual) - design.shape[1], 1), settings.variance_floor)
+        normal = design.T @ design / sigma2 + np.diag(self.prior_precision(design.shape[1]))
+        inverse = np.linalg.pinv(normal, hermitian=True)
+        block = self.problem.rows.block
+        scores = np.zeros((block[-1] + 1, design.shape[1]))
+        np.add.at(scores, block, design * residual[:, None] / sigma2)
+        # Wander outlasts a turn: neighbouring turns' scores count too, with falling weight (Newey, West 1987).
+        meat = scores.T @ scores
+        lags = min(settings.lags_turns, len(scores) // settings.turns_a_lag)
+        for lag in range(1, lags + 1):
+            across = scores[lag:].T @ scores[:-lag]
+            meat += (1 - lag / (lags + 1)) * (across + across.T)
+        sandwich = inverse @ meat @ inverse
+        blocks = block[-1] + 1
+        sandwich *= blocks / max(blocks - 1, 1)
+        ratio = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(inverse), TINY), 1.0))
+        return inverse * np.outer(ratio, ratio)
+
+    def estimates(self) -> list[FitEstimate]:
+        """Values and covariance of each term's coefficients and free shape parameters."""
+        covariance = self.covariance()
+        start = self.problem.base_width + self.problem.nuisance.shape[1]
+        found = []
+        for term, coefficients in zip(self.terms, self.coefficients, strict=True):
+            end = start + term.freedom
+            values = np.r_[coefficients, [term.shape[name] for name in term.steps]]
+            found.append(FitEstimate(values, covariance[start:end, start:end]))
+            start = end
+        return found
+
+
+def term_columns(term: Term, zone: NDArray[np.int64], base: CartesianModel | None) -> Array:
+    """The term's columns in arcmin per coefficient, with the zones as they drive now. `zone` (n,) is 0 or 1; `base`
+    is None for a gear without one.
+    """
+    if term.zones is None or base is None:
+        return term.columns if term.columns is not None else np.zeros((len(zone), term.width))
+    columns: Array = base.arcmin_per_mm * np.where((zone == 0)[:, None], term.zones[0], term.zones[1])
+    return columns
+
+
+def shape_columns(fit: Fit, index: int) -> Array:
+    """Derivative of term `index`'s contribution by its free shape parameters, (n, k), by central differences. `fit`
+    is the one looked at.
+    """
+    term, problem = fit.terms[index], fit.problem
+    columns = []
+    for name, step in term.steps.items():
+        sides = []
+        for sign in (1, -1):
+            shifted = {**term.shape, name: term.shape[name] + sign * step}
+            moved = problem.explanations[term.effect].term(problem.rows, shifted, fit.motion)
+            sides.append(term_columns(moved, fit.zone, problem.base) @ fit.coefficients[index])
+        columns.append((sides[0] - sides[1]) / (2 * step))
+    return np.column_stack(columns) if columns else np.empty((len(problem.rows), 0))
+
+
+def evaluate(
+    problem: FitProblem, errors: Array, offsets: Array, terms: Sequence[Term], coefficients: Sequence[Array]
+) -> Fit:
+    """The model of `problem` at given parameters: `errors` of the base (12,) mm, `offsets` of its nuisance columns
+    (q,), and `terms` with their `coefficients`.
+    """
+    rows = problem.rows
+    extra: Array | None = None
+    for term, c in zip(terms, coefficients, strict=True):
+        if term.zones is not None:
+            extra = term.zones @ c if extra is None else extra + term.zones @ c
+    if problem.base is not None:
+        base_value, zone, jacobian = problem.base.evaluate_at(problem.rotation, errors, extra)
+    else:
+        base_value, zone, jacobian = (
+            np.zeros(len(rows)),
+            np.zeros(len(rows), np.int64),
+            np.empty((len(rows), 0)),
+        )
+    terms = driven_by(motion_of(base_value, terms, coefficients), rows, terms)
+    prediction = base_value + problem.nuisance @ offsets
+    for term, c in zip(terms, coefficients, strict=True):
+        if term.columns is not None:
+            prediction = prediction + term.columns @ c
+    white = problem.noise.whiten(rows.error - prediction)
+    objective = float(white @ white)
+    if problem.base is not None:
+        objective += problem.noise.sigma**2 * float(np.sum((errors / problem.prior) ** 2))
+    return Fit(
+        problem, errors, offsets, tuple(terms), tuple(coefficients), base_value, zone, prediction, objective, jacobian
+    )
+
+
+def refine(fit: Fit, iterations: int | None = None, tolerance: float | None = None, move_shapes: bool = True) -> Fit:
+    """Levenberg-Marquardt from `fit` on (Marquardt, J. SIAM 11, 1963): at most so many `iterations`, until the
+    objective drops by less than `tolerance` of itself (None: as set); the shapes of terms stay where not `move_shapes`.
+    """
+    settings = fit.problem.settings.fit
+    tolerance = settings.tolerance if tolerance is None else tolerance
+    damping = settings.damping
+    for _ in range(settings.iterations if iterations is None else iterations):
+        trial, damping = _improved(fit, damping, move_shapes)
+        if trial is None:
+            break
+        drop = fit.objective - trial.objective
+        fit, damping = trial, max(damping / settings.damping_down, settings.damping_least)
+        if drop < tolerance * fit.objective:
+            break
+    return fit
+
+
+def _improved(fit: Fit, damping: float, move_shapes: bool) -> tuple[Fit | None, float]:
+    """A better fit one damped step away, None where none was found, and the damping that it took."""
+    problem, settings = fit.problem, fit.problem.settings.fit
+    wb = problem.base_width
+    design = fit.design(move_shapes=move_shapes)
+    white = problem.noise.whiten(design)
+    precision = problem.noise.sigma**2 * fit.prior_precision(design.shape[1])
+    normal = white.T @ white
+    gradient = white.T @ problem.noise.whiten(fit.residual)
+    gradient[:wb] -= precision[:wb] * fit.errors
+    normal[np.diag_indices_from(normal)] += precision
+    scale = np.sqrt(np.maximum(np.diag(normal), settings.scale_floor))
+    for _ in range(settings.damping_tries):
+        damped = normal / np.outer(scale, scale)
+        damped[np.diag_indices_from(damped)] += damping
+        try:
+            step = np.linalg.solve(damped, gradient / scale) / scale
+        except np.linalg.LinAlgError:
+            damping *= settings.damping_singular
+            continue
+        trial = _moved(fit, step, move_shapes)
+        if trial.objective < fit.objective:
+            return trial, damping
+        damping = max(damping * settings.damping_up, settings.damping_least_up)
+    return None, damping
+
+
+def _moved(fit: Fit, step: Array, move_shapes: bool) -> Fit:
+    """`fit` with all its parameters moved by `step`, the base's errors kept in their box."""
+    problem, settings = fit.problem, fit.problem.settings.fit
+    wb, position = problem.base_width, problem.base_width + problem.nuisance.shape[1]
+    terms, coefficients = [], []
+    for term, c in zip(fit.terms, fit.coefficients, strict=True):
+        delta = step[position : position + term.width]
+        position += term.width
+        if move_shapes and term.steps:
+            shape = dict(term.shape)
+            for name in term.steps:
+                limit = settings.shape_share * abs(shape[name]) + settings.shape_steps * term.steps[name]
+                shape[name] += float(np.clip(step[position], -limit, limit))
+                position += 1
+            shifted = problem.explanations[term.effect].term(problem.rows, shape, fit.motion)
+            term = replace(shifted, trials=term.trials, odds=term.odds)
+        terms.append(term)
+        coefficients.append(c + delta)
+    errors = np.clip(fit.errors + step[:wb], -problem.box[:wb], problem.box[:wb])
+    offsets = fit.offsets + step[wb : wb + problem.nuisance.shape[1]]
+    return evaluate(problem, errors, offsets, terms, coefficients)
+
+
+def extend(fit: Fit, terms: Sequence[Term]) -> Fit:
+    """`fit` with further terms, at coefficients of zero."""
+    return evaluate(
+        fit.problem,
+        fit.errors,
+        fit.offsets,
+        [*fit.terms, *terms],
+        [*fit.coefficients, *(np.zeros(term.width) for term in terms)],
+    )

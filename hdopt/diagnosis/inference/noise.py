@@ -1,0 +1,143 @@
+"""Coloured noise: an autoregressive model of the residual, and the filter that makes it white.
+
+Every fit of the diagnosis is generalized least squares in this filter (Box, Jenkins, "Time Series Analysis", AR(p)),
+so that slow wander of the bench is not taken for slow physics. The order is chosen by BIC and kept low: a narrow line
+in the residual must stay visible.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from hdopt.diagnosis.numerical import TINY
+from hdopt.diagnosis.settings import DEFAULT, NoiseSettings
+from hdopt.recordings.rows import Rows
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Noise:
+    """AR coefficients (x_t = sum a_k x_{t-k} + e_t), standard deviation of e, and a weight for each row (0 where the
+    filter would reach over a gap)."""
+
+    ar: Array
+    sigma: float
+    root_weight: Array
+
+    @classmethod
+    def white(cls, rows: Rows, sigma: float = 1.0) -> Noise:
+        """Noise without colour on `rows`, of standard deviation `sigma` (arcmin)."""
+        return cls(np.zeros(0), sigma, np.sqrt(rows.weight))
+
+    def without(self, left_out: NDArray[np.bool_]) -> Noise:
+        """The same noise with no weight on the rows `left_out` (n,), nor where the filter would reach into them."""
+        touched = left_out.copy()
+        for lag in range(1, len(self.ar) + 1):
+            touched[lag:] |= left_out[:-lag]
+        return replace(self, root_weight=np.where(touched, 0.0, self.root_weight))
+
+    def whiten(self, values: Array) -> Array:
+        """`values` (n,) or (n, q), filtered and weighted along the first axis."""
+        if not len(self.ar):
+            return values * (self.root_weight if values.ndim == 1 else self.root_weight[:, None])
+        table = np.ascontiguousarray(values.reshape(len(values), -1))
+        white: Array = _filtered(table, self.ar, self.root_weight).reshape(values.shape)
+        return white
+
+
+SIDE_BY_SIDE = 8
+"""Columns from which the filter's sums are taken for all columns side by side: speed alone, the sums are the same."""
+ROUNDING = 1e-9
+"""Imaginary part below which a pole is real."""
+
+
+@njit(cache=True, nogil=True)
+def _filtered(values: Array, ar: Array, root_weight: Array) -> Array:
+    """(x_t - sum a_k x_{t-k}) times the weight of row t, for each column of `values` (n, q)."""
+    rows, columns = values.shape
+    result = np.empty((rows, columns))
+    for t in range(rows):
+        lags = min(len(ar), t)
+        if columns < SIDE_BY_SIDE:
+            for q in range(columns):
+                white = values[t, q]
+                for k in range(lags):
+                    white -= ar[k] * values[t - 1 - k, q]
+                result[t, q] = white * root_weight[t]
+            continue
+        for q in range(columns):
+            result[t, q] = values[t, q]
+        for k in range(lags):
+            for q in range(columns):
+                result[t, q] -= ar[k] * values[t - 1 - k, q]
+        for q in range(columns):
+            result[t, q] *= root_weight[t]
+    return result
+
+
+def without_lines(ar: Array, largest_pole: float = DEFAULT.noise.largest_oscillating_pole) -> Array:
+    """`ar` (p,) with its oscillating poles drawn in to `largest_pole`: one near the unit circle is a line, not noise.
+    Slow wander, a real positive pole, is noise at any size.
+    """
+    poles = np.roots(np.r_[1.0, -ar])
+    size = np.abs(poles)
+    slow = (np.abs(poles.imag) < ROUNDING) & (poles.real > 0)
+    poles = np.where(slow, poles, poles * np.minimum(1.0, largest_pole / np.maximum(size, TINY)))
+    return -np.real(np.poly(poles))[1:] if len(ar) else ar
+
+
+def estimate(rows: Rows, residual: Array, settings: NoiseSettings = DEFAULT.noise) -> Noise:
+    """AR noise of `rows` from a `residual` (n,), arcmin, that holds no structure any more. `settings` are the
+    thresholds.
+    """
+    piece = rows.piece
+    n = len(residual)
+    ar = without_lines(
+        autoregression(_covariance(piece, residual, settings), n, settings), settings.largest_oscillating_pole
+    )
+    order = len(ar)
+    valid = np.ones(n, bool)
+    valid[:order] = False
+    for lag in range(1, order + 1):
+        valid[lag:] &= piece[lag:] == piece[:-lag]
+    noise = Noise(ar, 1.0, np.where(valid, np.sqrt(rows.weight), 0.0))
+    white = noise.whiten(residual)
+    return Noise(ar, float(np.sqrt(np.sum(white**2) / max(valid.sum(), 1))), noise.root_weight)
+
+
+def _covariance(piece: NDArray[np.int64], residual: Array, settings: NoiseSettings) -> Array:
+    """Mean products of `residual` (n,) with itself some rows later, over no gap between the contiguous `piece`s."""
+    n = len(residual)
+    highest = int(min(settings.highest_order, np.bincount(piece).max() // settings.rows_a_lag))
+    covariance = np.empty(highest + 1)
+    for lag in range(highest + 1):
+        same = piece[lag:] == piece[: n - lag]
+        products = residual[lag:][same] * residual[: n - lag][same]
+        covariance[lag] = products.mean() if len(products) else 0.0
+    return covariance
+
+
+def autoregression(covariance: Array, rows: int, settings: NoiseSettings = DEFAULT.noise) -> Array:
+    """Coefficients of the autoregression with a given `covariance` (p + 1,) at lags 0 to p, by the recursion of
+    Levinson and Durbin, of the order that Schwarz's criterion prefers for so many `rows`.
+
+    The same numbers as `statsmodels.tsa.stattools.levinson_durbin` gives; its estimators (`yule_walker`, `burg`,
+    `ar_select_order`) know neither gaps nor weights, by which this covariance was taken. `settings` are the
+    thresholds.
+    """
+    best, best_score, error, ar = np.zeros(0), np.inf, covariance[0], np.zeros(0)
+    for order in range(len(covariance)):
+        if order:
+            reflection = (covariance[order] - ar @ covariance[order - 1 : 0 : -1]) / error
+            reflection = float(np.clip(reflection, -settings.largest_reflection, settings.largest_reflection))
+            ar = np.r_[ar - reflection * ar[::-1], reflection]
+            error *= 1 - reflection**2
+        score = rows * np.log(max(error, TINY)) + order * np.log(rows)
+        if score < best_score - settings.bic_margin:
+            best, best_score = ar, score
+    return best

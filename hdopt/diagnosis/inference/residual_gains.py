@@ -1,0 +1,132 @@
+"""Looking at what a fit leaves: gains of further terms with everything already fitted projected out, and its
+spectrum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.diagnosis.inference.base_excitation import excites, is_driven
+from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.numerical import RANK, RIDGE, TINY
+from hdopt.effects.term import Term
+from hdopt.recordings.read import TURN
+
+Array = NDArray[np.float64]
+
+
+class FitProbe:
+    """A `Probe` on a fit: what `keep` lists of its terms (all by default) stays in it, the others' contributions return
+    to the residual; searches look at orders in `order_range`.
+    """
+
+    def __init__(self, fit: Fit, keep: Sequence[int] | None = None, order_range: tuple[float, float] | None = None):
+        self.keep = range(len(fit.terms)) if keep is None else keep
+        self.fit = fit
+        self.settings = fit.problem.settings.probe
+        self.samples = self.rows = fit.problem.rows
+        self.motion = fit.motion
+        self.order_range = order_range or (0.0, self.rows.highest_order)
+        self.noise = fit.problem.noise
+        self.swings = any(is_driven(fit.terms[i]) for i in self.keep)
+        self.residual = fit.residual
+        for i, term in enumerate(fit.terms):
+            if i not in self.keep:
+                own = fit.contribution(i)[:, None]
+                self.residual = self.residual + (fit.seen(own, self.keep) if excites(term) else own)[:, 0]
+        design = fit.design(self.keep)
+        white = self.noise.whiten(design)
+        # The prior on the base keeps directions the data leave open from swallowing an effect.
+        prior = np.sqrt(fit.prior_precision(design.shape[1])) * self.noise.sigma
+        augmented = np.vstack([white, np.diag(prior)])
+        scale = np.sqrt((augmented**2).sum(0))
+        basis, size, _ = np.linalg.svd(augmented / np.where(scale > 0, scale, 1), full_matrices=False)
+        rank = int(np.sum(size > RANK * size[0]))
+        self.basis = np.asfortranarray(basis[: len(white), :rank])
+        self.white_residual = self.project(self.noise.whiten(self.residual))
+
+    @property
+    def has_base(self) -> bool:
+        """Whether a base model with meshing zones is fitted beside."""
+        return self.fit.problem.base is not None
+
+    def project(self, white: Array) -> Array:
+        """Whitened columns with base, offsets and kept terms taken out."""
+        return white - self.basis @ (self.basis.T @ white)
+
+    def white_columns(self, term: Term) -> Array:
+        """The term's columns, whitened."""
+        return self.noise.whiten(self.fit.columns_of(term, self.keep))
+
+    def columns(self, term: Term) -> Array:
+        """The term's columns, whitened and projected."""
+        return self.project(self.white_columns(term))
+
+    def _whitened(self, term: Term) -> tuple[Array, Array]:
+        """The term's whitened columns and their inner products."""
+        known = self.fit.problem.whitened
+        alone = term.kept and term.zones is None and not (self.swings and excites(term))
+        if alone and id(term) in known:
+            return known[id(term)][1:]
+        white = self.white_columns(term)
+        gram = white.T @ white
+        if alone:
+            known[id(term)] = (term, white, gram)
+        return white, gram
+
+    def table(self, term: Term) -> tuple[Array, Array]:
+        """Inner products of the term's columns, with the fit projected out, with each other and with the residual."""
+        gram, absorbed, moment = self._products(term)
+        return gram - absorbed, moment
+
+    def _products(self, term: Term) -> tuple[Array, Array, Array]:
+        """Of the term's columns with each other, the part of it that the fit absorbs, and with the residual."""
+        white, gram = self._whitened(term)
+        absorbed = self.basis.T @ white
+        return gram, absorbed.T @ absorbed, white.T @ self.white_residual
+
+    def solve(self, term: Term) -> tuple[float, Array]:
+        """Drop of the weighted sum of squares, in noise variances, and the coefficients that bring it."""
+        gram, absorbed, moment = self._products(term)
+        scale = np.sqrt(np.maximum(np.diag(gram), TINY))
+        # A column that the base absorbs to a millionth has nothing left to say.
+        gram = (gram - absorbed) / np.outer(scale, scale) + RIDGE * np.eye(len(gram))
+        coefficients = np.linalg.solve(gram, moment / scale) / scale
+        return float(moment @ coefficients) / self.noise.sigma**2, coefficients
+
+    def gain(self, term: Term) -> float:
+        """Drop of the weighted sum of squares, in noise variances, when `term` joins the fit."""
+        return self.solve(term)[0]
+
+    @cached_property
+    def _by_input(self) -> tuple[Array, float]:
+        return self._fourier(self.rows.theta)
+
+    @cached_property
+    def _by_output(self) -> tuple[Array, float]:
+        return self._fourier(self.rows.output * self.rows.ratio)
+
+    def _fourier(self, theta: Array) -> tuple[Array, float]:
+        theta = theta - theta.min()
+        s = self.settings
+        per_turn = s.cells_a_row * 2 ** int(np.ceil(np.log2(max(self.rows.rows_per_turn, s.fewest_rows))))
+        span = theta.max() / TURN + 1
+        length = 1 << int(np.ceil(np.log2(s.oversampling * span * per_turn)))
+        length = min(length, 1 << s.most_cells_log2)
+        per_turn = min(per_turn, int(length / (s.folded_span * span)))
+        cell = np.round(theta / TURN * per_turn).astype(np.int64)
+        signal = np.bincount(cell, self.residual - self.residual.mean(), minlength=length)[:length]
+        return 2 * np.abs(np.fft.rfft(signal)) / len(theta), length / per_turn
+
+    def spectrum(self, orders: Array, of_output: bool = False) -> Array:
+        """Amplitude (arcmin) of the residual at each order, by the Fourier sum at the nearest quarter resolution.
+
+        Orders count cycles of the input, or, with `of_output`, of N times the output angle as its encoder read it.
+        """
+        amplitude, periods = self._by_output if of_output else self._by_input
+        index = np.round(np.asarray(orders) * periods).astype(np.int64)
+        return amplitude[np.clip(index, 0, len(amplitude) - 1)]

@@ -1,0 +1,1 @@
+"""The search for the effects that explain a residual."""

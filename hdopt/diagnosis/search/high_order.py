@@ -1,0 +1,147 @@
+"""Orders above what the averaged rows hold: looked for on the rows as recorded, and taken out of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.diagnosis.inference import noise as noise_model
+from hdopt.diagnosis.inference.catalogue import explanations
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.inference.nonphysical_alternatives import AnyOrder
+from hdopt.diagnosis.inference.nuisance import Nuisances
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.search.penalty import SubtractedTerms, leaves_nothing
+from hdopt.diagnosis.search.search_state import SearchPlan
+from hdopt.diagnosis.search.subset_search import Selection, select
+from hdopt.diagnosis.search.zone_high_order import fit_in_zones
+from hdopt.diagnosis.settings import DEFAULT, HighOrderSettings
+from hdopt.effects import HIGH_ORDER
+from hdopt.effects.probe import strongest_orders
+from hdopt.effects.sines import sine_columns
+from hdopt.effects.term import Term
+from hdopt.recordings.read import Recording
+from hdopt.recordings.rows import Rows, gather
+
+Array = NDArray[np.float64]
+
+
+def find_ripple(
+    recordings: Sequence[Recording],
+    found: Selection,
+    nuisances: Nuisances,
+    ruled_out: Sequence[str],
+    rng: np.random.Generator,
+) -> tuple[Selection | None, Array | None]:
+    """The search of orders above the averaged rows of `recordings` beside what was `found` in them and the
+    `nuisances`, without the effects `ruled_out`, and what its best candidate adds to the rows as recorded, (n,).
+    `rng` draws what is random.
+    """
+    high = high_order_selection(recordings, found, nuisances, ruled_out, rng)
+    if high is None or not high.best.fit.terms:
+        return high, None
+    inside = fit_in_zones(gather(recordings), found.best.fit, nuisances, high.best.fit)
+    if inside is None:
+        return high, high.best.fit.contributions
+    return high.with_best_fit(inside.fit), inside.adds
+
+
+def high_order_selection(
+    recordings: Sequence[Recording],
+    found: Selection,
+    nuisances: Nuisances,
+    ruled_out: Sequence[str],
+    rng: np.random.Generator,
+) -> Selection | None:
+    """Effects of orders above what the averaged rows hold, on the rows of `recordings` as they are without what was
+    `found` there: of all effects but those `ruled_out`. `nuisances` are the columns that are always free. `rng`
+    draws what is random.
+    """
+    low = found.best.fit
+    averaged = low.problem.rows
+    if averaged.locked or not averaged.are_averages:
+        return None
+    problem = left_as_recorded(recordings, low, nuisances)
+    raw = problem.rows
+    settings = problem.settings
+    lowest, highest = orders = ripple_orders(averaged, raw, settings.high_order)
+    start = evaluate(problem, np.zeros(0), np.zeros(1), (), ())
+    bare = refine(start, settings.fit.offset_iterations)
+    noise = noise_model.estimate(raw, bare.residual, settings.noise)
+    # A strong ripple must not be taken for noise: its strongest lines are taken out before the noise is measured.
+    lines = strongest_orders(FitProbe(bare), settings.high_order.noise_lines, lowest=lowest, highest=highest)
+    if lines:
+        left = bare.residual - waves_of(raw, bare.residual, lines)
+        noise = noise_model.estimate(raw, left, settings.noise)
+    bare = evaluate(problem.with_noise(noise), np.zeros(0), bare.offsets, (), ())
+    low_effects = (*ruled_out, *(e for e in explanations() if e not in HIGH_ORDER and e != AnyOrder.id))
+    # What a pulse or a loop leaves where its shape is not quite right reaches into these orders too.
+    rough = [i for i, term in enumerate(low.terms) if not leaves_nothing(term)]
+    power = float(np.var(sum((low.contribution(i) for i in rough), np.zeros(len(averaged)))))
+    # A term may be large only against a bent base: what both explain together is what counts.
+    power = min(power, max(float(np.var(found.base.residual) - np.var(low.residual)), 0.0))
+    taken = subtracted_terms(bare, power, [low.terms[i] for i in rough])
+    return select(bare, 1.0, rng, SearchPlan(skip=low_effects, order_range=orders, subtracted=taken))
+
+
+def left_as_recorded(recordings: Sequence[Recording], fit: Fit, nuisances: Nuisances) -> FitProblem:
+    """What `fit`, made on averaged rows, leaves of the rows as recorded: a problem with an offset alone beside it.
+    `recordings` are those diagnosed. `nuisances` are the columns that are always free.
+    """
+    raw, old = gather(recordings), fit.problem
+    problem = replace(old, rows=raw, nuisance=nuisances.columns(raw), noise=Noise.white(raw, 1.0))
+    base_value = np.zeros(len(raw)) if old.base is None else old.base.evaluate_at(problem.rotation, fit.errors)[0]
+    terms = [problem.explanations[t.effect].term(raw, t.shape, base_value) for t in fit.terms]
+    left = replace(raw, error=evaluate(problem, fit.errors, fit.offsets, terms, fit.coefficients).residual)
+    noise = Noise.white(left, float(np.std(left.error)))
+    return FitProblem(left, None, np.ones((len(left), 1)), noise, settings=old.settings)
+
+
+def waves_of(rows: Rows, values: Array, orders: Sequence[float]) -> Array:
+    """The sines of `orders` (cycles an input turn of `rows`) in `values` (n,), together, (n,)."""
+    columns = sine_columns(rows.theta, orders)
+    return columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
+
+
+def ripple_orders(averaged: Rows, raw: Rows, settings: HighOrderSettings = DEFAULT.high_order) -> tuple[float, float]:
+    """Lowest and highest order that the rows as recorded (`raw`) hold and their averages do not. `averaged` are
+    their means. `settings` are the thresholds.
+    """
+    return averaged.highest_order, settings.order_share * raw.rows_per_turn
+
+
+def subtracted_terms(base: Fit, power: float, terms: Sequence[Term]) -> SubtractedTerms:
+    """`terms` of so much `power` (arcmin^2) that were taken out of the rows of `base`."""
+    return SubtractedTerms(tuple(terms), power * base.problem.weighed_rows / base.problem.noise.sigma**2)
+
+
+def strong_ripple(recordings: Sequence[Recording], base: Fit, nuisances: Nuisances) -> Array | None:
+    """The strongest lines of orders beyond the averaged rows in what `base` and `nuisances` leave of `recordings`, as
+    they add to the error of the rows as recorded, (n,); None where they are weak, or where no rows were averaged.
+    """
+    averaged, settings = base.problem.rows, base.problem.settings.high_order
+    if averaged.locked or not averaged.are_averages:
+        return None
+    problem = left_as_recorded(recordings, base, nuisances)
+    probe = FitProbe(evaluate(problem, np.zeros(0), np.zeros(1), (), ()))
+    lowest, highest = ripple_orders(averaged, problem.rows, settings)
+    lines = strongest_orders(probe, settings.lines, lowest=lowest, highest=highest)
+    if not lines:
+        return None
+    ripple = waves_of(problem.rows, probe.residual, lines)
+    return ripple if np.var(ripple) > settings.strong * np.var(probe.residual - ripple) else None
+
+
+def subtract(recordings: Sequence[Recording], total: Array) -> list[Recording]:
+    """Recordings without what `total` (arcmin, on their rows as recorded) adds to their errors. `recordings` are
+    those diagnosed.
+    """
+    bounds = np.cumsum([0, *(len(r) for r in recordings)])
+    return [
+        replace(r, error_arcmin=r.error_arcmin - total[a:b])
+        for r, a, b in zip(recordings, bounds[:-1], bounds[1:], strict=True)
+    ]

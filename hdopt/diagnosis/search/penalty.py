@@ -1,0 +1,120 @@
+"""What a set of effects pays in log evidence before it may be named.
+
+Freedom (Schwarz's criterion), the shapes that were searched, prior odds, and the inexactness of shapes: what a slightly
+wrong shape leaves must not be named as further physics.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hdopt.diagnosis.inference.catalogue import is_outside, properties_of
+from hdopt.diagnosis.settings import DEFAULT, PenaltySettings
+from hdopt.effects.term import Term
+
+KINDS = {
+    "order": "turning",
+    "angle": "turning",
+    "asynchronous order": "turning",
+    "time": "slow",
+    "temperature": "slow",
+    "torque": "load",
+}
+"""Kind of an effect by its domain; reversal and direction are one: no curve of the torque makes a loop."""
+
+
+@dataclass(frozen=True)
+class SubtractedTerms:
+    """Terms that were taken out of the rows already (a ripple of higher order), and what they gained there, in noise
+    variances: what their shapes leave must not be named either.
+    """
+
+    terms: tuple[Term, ...] = ()
+    gain: float = 0.0
+
+
+NOTHING_SUBTRACTED = SubtractedTerms()
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What a penalty is measured by: so many `rows` with a weight, noise rougher by `inflation` turn by turn, what was
+    `subtracted` from the rows, and the `settings`.
+    """
+
+    rows: float
+    inflation: float = 1.0
+    subtracted: SubtractedTerms = NOTHING_SUBTRACTED
+    settings: PenaltySettings = DEFAULT.penalty
+
+
+def penalty(terms: Sequence[Term], gain: float, scale: Scale) -> float:
+    """Log evidence that a set of `terms` pays, where the best explanation gains `gain` noise variances. `scale` is
+    what penalties are measured by.
+    """
+    s, subtracted = scale.settings, scale.subtracted
+    cost = sum(term.freedom for term in terms) * math.log(scale.rows) / 2
+    cost += sum(searched(term) for term in terms)
+    # The first cycle of an encoder whose second was found among higher orders is no further effect.
+    cost -= sum(s.effect_cost + searched(t) for t in terms if is_cycle_of(t, subtracted.terms))
+    names = {term.effect for term in terms}
+    cost += s.one_in_the_other * sum(properties_of(name).special_case_of in names for name in names)
+    cost += sum(term.doubtful for term in terms) * s.clear_win * gain / scale.inflation / 2
+    rough = [term for term in subtracted.terms if not leaves_nothing(term)]
+    more = discrepancy([*terms, *rough], s) - discrepancy(rough, s)
+    inexact = more * (gain + (subtracted.gain if rough else 0.0))
+    if terms and subtracted.terms and not rough:
+        # What was taken out to the last digit leaves as little as another kind of effect.
+        inexact += s.other_kind * subtracted.gain
+    return cost + len(terms) * s.effect_cost + inexact / scale.inflation / 2
+
+
+def searched(term: Term) -> float:
+    """What the search over a term's shapes cost, in log evidence, and the odds against its variant."""
+    return math.log(max(term.trials, 1.0)) - term.odds
+
+
+def is_cycle_of(term: Term, found: Sequence[Term]) -> bool:
+    """Whether `term` belongs to one of `found`, as a cycle to the lines of an encoder."""
+    effect = properties_of(term.effect)
+    return any(other.effect == term.effect and effect.is_part_of(term.shape, other.shape) for other in found)
+
+
+def discrepancy(terms: Sequence[Term], settings: PenaltySettings = DEFAULT.penalty) -> float:
+    """Share of the explained power that a set of `terms` pays for the inexactness of its shapes; a description
+    without physics could be the misfit of anything. `settings` are the thresholds.
+    """
+    kinds = {kind_of(term) for term in terms if not is_outside(term.effect)}
+    alike = max(len(terms) - max(len(kinds), 1), 0)
+    # Sines of known orders leave nothing for each other: their shape is exact.
+    each_alike = settings.other_kind if all(has_exact_shape(term) for term in terms) else settings.discrepancy
+    flexible = sum(flexibility(term, settings) for term in terms)
+    return max(len(kinds) - 1, 0) * settings.other_kind + alike * each_alike + flexible * settings.discrepancy
+
+
+def has_exact_shape(term: Term) -> bool:
+    """Whether the columns of `term` are known to the last digit, so that its fit leaves nothing."""
+    return properties_of(term.effect).exact_shape
+
+
+def leaves_nothing(term: Term) -> bool:
+    """Whether nothing of `term` reaches other orders: one of exact shape, or sines at lines that were counted."""
+    return has_exact_shape(term) or properties_of(term.effect).leaves_nothing
+
+
+def flexibility(term: Term, settings: PenaltySettings = DEFAULT.penalty) -> float:
+    """0 for a `term` of few coefficients, 1 for one that bends to the misfit of anything as a second effect would.
+    `settings` are the thresholds.
+    """
+    few, many = settings.few_coefficients, settings.many_coefficients
+    return min(max((term.width - few) / (many - few), 0.0), 1.0)
+
+
+def kind_of(term: Term) -> str:
+    """What the misfit of `term` looks like; that of a resonance, whose frequency lies in its response to each speed,
+    like no other's.
+    """
+    effect = properties_of(term.effect)
+    return "swing" if effect.driven else KINDS.get(effect.domain, "way")

@@ -1,0 +1,265 @@
+"""Which effects explain the residual: a search over subsets, with the base refitted beside every one of them.
+
+Every candidate's columns are whitened and freed of what the base can absorb; the drop of the sum of squares of every
+subset up to three then follows from one table of inner products. Subsets are weighed by an approximate log Bayes
+factor: half the gain less half the freedom times log(rows) (Schwarz), less what the search over shapes cost and less
+prior odds. The leaders are fitted jointly with the nonlinear base, and the search is repeated about the best fit until
+it stands. `STAGES` is the order of work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hdopt.diagnosis.inference.catalogue import is_outside
+from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
+from hdopt.diagnosis.search.acceptance import is_acceptable
+from hdopt.diagnosis.search.candidates import Candidate, joint_fit, without_each
+from hdopt.diagnosis.search.explore import explore
+from hdopt.diagnosis.search.penalty import flexibility
+from hdopt.diagnosis.search.refinement import in_full, narrower, otherwise_acceptable, shortened, trimmed
+from hdopt.diagnosis.search.search_state import SearchPlan, SearchState
+from hdopt.effects.term import Term
+from hdopt.parallel.shared_memory import each
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The `base` alone, the `candidates` in order of evidence (the base alone is among them), and how much rougher the
+    noise is, turn by turn, than its model (`inflation`).
+    """
+
+    base: Fit
+    candidates: tuple[Candidate, ...]
+    inflation: float
+
+    @property
+    def best(self) -> Candidate:
+        """The first candidate."""
+        return self.candidates[0]
+
+    @property
+    def leaders(self) -> tuple[Fit, ...]:
+        """Fits of the best candidates that have terms."""
+        known = self.base.problem.settings.search.known
+        return tuple(candidate.fit for candidate in self.candidates if candidate.fit.terms)[:known]
+
+    def with_best_fit(self, fit: Fit) -> Selection:
+        """The same selection with its best candidate fitted otherwise."""
+        return replace(self, candidates=(replace(self.best, fit=fit), *self.candidates[1:]))
+
+
+def select(base: Fit, inflation: float, rng: np.random.Generator, plan: SearchPlan | None = None) -> Selection:
+    """The candidates that explain best beside `base`, in noise rougher by `inflation`, by alternating search about the
+    best fit and joint fits of the leaders; `rng` draws new drives, `plan` says where to look.
+    """
+    state = SearchState(base, plan or SearchPlan(), inflation, rng)
+    for stage in STAGES:
+        state = stage(state)
+    candidates = acceptable_first(ranked(state), state.settings.close_behind)
+    best = candidates[0]
+    fuller = in_full(best.fit, state.base, inflation, state.order_range) if best.fit.terms else best.fit
+    return Selection(state.base, (replace(best, fit=fuller), *candidates[1:]), inflation)
+
+
+def refit_known(state: SearchState) -> SearchState:
+    """The leaders of an earlier search, refitted on these rows and this noise. `state` is where the work stands."""
+    iterations = state.base.problem.settings.fit.known_iterations
+    for fit in each(lambda fit: refine(fit, iterations), state.plan.known):
+        state = state.with_fit(fit)
+    return state
+
+
+def explore_base(state: SearchState) -> SearchState:
+    """Where nothing is known yet: the best sets about the base alone. `state` is where the work stands."""
+    if state.fits:
+        return state
+    return explore(state, state.base, state.terms_for(state.probe(state.base)), afresh=True)
+
+
+def explore_clean_base(state: SearchState) -> SearchState:
+    """The best sets about a base that is less bent towards what is missing. `state` is where the work stands."""
+    clean = state.plan.clean
+    return state if clean is None else explore(state, clean, state.terms_for(state.probe(clean)))
+
+
+def look_beside_flexible_leader(state: SearchState) -> SearchState:
+    """Where the leader bends to anything, what it explains may be two effects, of which each alone leaves the other:
+    the best sets about single effects. `state` is where the work stands.
+    """
+    for fit in single_effects_worth_a_second(state):
+        pool = [*fit.terms, *state.terms_for(state.probe(fit), fit.terms[0].effect)]
+        state = explore(state, fit, pool)
+    return state
+
+
+def single_effects_worth_a_second(state: SearchState) -> list[Fit]:
+    """Fits of single effects beside which a second is looked for; none where the leader is stiff. `state` is where
+    the work stands.
+    """
+    leader, settings = state.leader, state.settings
+    penalties = state.base.problem.settings.penalty
+    if leader is None or not any(
+        is_outside(t.effect) or t.doubtful or flexibility(t, penalties) > 0 for t in leader.fit.terms
+    ):
+        return []
+    least = settings.beside_flexible * leader.log_bayes_factor
+    single = [
+        fit
+        for fit in state.fits.values()
+        if len(fit.terms) == 1
+        and fit is not leader.fit
+        and not is_outside(fit.terms[0].effect)
+        and state.log_bayes_factor(fit) > least
+    ]
+    return sorted(single, key=state.log_bayes_factor, reverse=True)[: settings.leaders]
+
+
+def search_about_leader(state: SearchState) -> SearchState:
+    """A better drive may fit once the effect is there: the leader from new starts, and a search about what was
+    found, until nothing new comes. `state` is where the work stands.
+    """
+    centre: Fit | None = None
+    for _ in range(state.settings.rounds):
+        leader = state.leader
+        if leader is None or leader.fit is centre:
+            break
+        centre = joint_fit(leader.fit, leader.fit.terms, state.rng)
+        state = state.with_fit(centre)
+        before = state
+        state = explore(state, centre, pool_about(state, centre))
+        if state is before:
+            break
+    return state
+
+
+def pool_about(state: SearchState, centre: Fit) -> list[Term]:
+    """The terms of `centre`, what is found beside them all, and what is found in place of each. `state` is where the
+    work stands.
+    """
+    names = [term.effect for term in centre.terms]
+    pool = [*centre.terms, *state.terms_for(state.probe(centre), *names)]
+    if len(names) == 1:
+        return pool + state.terms_for(state.probe(centre, keep=()), *names)
+    for i in range(len(names)):
+        keep = centre.all_but(i)
+        pool += state.terms_for(state.probe(centre, keep=keep), *(names[j] for j in keep))
+    return pool
+
+
+def refit_close_rivals(state: SearchState) -> SearchState:
+    """The leader has been fitted from new drives; those close behind it, and simpler sets, may want another drive.
+    What only adds to the leader's effects shares its drive. `state` is where the work stands.
+    """
+    leader, settings = state.leader, state.settings
+    if leader is None or state.base.problem.base is None:
+        return state
+    others = (fit for names, fit in state.fits.items() if not names >= set(leader.effects))
+    behind = sorted(others, key=state.log_bayes_factor, reverse=True)[: settings.leaders]
+    least = settings.close * leader.log_bayes_factor
+    sets: list[Sequence[Term]] = [fit.terms for fit in behind if state.log_bayes_factor(fit) > least]
+    sets += narrower(leader.fit, state.plan.skip, state.order_range)
+    start = leader.fit
+
+    def fitted(numbered: tuple[Sequence[Term], np.random.Generator]) -> Fit:
+        return joint_fit(start, *numbered)
+
+    return state.taking(each(fitted, zip(sets, state.rng.spawn(len(sets)), strict=True)))
+
+
+def leave_out_hidden_parts(state: SearchState) -> SearchState:
+    """Parts of terms that do not show are left out: without them a set may be acceptable, with them not. `state` is
+    where the work stands.
+    """
+    for fit in list(state.fits.values()):
+        few = trimmed(fit)
+        if few is None:
+            continue
+        may_lose = state.settings.lost_by_trimming * state.weigh(fit).gain / state.inflation
+        if state.is_better(few, fit, by=-may_lose):
+            state = state.with_fit(few)
+    return state
+
+
+def shorten_wide_terms(state: SearchState) -> SearchState:
+    """Less and less of the leaders' terms that bend to much, as long as that is better. `state` is where the work
+    stands.
+    """
+    best = sorted(state.fits.values(), key=state.log_bayes_factor, reverse=True)[: state.settings.leaders]
+    for fit in best:
+        for shorter in shortened(fit, state.rng):
+            if not state.would_take(shorter):
+                break
+            state = state.with_fit(shorter)
+    return state
+
+
+def leave_out_each_term(state: SearchState) -> SearchState:
+    """A term that came in beside a better drive may have no part in it: without each, from where the best stands.
+    `state` is where the work stands.
+    """
+    while (leader := state.leader) is not None and len(leader.fit.terms) > 1:
+        state = state.taking(without_each(leader.fit))
+        after = state.leader
+        if after is None or after.fit is leader.fit:
+            break
+    return state
+
+
+def base_beside_leader(state: SearchState) -> SearchState:
+    """Beside an effect the base may have come to a better drive: then that is the one to beat. `state` is where the
+    work stands.
+    """
+    leader = state.leader
+    if leader is None:
+        return state
+    fit = leader.fit
+    bare = evaluate(fit.problem, fit.errors, fit.offsets, (), ())
+    alone = refine(bare, fit.problem.settings.fit.again_iterations)
+    return replace(state, base=min(state.base, alone, key=lambda one: one.objective))
+
+
+STAGES: tuple[Callable[[SearchState], SearchState], ...] = (
+    refit_known,
+    explore_base,
+    explore_clean_base,
+    look_beside_flexible_leader,
+    search_about_leader,
+    refit_close_rivals,
+    leave_out_hidden_parts,
+    shorten_wide_terms,
+    leave_out_each_term,
+    base_beside_leader,
+)
+"""The search, in the order of its work."""
+
+
+def ranked(state: SearchState) -> list[Candidate]:
+    """All sets and the base alone in order of evidence, with acceptable variants of leaders that are not acceptable.
+    `state` is where the work stands.
+    """
+    top = state.top_gain
+    candidates = [state.weigh(fit, top) for fit in state.fits.values()]
+    candidates.append(Candidate(state.base, 0.0, 0.0))
+    candidates.sort(key=lambda c: -c.log_bayes_factor)
+    for candidate in candidates[: state.settings.leaders]:
+        if not candidate.fit.terms or is_acceptable(candidate.fit):
+            break
+        others = otherwise_acceptable(candidate.fit, state.plan.skip, state.order_range)
+        candidates += [state.weigh(fit, top) for fit in others]
+    return sorted(candidates, key=lambda c: -c.log_bayes_factor)
+
+
+def acceptable_first(candidates: Sequence[Candidate], close_behind: float) -> list[Candidate]:
+    """`candidates` in order of evidence, without those that are not acceptable, as far as they lead or come within
+    `close_behind` (log Bayes factor) of the leader.
+    """
+    kept: list[Candidate] = []
+    for candidate in candidates:
+        close = not kept or kept[0].log_bayes_factor - candidate.log_bayes_factor < close_behind
+        if not close or not candidate.fit.terms or is_acceptable(candidate.fit):
+            kept.append(candidate)
+    return kept

@@ -1,0 +1,273 @@
+"""The stages of a diagnosis, each from one `State` to the next; `STAGES` is the order of work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.diagnosis.inference.base_fit import fit_base
+from hdopt.diagnosis.inference.catalogue import STRAIN_WAVE_ONLY
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.generic_basis import generic_columns
+from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.inference.nuisance import nuisances_for, with_time_warp
+from hdopt.diagnosis.inference.residual_noise import measure_noise
+from hdopt.diagnosis.orientation import Orientation, is_decisive, preference, turn_round
+from hdopt.diagnosis.search.candidates import Candidate
+from hdopt.diagnosis.search.high_order import find_ripple, strong_ripple, subtract, subtracted_terms
+from hdopt.diagnosis.search.search_state import SearchPlan
+from hdopt.diagnosis.search.subset_search import Selection, select
+from hdopt.diagnosis.settings import DiagnosisSettings
+from hdopt.diagnosis.state import State
+from hdopt.effects.sines import sine_columns
+from hdopt.kinematics.cartesian import CartesianModel
+from hdopt.recordings.read import Recording
+from hdopt.recordings.rows import gather, neighbours_for
+
+Array = NDArray[np.float64]
+
+ORDER_DOMAINS = ("integer order", "output-synchronous order", "asynchronous order")
+"""Domains of the generic basis in which the base itself lives."""
+
+
+def begin(
+    recordings: Sequence[Recording],
+    base: CartesianModel | None,
+    seed: int,
+    settings: DiagnosisSettings,
+    nuisance: Sequence[str] = (),
+) -> State:
+    """The first state: rows of all `recordings`, nuisances asked for by name (`nuisance`), a first guess of the
+    noise, and the `base` model (None for a gear without one) fitted from random drives drawn with `seed`.
+    `settings` are the thresholds.
+    """
+    rng = np.random.default_rng(seed)
+    # Offsets of thousands of arcmin are zeros of encoders; without them the numbers keep their digits.
+    middle = float(np.median(recordings[0].error_arcmin))
+    recordings = tuple(replace(r, error_arcmin=r.error_arcmin - middle) for r in recordings)
+    rows = gather(recordings, neighbours_for(recordings))
+    nuisances = nuisances_for(rows, base, nuisance, settings.nuisance)
+    ruled_out = (*nuisances.hidden, *(STRAIN_WAVE_ONLY if base is None else ()))
+    problem = FitProblem(rows, base, nuisances.columns(rows), Noise.white(rows), settings=settings)
+    offsets = problem.nuisance @ np.linalg.lstsq(problem.nuisance, rows.error, rcond=None)[0]
+    size = float(np.std(rows.error - offsets))
+    sigma = max(settings.noise.first_share * size, settings.noise.smallest_arcmin)
+    widened = max(1.0, size / settings.base.prior_arcmin)
+    start = fit_base(replace(problem, noise=Noise.white(rows, sigma), prior_scale=widened), rng)
+    return State(recordings, nuisances, ruled_out, start, None, only_base(start, 1.0), None, None, 1.0, rng)
+
+
+def only_base(base: Fit, inflation: float) -> Selection:
+    """The selection of a search that found nothing beside `base`. `inflation` is that of the noise."""
+    return Selection(base, (Candidate(base, 0.0, 0.0),), inflation)
+
+
+def set_strong_ripple_aside(state: State) -> State:
+    """What the means of a few rows cannot hold comes back as orders that are not there: a strong ripple is taken out
+    of the rows and waits for its own search. `state` is where the work stands.
+    """
+    ripple = strong_ripple(state.recordings, state.base, state.nuisances)
+    if ripple is None:
+        return state
+    rng = state.draws()
+    rows = gather(subtract(state.recordings, ripple), neighbours_for(state.recordings))
+    return replace(state, base=fit_base(replace(state.problem, rows=rows), rng, near=state.base), rng=rng)
+
+
+def fit_time_warp(state: State) -> State:
+    """Where one was asked for: the base with a time warp beside it, linearised anew where each fit stands. `state`
+    is where the work stands.
+    """
+    if not state.nuisances.warps:
+        return state
+    nuisances, fit, settings = state.nuisances, state.base, state.settings.nuisance
+    for _ in range(settings.warp_rounds):
+        nuisances = with_time_warp(nuisances, fit)
+        problem = replace(state.problem, nuisance=nuisances.columns(state.problem.rows))
+        free = np.r_[fit.offsets, np.zeros(problem.nuisance.shape[1] - len(fit.offsets))]
+        fit = refine(evaluate(problem, fit.errors, free, (), ()), settings.warp_iterations)
+    return replace(state, base=fit, nuisances=nuisances)
+
+
+def fit_base_in_noise(state: State) -> State:
+    """The noise is measured, and the base fitted in it, once as it is and once beside smooth columns. `state` is
+    where the work stands.
+    """
+    rng, settings = state.draws(), state.settings.base
+    measured = measure_noise(state.base)
+    problem = state.problem.with_noise(measured.noise)
+    base = refine(fit_base(problem, rng, settings.starts_again, near=state.base), settings.measured_iterations)
+    clean = fit_clean_base(problem, rng)
+    return replace(state, base=base, clean=clean, inflation=measured.inflation, rng=rng)
+
+
+def fit_clean_base(problem: FitProblem, rng: np.random.Generator) -> Fit | None:
+    """The base of `problem` fitted beside smooth columns that soak up most additive physics, from drives drawn by
+    `rng`, then looked at without them.
+    """
+    if problem.base is None:
+        return None
+    columns, domains = generic_columns(problem.rows, settings=problem.settings.generic)
+    wanted = [i for i, domain in enumerate(domains) if domain not in ORDER_DOMAINS]
+    nuisance = np.column_stack([problem.nuisance, columns[:, wanted], sine_columns(problem.rows.theta, [1])])
+    fit = fit_base(replace(problem, nuisance=nuisance), rng, problem.settings.base.starts_clean)
+    bare = evaluate(problem, fit.errors, fit.offsets[: problem.nuisance.shape[1]], (), ())
+    offset = np.linalg.lstsq(problem.nuisance, bare.residual, rcond=None)[0]
+    return evaluate(problem, fit.errors, bare.offsets + offset, (), ())
+
+
+def choose_orientation(state: State) -> State:
+    """Both ways of counting the angles are fitted; where neither base explains clearly more, with their effects.
+    `state` is where the work stands; the draws are its own, so that a recording as counted goes on as without them.
+    """
+    problem = state.problem
+    output = -1 if state.recordings[0].output_reversed else 1
+    if problem.base is None or problem.rows.locked or state.nuisances.warps:
+        return replace(state, orientation=Orientation(1, output, "no model"))
+    rng, settings = state.draws(), state.settings
+    turned = begin_turned(state)
+    turned = replace(turned, base=fit_base(turned.problem.with_noise(problem.noise), rng, near=turned.base))
+    preferred = preference([state.base], [turned.base])
+    if not abs(preferred) > settings.orientation.base_alone and state.clean is not None:
+        clean = fit_clean_base(turned.problem, rng)
+        if clean is not None:
+            ways = ([state.base, beside_smooth(state.clean)], [turned.base, beside_smooth(clean)])
+            preferred = preference(*ways)
+    turned = replace(turned, orientation=Orientation(-1, -output, "data"))
+    if is_decisive(preferred, settings.orientation):
+        return (
+            replace(state, orientation=Orientation(1, output, "data")) if preferred > 0 else fit_base_in_noise(turned)
+        )
+    return better_way(replace(state, orientation=Orientation(1, output, "data")), turned)
+
+
+def begin_turned(state: State) -> State:
+    """`state` before its noise was measured, on its recordings turned round."""
+    seed = int(state.draws().integers(np.iinfo(np.int64).max))
+    asked = ("drift",) if state.nuisances.drift else ()
+    start = begin(turn_round(state.recordings), state.problem.base, seed, state.settings, asked)
+    return set_strong_ripple_aside(start)
+
+
+def beside_smooth(clean: Fit) -> Fit:
+    """A `clean` base's fit with its smooth columns beside it: what it was fitted for."""
+    problem = clean.problem
+    columns, domains = generic_columns(problem.rows, settings=problem.settings.generic)
+    wanted = [i for i, domain in enumerate(domains) if domain not in ORDER_DOMAINS]
+    own = np.column_stack([problem.nuisance, columns[:, wanted], sine_columns(problem.rows.theta, [1])])
+    beside = replace(problem, nuisance=own)
+    free = np.r_[clean.offsets, np.zeros(own.shape[1] - len(clean.offsets))]
+    return refine(evaluate(beside, clean.errors, free, (), ()), problem.settings.fit.offset_iterations)
+
+
+def better_way(state: State, turned: State) -> State:
+    """Of `state` and its `turned` counterpart the one whose effects and base explain more together; `state`, by
+    convention, where that is a tie.
+    """
+    other = fit_base_in_noise(turned)
+    sigma2 = state.problem.noise.sigma**2
+    scores = []
+    for way in (state, other):
+        problem = way.problem.with_noise(state.problem.noise)
+        base = refine(on_problem(way.base, problem), way.settings.fit.known_iterations)
+        plan = SearchPlan(skip=way.ruled_out, clean=way.clean)
+        found = select(base, state.inflation, way.draws(), plan)
+        left = found.base.objective / sigma2 / state.inflation / 2
+        scores.append(found.best.log_bayes_factor - left)
+    if abs(scores[0] - scores[1]) < state.settings.orientation.tie:
+        return replace(state, orientation=replace(state.orientation, decided_by="convention"))
+    return state if scores[0] > scores[1] else other
+
+
+def search_effects(state: State) -> State:
+    """Which effects explain what the base leaves. `state` is where the work stands."""
+    rng = state.draws()
+    plan = SearchPlan(skip=state.ruled_out, clean=state.clean)
+    return replace(state.found(select(state.base, state.inflation, rng, plan)), rng=rng)
+
+
+def measure_noise_again(state: State) -> State:
+    """The noise again, now without what was found: where that was most of what is there, more shows beside it.
+    `state` is where the work stands.
+    """
+    rng, settings = state.draws(), state.settings
+    for _ in range(settings.noise.rounds):
+        best = state.selection.best.fit
+        measured = measure_noise(best)
+        change = measured.noise.sigma / state.problem.noise.sigma
+        if not best.terms or settings.noise.unchanged_from < change < settings.noise.unchanged_to:
+            break
+        problem = state.problem.with_noise(measured.noise)
+        base = refine(on_problem(state.base, problem), settings.fit.known_iterations)
+        plan = SearchPlan(skip=state.ruled_out, known=leaders_on(state.selection, problem))
+        selection = select(base, measured.inflation, rng, plan)
+        state = replace(state.found(selection), inflation=measured.inflation)
+    return replace(state, rng=rng)
+
+
+def search_high_orders(state: State) -> State:
+    """Tooth mesh and encoder lines, on the rows as recorded. `state` is where the work stands."""
+    rng = state.draws()
+    high, ripple = find_ripple(state.recordings, state.selection, state.nuisances, state.ruled_out, rng)
+    return replace(state, high=high, ripple=ripple, rng=rng)
+
+
+def search_without_ripple(state: State) -> State:
+    """Where a ripple was found: the rest is searched again on rows that are free of it. `state` is where the work
+    stands.
+    """
+    if state.ripple is None or state.high is None:
+        return state
+    rng, settings, before = state.draws(), state.settings, state.selection.best
+    cleaned = subtract(state.recordings, state.ripple)
+    rows = gather(cleaned, neighbours_for(cleaned))
+    problem = replace(state.problem, rows=rows, nuisance=state.nuisances.columns(rows))
+    base = refine(on_problem(state.base, problem), settings.fit.known_iterations)
+    measured = measure_noise(base if not before.effects else on_problem(before.fit, problem))
+    base = refine(on_problem(base, problem.with_noise(measured.noise)), settings.fit.settled_iterations)
+    plan = SearchPlan(
+        skip=state.ruled_out,
+        known=leaders_on(state.selection, base.problem),
+        subtracted=subtracted_terms(base, float(np.var(state.ripple)), state.high.best.fit.terms),
+    )
+    selection = select(base, measured.inflation, rng, plan)
+    state = replace(state.found(selection), inflation=measured.inflation, rng=rng)
+    changed = set(selection.best.effects) != set(before.effects)
+    sizes = [float(np.var(fit.contributions)) for fit in (selection.best.fit, before.fit)]
+    if state.ripple is not None and changed and max(sizes) > settings.high_order.beside * float(np.var(state.ripple)):
+        # What was beside the ripple when it was named is not there any more.
+        high, _ = find_ripple(state.recordings, state.selection, state.nuisances, state.ruled_out, rng)
+        state = replace(state, high=high)
+    return state
+
+
+def on_problem(fit: Fit, problem: FitProblem) -> Fit:
+    """The parameters of `fit` on another problem's rows and noise."""
+    terms = [
+        replace(problem.explanations[t.effect].term(problem.rows, t.shape, fit.motion), trials=t.trials, odds=t.odds)
+        for t in fit.terms
+    ]
+    return evaluate(problem, fit.errors, fit.offsets, terms, fit.coefficients)
+
+
+def leaders_on(selection: Selection, problem: FitProblem) -> tuple[Fit, ...]:
+    """The leaders of a search on another problem's rows and noise; none where nothing led. `selection` is what the
+    search found.
+    """
+    return tuple(on_problem(fit, problem) for fit in selection.leaders) if selection.best.fit.terms else ()
+
+
+STAGES: tuple[Callable[[State], State], ...] = (
+    set_strong_ripple_aside,
+    fit_time_warp,
+    fit_base_in_noise,
+    choose_orientation,
+    search_effects,
+    measure_noise_again,
+    search_high_orders,
+    search_without_ripple,
+)
+"""A diagnosis, in the order of its work, after `begin`; `checks.assessment.assess` takes the last state."""

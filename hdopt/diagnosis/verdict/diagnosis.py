@@ -1,0 +1,69 @@
+"""The diagnosis as a record: a verdict with everything that carries it, and its JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from hdopt.diagnosis.checks.assessment import Evidence
+from hdopt.diagnosis.checks.confounding import Confounding
+from hdopt.diagnosis.checks.localization import Location
+from hdopt.diagnosis.inference.base_fit import BaseEstimate
+from hdopt.diagnosis.verdict.named_effect import NamedEffect
+from hdopt.diagnosis.verdict.where import Where
+from hdopt.effects.estimate import Parameter
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A verdict with everything that carries it; `to_dict` is the JSON contract, and `rule` the name of the rule that
+    gave the verdict.
+    """
+
+    verdict: str
+    rule: str
+    effects: tuple[NamedEffect, ...]
+    ambiguous_with: tuple[tuple[str, ...], ...]
+    separating_test: str | None
+    base: BaseEstimate
+    fit: Mapping[str, float | None]
+    below_detection: Mapping[str, float]
+    warnings: tuple[str, ...]
+    says: str
+    where: Where | None
+    located: tuple[Location, ...]
+    confounded: tuple[Confounding, ...]
+    each_condition: Mapping[str, tuple[float, float]]
+    nuisances: Mapping[str, Parameter]
+    evidence: Evidence
+
+    def to_dict(self) -> dict[str, object]:
+        """The JSON of `hdopt diagnose`."""
+        result: dict[str, object] = {
+            "schema": 1,
+            "verdict": self.verdict,
+            "says": self.says,
+            "effects": [found.to_dict() for found in self.effects],
+            "ambiguous_with": [list(ids) for ids in self.ambiguous_with],
+            "separating_test": self.separating_test,
+            "confounded": [pair.to_dict() for pair in self.confounded],
+            "base": {
+                "parameters": {name: p.to_dict() for name, p in self.base.parameters.items()},
+                "rms_arcmin": self.base.rms_arcmin,
+                "not_separable": list(self.base.open_combinations),
+                "nuisances": {name: p.to_dict() for name, p in self.nuisances.items()},
+            },
+            "located": [location.to_dict() for location in self.located],
+            "orientation": self.evidence.orientation.to_dict(),
+            "scale": None if self.evidence.scale is None else self.evidence.scale.to_dict(),
+            "fit": dict(self.fit),
+            "heldout_conditions": [
+                {"condition": name, "rms_base_arcmin": base, "rms_extended_arcmin": extended}
+                for name, (base, extended) in self.each_condition.items()
+            ],
+            "below_detection": dict(self.below_detection),
+            "warnings": list(self.warnings),
+        }
+        if self.where is not None:
+            result["where"] = self.where
+        return result

@@ -1,0 +1,146 @@
+"""Drawing the verdict: the rules' conclusion, with the numbers that belong to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hdopt.diagnosis.checks.assessment import Evidence
+from hdopt.diagnosis.checks.localization import locate
+from hdopt.diagnosis.inference.base_fit import base_estimate, beat_warning
+from hdopt.diagnosis.inference.catalogue import is_effect
+from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.inference.nuisance import estimated, notes
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.orientation import Orientation
+from hdopt.diagnosis.verdict.diagnosis import Diagnosis
+from hdopt.diagnosis.verdict.facts import find
+from hdopt.diagnosis.verdict.named_effect import NamedEffect
+from hdopt.diagnosis.verdict.rules import rule_for
+from hdopt.effects import EFFECTS
+from hdopt.effects.declared import Quantity
+from hdopt.kinematics.cartesian import CARTESIAN_NAMES
+
+LOCATE_SEED = 0
+"""Seed of the sign flips that say where a residual lives."""
+
+
+def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
+    """The verdict on the `evidence`, with the `warnings` that reading the recordings gave."""
+    findings = find(evidence)
+    rule = rule_for(findings.facts)
+    conclusion = rule.consequence(findings)
+    selection = evidence.selection
+    across = evidence.across_conditions
+    model = selection.best.fit if findings.facts.named else selection.base
+    said = {found.id for found in conclusion.effects}
+    return Diagnosis(
+        verdict=conclusion.verdict,
+        rule=rule.name,
+        effects=conclusion.effects,
+        ambiguous_with=conclusion.ambiguous_with,
+        separating_test=conclusion.separating_test,
+        base=base_estimate(model),
+        fit=fit_numbers(evidence),
+        below_detection={
+            name: limit for name, limit in evidence.below_detection.items() if is_effect(name) and name not in said
+        },
+        warnings=(
+            *warnings,
+            *notes(model, evidence.nuisances),
+            *orientation_notes(evidence.orientation),
+            *scale_notes(evidence),
+            *base_notes(model),
+            *prior_notes(conclusion.effects),
+            *beat_notes(evidence),
+            *(f"{name} cannot be seen here: it needs {need}" for name, need in evidence.lacking.items()),
+        ),
+        says=conclusion.says,
+        where=conclusion.where,
+        located=tuple(locate(FitProbe(selection.base), np.random.default_rng(LOCATE_SEED))),
+        confounded=conclusion.confounded,
+        each_condition=across.each if across is not None else {},
+        nuisances=estimated(model, evidence.nuisances),
+        evidence=evidence,
+    )
+
+
+def fit_numbers(evidence: Evidence) -> dict[str, float | None]:
+    """The numbers behind the verdict, as in the JSON's `fit`. `evidence` is that of the diagnosis."""
+    across = evidence.across_conditions
+    return {
+        "heldout_rms_base_arcmin": evidence.base_held_out.rms,
+        "heldout_rms_extended_arcmin": evidence.extended_held_out.rms,
+        "heldout_rms_generic_arcmin": evidence.generic_held_out.rms,
+        "heldout_rms_placebo_arcmin": evidence.placebo_held_out.rms,
+        "heldout_conditions_rms_base_arcmin": across.base if across is not None else None,
+        "heldout_conditions_rms_extended_arcmin": across.extended if across is not None else None,
+        "noise_floor_arcmin": evidence.noise_floor,
+        "false_alarm_p": evidence.false_alarm_p,
+    }
+
+
+def orientation_notes(orientation: Orientation) -> tuple[str, ...]:
+    """What must be said of the way the angles count (`orientation`)."""
+    if orientation.turned:
+        return (
+            "both angles count the other way round than the model's: the recording was turned round; the drive's own "
+            "errors are those of the turned counting, effects' phases and angles those of the recording as given",
+        )
+    if orientation.decided_by == "convention":
+        return (
+            "the recording does not say which way its angles count, and they were taken as they are; tell from the "
+            "bench whether a positive input angle turns the drive as the model's does",
+        )
+    return ()
+
+
+def scale_notes(evidence: Evidence) -> tuple[str, ...]:
+    """What the `evidence` says of a ratio or gain that is off."""
+    scale = evidence.scale
+    if scale is None or not scale.found:
+        return ()
+    return (
+        f"the error grows with the angle as if the ratio were {scale.ratio:.6g} in place of {evidence.rows.ratio:g}, "
+        f"or the output encoder's gain {scale.gain:.6g}; check both (a slow warming at one speed would look the same)",
+    )
+
+
+def base_notes(model: Fit) -> tuple[str, ...]:
+    """A base of `model` far outside the errors that its prior allows."""
+    if model.problem.base is None:
+        return ()
+    far = np.abs(model.errors) > model.problem.settings.verdict.far_base * model.problem.prior
+    if not far.any():
+        return ()
+    listed = ", ".join(f"{CARTESIAN_NAMES[i]} {model.errors[i]:.3g} mm" for i in np.flatnonzero(far))
+    return (f"the fitted drive lies far outside the tolerances of its kind ({listed}): check drive, ratio and units",)
+
+
+def prior_notes(effects: Sequence[NamedEffect]) -> tuple[str, ...]:
+    """Parameters of the `effects` said whose whole interval lies outside of where real drives and benches have them."""
+    notes = []
+    for found in effects:
+        for one in EFFECTS[found.id].flat_declared():
+            parameter = found.parameters.get(one.name) if isinstance(one, Quantity) else None
+            if parameter is None or not isinstance(one, Quantity) or one.prior is None:
+                continue
+            low, high = one.prior
+            if parameter.low > high or parameter.high < low:
+                notes.append(
+                    f"{found.id}: {one.name} {parameter.value:.3g} {parameter.unit} lies outside of what drives and "
+                    f"benches have ({low:g} to {high:g}): check units, columns, signs and ratio before you believe it"
+                )
+    return tuple(notes)
+
+
+def beat_notes(evidence: Evidence) -> tuple[str, ...]:
+    """What the record's length leaves open between circular spline and flexspline, of a harmonic drive. `evidence`
+    is that of the diagnosis.
+    """
+    problem = evidence.selection.base.problem
+    if evidence.rows.locked or problem.base is None:
+        return ()
+    warning = beat_warning(evidence.rows, problem.settings.base)
+    return () if warning is None else (warning,)

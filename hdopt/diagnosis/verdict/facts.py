@@ -1,0 +1,203 @@
+"""What the rules of the verdict look at, drawn from the evidence once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from hdopt.diagnosis.checks.assessment import Evidence
+from hdopt.diagnosis.checks.confounding import Confounding
+from hdopt.diagnosis.inference.catalogue import SCALE
+from hdopt.diagnosis.numerical import TINY
+from hdopt.diagnosis.search.candidates import Candidate
+from hdopt.diagnosis.settings import VerdictSettings
+from hdopt.diagnosis.verdict.named_effect import NamedEffect, describe
+from hdopt.diagnosis.verdict.residual_structure import (
+    clearly_unexplained,
+    momentary,
+    outside_share,
+    term_powers,
+    unsteady,
+)
+from hdopt.diagnosis.verdict.rivals import (
+    Sets,
+    confounded_pairs,
+    imitating_sets,
+    placebo_as_good,
+    rivals,
+    scale_is_as_good,
+)
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a recording shows.
+
+    `explained`: the best set has effects; `false_alarm_p`: the chance that noise alone does as well; `own_gain`: the
+    held-out power that the effects themselves predict, over what is left; `high`: orders above the averaged rows stand
+    out. `outside_share` and `high_outside_share`: share of what the best set, and the set of high orders, explain that
+    descriptions without physics carry. `momentary`: something happened at one moment only; `unsteady`: something
+    changes in time as no noise does; `generic_wins`: a basis without physics clearly predicts better, with a t of
+    `generic_t`. `turns_suffice`: turns can be held out; `too_little`: the record cannot say even that the base is
+    adequate. `rivals`: other sets that are as good, placebo and
+    perfect imitations among them; `scale_as_good`: so is a ratio or gain that is off, alone. `heldout_over_floor`:
+    held-out error over what a generic basis leaves; `noise_over_neighbours`: the same over the noise that neighbouring
+    samples and the sensors' steps show. `above_resolution`: some effect is larger than what sensors and model resolve.
+    """
+
+    settings: VerdictSettings
+    turns_suffice: bool
+    explained: bool
+    false_alarm_p: float
+    own_gain: float
+    high: bool
+    outside_share: float
+    high_outside_share: float
+    momentary: bool
+    unsteady: bool
+    generic_wins: bool
+    generic_t: float
+    too_little: bool
+    rivals: Sets
+    scale_as_good: bool = False
+    heldout_over_floor: float = 1.0
+    noise_over_neighbours: float = 1.0
+    above_resolution: bool = True
+
+    @property
+    def significant(self) -> bool:
+        """Whether noise alone would hardly do as well."""
+        return self.false_alarm_p <= self.settings.significance
+
+    @property
+    def named(self) -> bool:
+        """Whether the best set's effects may be named."""
+        worth = self.own_gain > self.settings.smallest_share
+        possible = self.turns_suffice and self.explained and self.above_resolution
+        return possible and self.significant and worth and not self.scale_as_good
+
+    @property
+    def said(self) -> bool:
+        """Whether there is any effect to name, high orders included."""
+        return self.named or self.high
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The evidence, the facts in it, and what was found in high orders, if that stands out."""
+
+    evidence: Evidence
+    facts: Facts
+    high: Candidate | None
+    pairs: tuple[Confounding, ...] = ()
+
+    @cached_property
+    def effects(self) -> tuple[NamedEffect, ...]:
+        """Every effect that is said, the largest first."""
+        found: list[NamedEffect] = []
+        if self.facts.named:
+            least = resolution(self.evidence)
+            described = describe(self.evidence.selection.best, self.evidence)
+            found += [one for one in described if one.where["rms_arcmin"] >= least]
+        if self.high is not None:
+            said = {one.id for one in found}
+            found += [one for one in describe(self.high, self.evidence, high=True) if one.id not in said]
+        return tuple(sorted(found, key=lambda one: -one.where["rms_arcmin"]))
+
+
+def find(evidence: Evidence) -> Findings:
+    """The facts of the `evidence`."""
+    best, settings = evidence.selection.best, evidence.settings.verdict
+    suffice = turns_suffice(evidence)
+    high = evidence.high.best if evidence.high is not None and evidence.high.best.fit.terms else None
+    if high is not None and not (suffice and stands_out(high, evidence)):
+        high = None
+    facts = Facts(
+        settings=settings,
+        turns_suffice=suffice,
+        explained=any(name != SCALE for name in best.effects),
+        false_alarm_p=evidence.false_alarm_p,
+        own_gain=own_gain(evidence),
+        high=high is not None,
+        outside_share=outside_share(best),
+        high_outside_share=0.0 if high is None else outside_share(high),
+        momentary=momentary(evidence),
+        unsteady=unsteady(evidence) is not None,
+        generic_wins=clearly_unexplained(evidence),
+        generic_t=evidence.remainder.t,
+        too_little=too_little(evidence),
+        rivals=(),
+        scale_as_good=scale_is_as_good(evidence),
+        heldout_over_floor=evidence.extended_held_out.rms / evidence.noise_floor,
+        noise_over_neighbours=evidence.extended_held_out.rms
+        / max(evidence.neighbours_arcmin, evidence.sensor_arcmin, TINY),
+        above_resolution=any(power >= resolution(evidence) ** 2 for power in effect_powers(best)),
+    )
+    pairs = confounded_pairs(evidence, facts.named, high) if facts.said else ()
+    findings = Findings(evidence, facts, high, pairs)
+    as_good: Sets = ()
+    if facts.named:
+        as_good = (*rivals(evidence, high), *placebo_as_good(evidence, pairs))
+    if facts.said:
+        as_good = (*as_good, *imitating_sets(pairs, [one.id for one in findings.effects], settings))
+    as_good = tuple(dict.fromkeys(as_good))[: settings.most_rivals]
+    return Findings(evidence, replace(facts, rivals=as_good), high, pairs)
+
+
+def effect_powers(candidate: Candidate) -> list[float]:
+    """Power (arcmin^2) of each term of `candidate` but a scale that is off."""
+    powers = term_powers(candidate.fit)
+    return [power for power, name in zip(powers, candidate.effects, strict=True) if name != SCALE]
+
+
+def resolution(evidence: Evidence) -> float:
+    """Rms (arcmin) below which nothing in `evidence` is a finding: a share of the base's own, to which its model is
+    accurate, and of the noise and the steps of the sensors.
+    """
+    settings = evidence.settings.verdict
+    base = float(np.std(evidence.selection.base.base_value))
+    sensors = max(evidence.neighbours_arcmin, evidence.sensor_arcmin)
+    return max(settings.model_resolution * base, settings.sensor_resolution * sensors)
+
+
+def own_gain(evidence: Evidence) -> float:
+    """How much better the effects predict, over what is left, and do so themselves: not by a better drive that was
+    found beside them. `evidence` is that of the diagnosis.
+    """
+    base, extended = evidence.base_held_out.variance, evidence.extended_held_out.variance
+    own = sum(effect_powers(evidence.selection.best))
+    return min(base - extended, evidence.settings.verdict.own_power * own) / extended
+
+
+def stands_out(high: Candidate, evidence: Evidence) -> bool:
+    """Whether a ripple (`high`) carries a share of the raw rows' power, and is more than what another shape of what the
+    `evidence` holds may leave there.
+    """
+    settings = evidence.settings.verdict
+    power = sum(term_powers(high.fit))
+    explained = max(evidence.base_held_out.variance - evidence.extended_held_out.variance, 0.0)
+    enough = power > settings.smallest_share * float(np.var(high.fit.residual))
+    return enough and power > settings.high_share * explained
+
+
+def turns_suffice(evidence: Evidence) -> bool:
+    """Whether turns can be held out: otherwise neither a name nor something unknown is claimed. `evidence` is that
+    of the diagnosis.
+    """
+    return evidence.rows.locked or evidence.rows.blocks >= evidence.settings.verdict.fewest_blocks
+
+
+def too_little(evidence: Evidence) -> bool:
+    """Too short for whole turns to be held out, or noise above the base's own size in every average. `evidence` is
+    that of the diagnosis.
+    """
+    rows = evidence.rows
+    if rows.locked:
+        return False
+    base_power = float(np.std(evidence.selection.base.base_value))
+    if not turns_suffice(evidence) or rows.span_turns < evidence.settings.verdict.fewest_turns:
+        return True
+    limits = list(evidence.below_detection.values())
+    return bool(limits) and base_power > 0 and float(np.median(limits)) > base_power

@@ -1,0 +1,128 @@
+"""What the catalogue does not explain: when it counts, and where it lives."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hdopt.diagnosis.checks.assessment import Evidence
+from hdopt.diagnosis.inference.catalogue import is_outside, properties_of
+from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.numerical import TINY
+from hdopt.diagnosis.search.candidates import Candidate
+from hdopt.diagnosis.verdict.named_effect import main_orders, share_of
+from hdopt.diagnosis.verdict.where import Where
+
+LISTED_DIGITS = 4
+"""Digits of an order in the JSON."""
+MOMENTARY = frozenset({"_jump", "_bump"})
+"""Descriptions of what happened at one moment."""
+
+
+def term_powers(fit: Fit) -> list[float]:
+    """Power of each term's contribution, arcmin^2. `fit` holds the terms."""
+    return [float(np.var(fit.contribution(i))) for i in range(len(fit.terms))]
+
+
+def momentary(evidence: Evidence) -> bool:
+    """Whether something that happened at one moment only, and that no held-out turn can show again, is most of what
+    is there. `evidence` is that of the diagnosis.
+    """
+    best, settings = evidence.selection.best, evidence.settings.verdict
+    powers = term_powers(best.fit)
+    once = sum(p for p, name in zip(powers, best.effects, strict=True) if name in MOMENTARY)
+    return (
+        bool(best.effects)
+        and once > settings.momentary_share * sum(powers)
+        and best.log_bayes_factor > settings.momentary_evidence
+        and once > settings.smallest_share * float(np.var(best.fit.residual))
+    )
+
+
+def in_what_way(where: Where) -> str:
+    """How something that lives in time (`where`) shows, for the sentence."""
+    if "period_s" in where:
+        return f", a wave of {where['period_s']:.3g} s"
+    if "sudden_steps" in where:
+        return f", {where['sudden_steps']} sudden steps and what creeps back between them"
+    return ""
+
+
+def unsteady(evidence: Evidence) -> Where | None:
+    """Where something lives that changes in time as no noise does, if it is a fair part of what is there, or None.
+    `evidence` is that of the diagnosis.
+    """
+    settings = evidence.settings.verdict
+    least = settings.remainder_share * max(evidence.base_held_out.variance - evidence.extended_held_out.variance, 0.0)
+    floor = settings.smallest_share * evidence.extended_held_out.variance
+    wave, steps = evidence.wave, evidence.steps
+    rms = max(wave.rms if wave is not None else 0.0, steps.rms)
+    if not (steps.any or wave is not None) or rms**2 <= max(least, floor):
+        return None
+    where: Where = {
+        "domain": "time",
+        "orders_per_input_turn": [],
+        "direction": "both",
+        "share_of_residual": float(min(rms**2 / max(evidence.base_held_out.variance, TINY), 1.0)),
+        "rms_arcmin": rms,
+    }
+    if wave is not None and wave.rms >= steps.rms:
+        where["period_s"] = wave.period
+    else:
+        where["sudden_steps"] = len(steps.rows)
+    return where
+
+
+def outside_share(candidate: Candidate) -> float:
+    """Share of what a set explains that its descriptions without physics carry. `candidate` is that set."""
+    fit = candidate.fit
+    power = term_powers(fit)
+    outside = sum(p for p, term in zip(power, fit.terms, strict=True) if is_outside(term.effect))
+    return outside / max(sum(power), TINY)
+
+
+def clearly_unexplained(evidence: Evidence) -> bool:
+    """Whether the generic basis clearly beats the explanation on held-out turns. `evidence` is that of the
+    diagnosis.
+    """
+    left = evidence.extended_held_out.variance - evidence.remainder.held_out.variance
+    explainable = evidence.base_held_out.variance - min(
+        evidence.remainder.held_out.variance, evidence.generic_held_out.variance
+    )
+    if evidence.high is not None:
+        explainable += float(np.var(evidence.high.best.fit.contributions))
+    base_power = float(np.var(evidence.selection.base.base_value))
+    settings = evidence.settings.verdict
+    floor = max(settings.remainder_floor * evidence.remainder.held_out.variance, settings.base_floor * base_power)
+    return (
+        evidence.remainder.t > settings.remainder_t and left > settings.remainder_share * explainable and left > floor
+    )
+
+
+def locate_remainder(evidence: Evidence) -> Where:
+    """Where the structure lives that nothing in the catalogue explains. `evidence` is that of the diagnosis."""
+    if (where := unsteady(evidence)) is not None:
+        return where
+    remainder = evidence.remainder
+    left = max(evidence.extended_held_out.variance - remainder.held_out.variance, 0.0)
+    domain = max(remainder.domains, key=lambda name: remainder.domains[name], default="order")
+    for candidate in (evidence.selection.best, *((evidence.high.best,) if evidence.high is not None else ())):
+        for index, term in enumerate(candidate.fit.terms):
+            if is_outside(term.effect):
+                contribution = candidate.fit.contribution(index)
+                return {
+                    "domain": properties_of(term.effect).domain,
+                    "orders_per_input_turn": main_orders(candidate.fit, contribution),
+                    "direction": "both",
+                    "share_of_residual": float(min(share_of(candidate.fit, index), 1.0)),
+                    "rms_arcmin": float(np.std(contribution)),
+                }
+    explainable = max(evidence.base_held_out.variance, TINY)
+    return {
+        "domain": domain,
+        "orders_per_input_turn": [round(order, LISTED_DIGITS) for order in remainder.orders],
+        "direction": "both",
+        "share_of_residual": float(min(left / explainable, 1.0)),
+        "rms_arcmin": math.sqrt(left),
+    }

@@ -1,0 +1,112 @@
+"""Other explanations: sets whose evidence is as good, effects that could imitate, and what would part them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hdopt.diagnosis.checks.assessment import Evidence
+from hdopt.diagnosis.checks.confounding import Confounding, confounded_with
+from hdopt.diagnosis.inference.catalogue import SCALE, is_effect
+from hdopt.diagnosis.inference.cross_validation import paired_t
+from hdopt.diagnosis.search.candidates import Candidate
+from hdopt.diagnosis.search.high_order import ripple_orders
+from hdopt.diagnosis.settings import VerdictSettings
+from hdopt.effects import EFFECTS, HIGH_ORDER
+
+Sets = tuple[tuple[str, ...], ...]
+
+
+def rivals(evidence: Evidence, high: Candidate | None) -> Sets:
+    """Other sets of effects, no larger, whose evidence is within a tie of the best; each with what was found in `high`
+    orders beside it.
+    """
+    settings = evidence.settings.verdict
+    best, *others = evidence.selection.candidates
+    tail = [] if high is None else list(high.effects)
+    said = {name for name in (*best.effects, *tail) if is_effect(name)}
+    found = []
+    for other in others:
+        if not other.fit.terms or (other.outside and not best.outside) or len(other.fit.terms) > len(best.fit.terms):
+            continue
+        if best.log_bayes_factor - other.log_bayes_factor <= settings.tie:
+            found.append(tuple(name for name in (*other.effects, *tail) if is_effect(name)))
+    different = (names for names in dict.fromkeys(found) if names and set(names) != said)
+    return tuple(different)[: settings.most_rivals]
+
+
+def scale_is_as_good(evidence: Evidence) -> bool:
+    """Whether a ratio or gain that is off, without any effect, explains as well as the best set of the `evidence`."""
+    best = evidence.selection.best
+    alone = (one for one in evidence.selection.candidates if one.effects == (SCALE,))
+    tie = evidence.settings.verdict.tie
+    return any(best.log_bayes_factor - one.log_bayes_factor <= tie for one in alone)
+
+
+def placebo_as_good(evidence: Evidence, pairs: Sequence[Confounding]) -> Sets:
+    """The placebo, as another explanation, where it predicts unseen turns as well as what was found in `evidence`, and
+    none of the confounded `pairs` says that rows part them: what tells play from friction lies in the few rows after a
+    reversal, and drowns in whole turns.
+    """
+    settings = evidence.settings.verdict
+    base, own = evidence.base_held_out.variance, evidence.extended_held_out.variance
+    found = {name for name in evidence.selection.best.effects if is_effect(name)}
+    if evidence.placebo is None or not found or evidence.placebo in found:
+        return ()
+    apart = [pair.evidence_apart for pair in pairs if pair.effect in found and pair.other == evidence.placebo]
+    if apart and min(apart) >= settings.placebo_apart:
+        return ()
+    reached = base - evidence.placebo_held_out.variance >= settings.placebo_share * (base - own)
+    t = paired_t(evidence.placebo_held_out.white, evidence.extended_held_out.white, evidence.settings.held_out)
+    return ((evidence.placebo,),) if reached and t < settings.placebo_t else ()
+
+
+def imitating_sets(pairs: Sequence[Confounding], ids: Sequence[str], settings: VerdictSettings) -> Sets:
+    """The sets that explain as well because one of their effects can imitate wholly the one that it stands for: of
+    `pairs` those in which the recording tells nothing apart, with `ids` said, by the `settings`.
+    """
+    return tuple(
+        tuple(dict.fromkeys(pair.other if name == pair.effect else name for name in ids))
+        for pair in pairs
+        if pair.imitates >= settings.imitated and pair.evidence_apart < settings.tie and pair.other not in ids
+    )
+
+
+def confounded_pairs(evidence: Evidence, named: bool, high: Candidate | None) -> tuple[Confounding, ...]:
+    """Each effect that is said against every other of the catalogue, the most confounded pair first: of the best set
+    where it is `named`, and of what was found in `high` orders. `evidence` is that of the diagnosis.
+    """
+    pairs: list[Confounding] = []
+    if named:
+        others = [name for name in EFFECTS if name not in evidence.lacking]
+        fit = evidence.selection.best.fit
+        for index, term in enumerate(fit.terms):
+            if is_effect(term.effect):
+                pairs += confounded_with(fit, index, evidence.inflation, others)
+    if high is not None:
+        orders = ripple_orders(evidence.rows, high.fit.problem.rows, evidence.settings.high_order)
+        for index, term in enumerate(high.fit.terms):
+            if is_effect(term.effect):
+                pairs += confounded_with(high.fit, index, others=HIGH_ORDER, order_range=orders)
+    return tuple(sorted(pairs, key=lambda pair: -pair.imitates))
+
+
+def tied_pairs(pairs: Sequence[Confounding], ids: Sequence[str], ambiguous: Sets) -> tuple[Confounding, ...]:
+    """Of the `pairs` those in which an explanation that ties (`ambiguous`) differs from the one given (`ids`)."""
+    return tuple(
+        pair
+        for pair in pairs
+        if any(pair.effect not in other and pair.other in other and pair.other not in ids for other in ambiguous)
+    )
+
+
+def separating_measurement(ids: Sequence[str], ambiguous: Sets, tied: Sequence[Confounding]) -> str:
+    """The measurement that would tell the explanation given (`ids`) from those that are as good (`ambiguous`): that of
+    the most confounded pair in which they differ (`tied`).
+    """
+    if tied:
+        return tied[0].separating
+    for other in ambiguous:
+        for name in [*ids, *other]:
+            if (name in ids) != (name in other):
+                return EFFECTS[name].separating
+    return EFFECTS[ids[0]].separating

@@ -1,0 +1,205 @@
+"""The rules of the verdict, in their order: the first whose condition holds says what is said."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from hdopt.diagnosis.checks.confounding import Confounding
+from hdopt.diagnosis.verdict.facts import Facts, Findings
+from hdopt.diagnosis.verdict.named_effect import NamedEffect
+from hdopt.diagnosis.verdict.residual_structure import in_what_way, locate_remainder
+from hdopt.diagnosis.verdict.rivals import Sets, separating_measurement, tied_pairs
+from hdopt.diagnosis.verdict.where import Where
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What a rule concludes: the verdict and its sentence, with what belongs to it in the JSON."""
+
+    verdict: str
+    says: str
+    effects: tuple[NamedEffect, ...] = ()
+    ambiguous_with: Sets = ()
+    separating_test: str | None = None
+    where: Where | None = None
+    confounded: tuple[Confounding, ...] = ()
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One rule: its `name`, the `condition` on the facts, and the `consequence` that it draws from the findings."""
+
+    name: str
+    condition: Callable[[Facts], bool]
+    consequence: Callable[[Findings], Conclusion]
+
+
+def happened_once(facts: Facts) -> bool:
+    """Something that happened at one moment, and that no held-out turn can show again, is most of what is there.
+    `facts` are those of the recording.
+    """
+    return facts.turns_suffice and facts.momentary
+
+
+def no_physics_explains(facts: Facts) -> bool:
+    """Descriptions without physics carry too much of what explains, in the averaged rows or in the high orders.
+    `facts` are those of the recording.
+    """
+    share = facts.settings.remainder_share
+    return (facts.named and facts.outside_share > share) or (facts.high and facts.high_outside_share > share)
+
+
+def changes_in_time(facts: Facts) -> bool:
+    """Something changes in time as no noise does. `facts` are those of the recording."""
+    return facts.turns_suffice and facts.unsteady
+
+
+def generic_basis_wins(facts: Facts) -> bool:
+    """A basis without physics predicts unseen turns clearly better than what explains, and something else speaks for
+    structure too, or the win is large. `facts` are those of the recording.
+    """
+    other = facts.explained or facts.high or facts.significant
+    return facts.turns_suffice and facts.generic_wins and (other or facts.generic_t > facts.settings.remainder_t_alone)
+
+
+def more_than_noise_is_left(facts: Facts) -> bool:
+    """Beside what is said, held-out turns are predicted clearly worse than a basis without physics could: more is
+    there. `facts` are those of the recording.
+    """
+    much = facts.heldout_over_floor > facts.settings.heldout_over_floor
+    return facts.said and much and facts.generic_t > facts.settings.remainder_t
+
+
+def too_much_for_noise(facts: Facts) -> bool:
+    """What is left is far above what neighbouring samples and the sensors' steps show: no sensor makes such noise.
+    `facts` are those of the recording.
+    """
+    return facts.turns_suffice and facts.noise_over_neighbours > facts.settings.noise_over_neighbours
+
+
+def others_are_as_good(facts: Facts) -> bool:
+    """Effects are named, and another set explains as well. `facts` are those of the recording."""
+    return facts.said and bool(facts.rivals)
+
+
+def unknown(findings: Findings) -> Conclusion:
+    """Something is there that the catalogue does not hold, and this is where. `findings` hold the facts and the
+    evidence behind them.
+    """
+    where = locate_remainder(findings.evidence)
+    return Conclusion(
+        "unknown",
+        f"Something the catalogue does not hold is there: {where['rms_arcmin']:.2g} arcmin rms, "
+        f"mostly in {where['domain']}{in_what_way(where)}.",
+        separating_test="record again at another speed, torque and temperature, one at a time, and see which of them "
+        "moves it",
+        where=where,
+    )
+
+
+def no_noise(findings: Findings) -> Conclusion:
+    """What is left is more than the sensors' noise, whatever it is. `findings` hold the facts and the evidence behind
+    them.
+    """
+    evidence = findings.evidence
+    sensors = max(evidence.neighbours_arcmin, evidence.sensor_arcmin)
+    rms = math.sqrt(max(evidence.extended_held_out.variance - sensors**2, 0.0))
+    where = locate_remainder(evidence) | {"rms_arcmin": rms, "share_of_residual": 1.0}
+    says = (
+        f"What is left, {evidence.extended_held_out.rms:.2g} arcmin rms, is {findings.facts.noise_over_neighbours:.2g} "
+        "times what neighbouring samples and the sensors' steps show: no sensor makes such noise, and the catalogue "
+        "does not explain it."
+    )
+    test = "record the same motion again: what repeats is the drive's, what does not is the bench's"
+    return Conclusion("unknown", says, separating_test=test, where=where)
+
+
+def named_and_more(findings: Findings) -> Conclusion:
+    """What is named is there, and more that the catalogue does not hold. `findings` hold the facts and the evidence
+    behind them.
+    """
+    where = locate_remainder(findings.evidence)
+    says = " ".join(found.says for found in findings.effects)
+    says += (
+        f" More is there that this does not explain: {where['rms_arcmin']:.2g} arcmin rms, mostly in {where['domain']}."
+    )
+    test = "take what is named away, or record without it, and see what stays"
+    return Conclusion("unknown", says, findings.effects, separating_test=test, where=where)
+
+
+def ambiguous(findings: Findings) -> Conclusion:
+    """The best explanation, those that are as good, and the measurement that would part them. `findings` hold the
+    facts and the evidence behind them.
+    """
+    effects, others = findings.effects, findings.facts.rivals
+    pairs = findings.pairs
+    ids = [found.id for found in effects]
+    tied = tied_pairs(pairs, ids, others)
+    listed = "; ".join(" and ".join(names) for names in others)
+    says = " ".join(found.says for found in effects) + f" This recording cannot tell it from: {listed}."
+    says += "".join(f" {p.other} could imitate {100 * p.imitates:.3g} % of {p.effect}." for p in tied)
+    return Conclusion(
+        "ambiguous",
+        says,
+        effects,
+        others,
+        separating_measurement(ids, others, tied),
+        confounded=confusable(pairs, tied, findings),
+    )
+
+
+def named(findings: Findings) -> Conclusion:
+    """The effects found, and what could imitate them. `findings` hold the facts and the evidence behind them."""
+    pairs = findings.pairs
+    says = " ".join(found.says for found in findings.effects)
+    return Conclusion("named", says, findings.effects, confounded=confusable(pairs, (), findings))
+
+
+def confusable(
+    pairs: tuple[Confounding, ...], tied: tuple[Confounding, ...], findings: Findings
+) -> tuple[Confounding, ...]:
+    """Of the `pairs` those worth listing: the `tied` ones, and those in which most could be imitated. `findings`
+    hold the facts and the evidence behind them.
+    """
+    least = findings.facts.settings.confounded
+    return tuple(pair for pair in pairs if pair in tied or pair.imitates >= least)
+
+
+def insufficient(findings: Findings) -> Conclusion:
+    """The record says nothing. `findings` hold the facts and the evidence behind them."""
+    return Conclusion(
+        "insufficient",
+        "The recording is too short or too noisy to say even that the model is adequate.",
+        separating_test="record at least ten input turns, better one whole output turn in both directions",
+    )
+
+
+def adequate(findings: Findings) -> Conclusion:
+    """The base explains the record. `findings` hold the facts and the evidence behind them."""
+    if findings.evidence.selection.base.problem.base is None:
+        return Conclusion("adequate", "Nothing shows above the noise.")
+    return Conclusion(
+        "adequate", "The kinematic-error model explains the recording; nothing else shows above the noise."
+    )
+
+
+RULES = (
+    Rule("happened once", happened_once, unknown),
+    Rule("no physics explains", no_physics_explains, unknown),
+    Rule("changes in time", changes_in_time, unknown),
+    Rule("generic basis wins", generic_basis_wins, unknown),
+    Rule("too much for noise", too_much_for_noise, no_noise),
+    Rule("more than noise is left", more_than_noise_is_left, named_and_more),
+    Rule("others are as good", others_are_as_good, ambiguous),
+    Rule("named", lambda facts: facts.said, named),
+    Rule("too little", lambda facts: facts.too_little, insufficient),
+    Rule("adequate", lambda facts: True, adequate),
+)
+"""The rules in the order in which they are asked; the last always holds."""
+
+
+def rule_for(facts: Facts) -> Rule:
+    """The first of the rules whose condition holds for `facts`."""
+    return next(rule for rule in RULES if rule.condition(facts))
