@@ -1,0 +1,298 @@
+"""One blind case: what is asked for, the recordings that go out, and the key that stays behind."""
+
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+
+import numpy as np
+import pandas as pd
+
+from hdopt.bench.evidence import Witness
+from hdopt.bench.geometry import ARCMIN, draw_errors
+from hdopt.bench.hidden_drive import BearingPass, Lobing, LocalDefect, LongWave, ToothMesh
+from hdopt.bench.hidden_load import Hysteresis, LostMotion, Resonance, ThermalDrift, Windup
+from hdopt.bench.hidden_outside import Outside
+from hdopt.bench.hidden_sensors import ChannelDelay, Coupling, Eccentricity, Interpolation
+from hdopt.bench.instrument import draw_instrument, record
+from hdopt.bench.motion import draw_plans, draw_ripple, run
+from hdopt.bench.readings import READINGS, as_read, through
+from hdopt.bench.signal_chain import hidden_wave, joint_rms, read_angles, read_error, set_up
+
+CATALOGUE = {
+    "cs_tooth_harmonics": partial(LongWave.draw, on="cs"),
+    "fs_tooth_harmonics": partial(LongWave.draw, on="fs"),
+    "tooth_mesh": ToothMesh.draw,
+    "torsional_windup": Windup.draw,
+    "hysteresis": Hysteresis.draw,
+    "lost_motion": LostMotion.draw,
+    "encoder_input_eccentricity": partial(Eccentricity.draw, on="input"),
+    "encoder_output_eccentricity": partial(Eccentricity.draw, on="output"),
+    "encoder_interpolation": Interpolation.draw,
+    "output_coupling": Coupling.draw,
+    "bearing_pass": BearingPass.draw,
+    "circular_spline_lobing": Lobing.draw,
+    "thermal_drift": ThermalDrift.draw,
+    "resonance": Resonance.draw,
+    "local_tooth_defect": LocalDefect.draw,
+    "channel_delay": ChannelDelay.draw,
+}
+
+TROUBLES = ("gaps", "coloured", "ripple", "short", "one way", "coarse", "clock")
+
+# One of each pair is a special case of the other, as far as any recording goes.
+ONE_IN_THE_OTHER = (
+    {"circular_spline_lobing", "cs_tooth_harmonics"},
+    {"encoder_output_eccentricity", "output_coupling"},
+)
+
+# From this severity on, a case whose own records cannot show the physics is drawn anew: it would test nothing.
+MUST_SHOW = 0.25
+# From this severity on, conditions under which the physics could also be another are drawn anew, as a test engineer
+# would choose them; after some draws the confusion is taken as the physics' own.
+SHOULD_SEPARATE, SEPARATION_DRAWS = 0.5, 5
+ATTEMPTS = 14
+
+
+@dataclass(frozen=True)
+class Spec:
+    """What a case is to be. `effects` are catalogue ids; `outside` a kind of physics beyond it."""
+
+    family: str  # "nothing", "single", "pair", "decoy", "unknown"
+    seed: int
+    effects: tuple[str, ...] = ()
+    severity: float = 0.0  # hidden rms of each effect, in units of the base's rms
+    outside: str = ""
+    trouble: str = ""
+    size: str = ""  # of the record, as in `draw_plans`; by the family where empty
+    reading: str = ""  # of `readings`: how the bench counts and samples
+    whole_motion: bool = False  # a resonance swings with all of its foot's motion, not with the error alone
+
+
+@dataclass(frozen=True)
+class Key:
+    """The truth of one case. Waves and noise in arcmin rms, means of each recording removed."""
+
+    id: str
+    family: str
+    seed: int
+    effects: tuple[str, ...]
+    variants: tuple[str, ...]
+    outside: str
+    trouble: str
+    reading: str
+    severity: float
+    base_rms_arcmin: float
+    hidden_rms_arcmin: float  # of all hidden physics together
+    part_rms_arcmin: dict
+    noise_rms_arcmin: float
+    unexplained_rms_arcmin: float  # of the hidden wave, after the base alone was refitted
+    detectable: bool
+    separable: bool
+    rivals: tuple[str, ...]
+    parameters: dict  # id -> name -> {value, unit, identifiable}
+    conditions: dict
+
+    def to_dict(self):
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Case:
+    """What goes out: the tables, and nothing that hints at what is in them."""
+
+    id: str
+    recordings: tuple[pd.DataFrame, ...]
+
+
+def generate(spec, name="case"):
+    """Case and key of `spec`; the same seed gives the same numbers."""
+    for effect in spec.effects:
+        if effect not in CATALOGUE:
+            raise ValueError(f"unknown effect {effect!r}; the bench knows {', '.join(CATALOGUE)}")
+    if spec.reading not in READINGS:
+        raise ValueError(f"unknown reading {spec.reading!r}; the bench knows {', '.join(filter(None, READINGS))}")
+    rng = _generator(spec)
+    for attempt in range(ATTEMPTS):
+        case, key = _attempt(spec, name, rng)
+        if case is not None and _fair(spec, key, attempt):
+            return case, key
+    raise RuntimeError(f"no fair case in {ATTEMPTS} draws for {spec}")
+
+
+def _generator(spec):
+    return np.random.default_rng([spec.seed, len(spec.effects), int(1000 * spec.severity)])
+
+
+def simulate(spec):
+    """The first draw of `spec`, without a key: a `Simulated`, or None where the physics cannot be so large in it."""
+    return _simulate(spec, _generator(spec))
+
+
+def _fair(spec, key, attempt):
+    if spec.family == "unknown":
+        return key.detectable and not key.rivals
+    if spec.family in ("single", "pair") and spec.severity >= MUST_SHOW:
+        own = {name for pair in ONE_IN_THE_OTHER if pair & set(key.effects) for name in pair}
+        confused = spec.severity >= SHOULD_SEPARATE and not set(key.rivals) <= own
+        return key.detectable and not (confused and attempt < SEPARATION_DRAWS)
+    return True
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """One draw of a case: its drive and motion, what is hidden in it and how large, and what the instrument wrote."""
+
+    plans: tuple
+    setups: list
+    hidden: list
+    waves: list  # of each hidden physics alone, one array a recording
+    instrument: object
+    tables: tuple[pd.DataFrame, ...]
+    noise_rms: float
+    base_rms: float
+    torque_gain: float
+
+    def parameters(self):
+        """True parameters of the catalogue's physics in it: id -> name -> {value, unit, identifiable}."""
+        top = self.torque_gain * max(float(np.abs(s.run.torque).max()) for s in self.setups)
+        return {physics.id: _parameters(physics, top) for physics in self.hidden if physics.id}
+
+
+def _simulate(spec, rng):
+    errors = draw_errors(rng)
+    hidden = [CATALOGUE[effect](rng) for effect in spec.effects]
+    if spec.outside:
+        hidden.append(Outside.draw(rng, spec.outside))
+    plans = _plans(spec, hidden, rng)
+    hidden = [physics.for_plans(plans) for physics in hidden]
+    if spec.whole_motion:
+        hidden = [replace(h, whole_motion=True) if h.id == "resonance" else h for h in hidden]
+    instrument = through(spec.reading, draw_instrument(rng, len(plans), frozenset([spec.trouble])))
+    setups = [set_up(errors, run(plan, instrument.jitter, rng)) for plan in plans]
+    base_rms = joint_rms([read_error(s) for s in setups])
+    deaf = {"reversal", "speeds"} if spec.trouble == "one way" else set()
+    target = spec.severity * base_rms
+    sized = [
+        (_as_if_reversed if physics.needs & deaf and hasattr(physics, "scale_for") else scaled_to)(
+            physics, setups, target
+        )
+        for physics in (hidden if target else [])
+    ]
+    if None in sized:
+        return None
+    hidden, waves = [physics for physics, _ in sized], [waves for _, waves in sized]
+    gain = float(np.prod([physics.torque_gain for physics in hidden]))
+    tables, noises = zip(
+        *[
+            record(instrument, rank, plan, s.run, read_angles(s, hidden), gain * s.run.torque, rng)
+            for rank, (plan, s) in enumerate(zip(plans, setups, strict=True))
+        ],
+        strict=True,
+    )
+    tables = tuple(as_read(spec.reading, table, rng) for table in tables)
+    return Simulated(plans, setups, hidden, waves, instrument, tables, joint_rms(noises), base_rms, gain)
+
+
+def _attempt(spec, name, rng):
+    drawn = _simulate(spec, rng)
+    if drawn is None:
+        return None, None
+    hidden, setups, waves = drawn.hidden, drawn.setups, drawn.waves
+    together = [hidden_wave(s, hidden) for s in setups] if len(hidden) != 1 else waves[0]
+    finding = _weigh(drawn, together, rng)
+    key = Key(
+        id=name,
+        family=spec.family,
+        seed=spec.seed,
+        effects=tuple(sorted(spec.effects)),
+        variants=tuple(physics.variant for physics in hidden),
+        outside=spec.outside,
+        trouble=spec.trouble,
+        reading=spec.reading,
+        severity=spec.severity,
+        base_rms_arcmin=drawn.base_rms / ARCMIN,
+        hidden_rms_arcmin=joint_rms(together) / ARCMIN,
+        part_rms_arcmin={h.id or h.variant: joint_rms(w) / ARCMIN for h, w in zip(hidden, waves, strict=True)},
+        noise_rms_arcmin=drawn.noise_rms / ARCMIN,
+        parameters=drawn.parameters(),
+        conditions=_conditions(drawn.plans, setups),
+        **finding,
+    )
+    return Case(name, drawn.tables), key
+
+
+def _plans(spec, hidden, rng):
+    needs = frozenset().union(*[physics.needs for physics in hidden])
+    size = spec.size or ("small" if spec.family == "nothing" else "full")
+    if spec.trouble == "one way":
+        needs = needs - {"reversal", "speeds"} | {"one way"}
+    if spec.trouble == "short":
+        size = "short"
+    plans = draw_plans(rng, needs, size)
+    if spec.trouble == "ripple":
+        plans = tuple(replace(p, ripple=draw_ripple(rng, rng.uniform(0.05, 0.2))) for p in plans)
+    return plans
+
+
+def scaled_to(physics, setups, target):
+    """`physics` scaled to an rms of `target` (rad), and its waves; None where it cannot be so large."""
+    scale = physics.scale
+    for _ in range(25):
+        physics = physics.scaled(scale)
+        waves = [hidden_wave(s, [physics]) for s in setups]
+        rms = joint_rms(waves)
+        if abs(rms / target - 1) < 0.005:
+            break
+        # In proportion at first; by half steps close by, where the zone switch spoils the proportion.
+        step = np.clip(target / rms, 0.01, 100) if rms else 10.0
+        step = step if abs(np.log(step)) > 0.1 else np.sqrt(step)
+        scale = float(np.clip(scale * step, *physics.scale_range))
+    return (physics, waves) if abs(rms / target - 1) < 0.02 else None
+
+
+def _as_if_reversed(physics, setups, target):
+    """Physics in a test without the reversal that it needs: as large as would give `target` with one."""
+    physics = physics.scaled(physics.scale_for(target, max(np.abs(s.run.speed).max() for s in setups)))
+    return physics, [hidden_wave(s, [physics]) for s in setups]
+
+
+def _weigh(drawn, together, rng):
+    hidden = drawn.hidden
+    if not hidden:
+        return {"unexplained_rms_arcmin": 0.0, "detectable": False, "separable": False, "rivals": ()}
+    witness = Witness(drawn.setups, drawn.plans, rng)
+
+    def sampled(parts):
+        return np.concatenate([part[pick] for part, pick in zip(parts, witness.pick, strict=True)])
+
+    share = drawn.instrument.effective(1.0)
+    parts = [sampled(wave) for wave in drawn.waves]
+    detectable, rivals = True, set()
+    for rank, physics in enumerate(hidden):
+        # A second physics is free to take up what it can of the first, so all its columns stand beside its wave.
+        others = [other for other in range(len(hidden)) if other != rank]
+        beside = [parts[other][:, None] for other in others] + [witness.family(hidden[other].id) for other in others]
+        evidence = witness.weigh(parts[rank], physics.id, drawn.noise_rms, share, beside)
+        detectable &= evidence.detectable
+        rivals |= set(evidence.rivals)
+    return {
+        "unexplained_rms_arcmin": witness.refit(sampled(together)) / ARCMIN,
+        "detectable": bool(detectable),
+        "separable": not rivals,
+        "rivals": tuple(sorted(rivals)),
+    }
+
+
+def _parameters(physics, top_torque):
+    found = physics.truth_under(top_torque) if physics.id == "torsional_windup" else physics.truth()
+    return {name: asdict(parameter) for name, parameter in found.items()}
+
+
+def _conditions(plans, setups):
+    return {
+        "recordings": len(plans),
+        "samples": int(sum(s.run.time.size for s in setups)),
+        "legs": [list(plan.legs) for plan in plans],
+        "samples_per_turn": plans[0].samples_per_turn,
+        "torque": plans[0].torque.shape if plans[0].torque else "",
+        "temperature": plans[0].log_temperature,
+    }

@@ -1,0 +1,174 @@
+"""The csf-25-80 drive of the bench, from exact rotated contours and per-tooth arrays (Jia 2021, Eqs. (16)-(32)).
+
+Angles are in rad and count clockwise from +y, lengths in mm. The two rim curves of the wave generator are moved by the
+full rotation matrices; on a rim the squared radius is a trigonometric polynomial of the contour parameter, whose
+maximum Newton's method finds to rounding. Tooth deviations are arrays, one value a tooth, interpolated in between.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+FS_TEETH, CS_TEETH = 160, 162
+RATIO = FS_TEETH / (CS_TEETH - FS_TEETH)
+MODULE_MM = 0.396
+PRESSURE_ANGLE = np.deg2rad(12.0)
+SEMI_MAJOR_MM, SEMI_MINOR_MM, WIDTH_MM = 31.046, 30.318, 9.0
+PITCH_LENGTH_MM = np.pi * MODULE_MM * FS_TEETH
+RAD_PER_MM = 2 * np.pi / PITCH_LENGTH_MM
+ARCMIN = np.pi / 10800
+
+
+@dataclass(frozen=True)
+class BaseErrors:
+    """The twelve errors of one drive; eccentricities and tooth deviations as two components each (mm, rad)."""
+
+    axis_x_mm: float
+    axis_y_mm: float
+    axis_tilt_y: float
+    axis_tilt_x: float
+    wg_x_mm: float
+    wg_y_mm: float
+    wg_tilt_major: float
+    wg_tilt_minor: float
+    cs_sin_mm: float
+    cs_cos_mm: float
+    fs_sin_mm: float
+    fs_cos_mm: float
+
+    def vector(self):
+        return np.array([getattr(self, field.name) for field in fields(self)])
+
+    @classmethod
+    def from_polar(cls, axis, axis_tilts, wg, wg_tilts, cs, fs):
+        """From (magnitude, direction) pairs and pairs of tilts; a deviation is a sin(angle + phase)."""
+        return cls(
+            axis[0] * np.sin(axis[1]),
+            axis[0] * np.cos(axis[1]),
+            *axis_tilts,
+            wg[0] * np.sin(wg[1]),
+            wg[0] * np.cos(wg[1]),
+            *wg_tilts,
+            cs[0] * np.cos(cs[1]),
+            cs[0] * np.sin(cs[1]),
+            fs[0] * np.cos(fs[1]),
+            fs[0] * np.sin(fs[1]),
+        )
+
+
+# One-sided steps for numerical derivatives: a few per mille of each error's tolerance.
+ERROR_STEPS = np.array([2e-5, 2e-5, 5e-6, 5e-6, 1e-5, 1e-5, 3e-6, 3e-6, 4e-6, 4e-6, 4e-6, 4e-6])
+# The sizes of the errors: the bounds of the shipped tolerances.
+ERROR_BOUNDS = np.array([0.015, 0.015, *np.deg2rad([0.2, 0.2]), 0.0075, 0.0075, *np.deg2rad([0.1, 0.1]), *[0.003] * 4])
+
+
+def _below(draw, upper):
+    value = draw()
+    while abs(value) > upper:
+        value = draw()
+    return value
+
+
+def draw_errors(rng):
+    """Errors of one drive from the tolerances that ship with csf-25-80."""
+    turn = 2 * np.pi
+    tilt = np.deg2rad([0.2, 0.1])
+    return BaseErrors.from_polar(
+        (_below(lambda: rng.rayleigh(0.005), 0.015), rng.uniform(0, turn)),
+        [_below(lambda: rng.normal(0, tilt[0] / 3), tilt[0]) for _ in range(2)],
+        (_below(lambda: rng.rayleigh(0.0025), 0.0075), rng.uniform(0, turn)),
+        [_below(lambda: rng.normal(0, tilt[1] / 3), tilt[1]) for _ in range(2)],
+        (rng.uniform(0.001, 0.003), rng.uniform(0, turn)),
+        (rng.uniform(0.001, 0.003), rng.uniform(0, turn)),
+    )
+
+
+def _tilt_frame(t2, t3):
+    z = np.array([np.tan(t3), np.tan(t2), 1.0])
+    z /= np.linalg.norm(z)
+    y = np.array([0.0, np.cos(t2), -np.sin(t2)])
+    return np.column_stack([np.cross(y, z), y, z])
+
+
+@dataclass(frozen=True)
+class Zones:
+    """Meshing zones 1 and 2 (first axis) at every wave-generator angle (second axis).
+
+    `depth_mm` is the extra meshing depth |H| - L_W, `cs_angle` the deepest point's angle in the ground, `fs_angle` its
+    angle on the flexspline, which has turned back by theta/N.
+    """
+
+    depth_mm: np.ndarray
+    cs_angle: np.ndarray
+    fs_angle: np.ndarray
+
+
+def find_zones(errors, theta):
+    """Deepest point of each zone, over both rims, at wave-generator angles `theta` (rad, unwrapped)."""
+    theta = np.asarray(theta, dtype=float)
+    sin, cos = np.sin(theta), np.cos(theta)
+    axis_frame = _tilt_frame(errors.axis_tilt_y, errors.axis_tilt_x)
+    wg_frame = _tilt_frame(errors.wg_tilt_major, errors.wg_tilt_minor)
+
+    def to_ground(vector):
+        turned = np.stack([cos * vector[0] + sin * vector[1], cos * vector[1] - sin * vector[0]])
+        return axis_frame[:2, :2] @ turned + axis_frame[:2, 2:] * vector[2]
+
+    minor = to_ground(SEMI_MINOR_MM * wg_frame[:, 0])
+    major = to_ground(SEMI_MAJOR_MM * wg_frame[:, 1])
+    centre = to_ground(np.array([errors.wg_x_mm, errors.wg_y_mm, 0.0]))
+    centre += np.array([[errors.axis_x_mm], [errors.axis_y_mm]])
+    half = to_ground(0.5 * WIDTH_MM * wg_frame[:, 2])
+
+    depth, cs_angle, fs_angle = (np.full((2, theta.size), -np.inf) for _ in range(3))
+    for zone, sign in enumerate((1.0, -1.0)):
+        for rim in (1.0, -1.0):
+            rim_centre = centre + rim * half
+            u = np.zeros(theta.size)
+            for _ in range(5):  # quadratic from a start within 0.1 rad: rounding after four steps
+                s, c = np.sin(u), np.cos(u)
+                point = rim_centre + sign * (s * minor + c * major)
+                slope = sign * (c * minor - s * major)
+                bend = rim_centre - point
+                step = (point * slope).sum(0) / ((slope * slope).sum(0) + (point * bend).sum(0))
+                u -= step
+            point = rim_centre + sign * (np.sin(u) * minor + np.cos(u) * major)
+            here = np.hypot(point[0], point[1]) - SEMI_MAJOR_MM
+            deeper = here > depth[zone]
+            arm = point - rim_centre
+            depth[zone] = np.where(deeper, here, depth[zone])
+            cs_angle[zone] = np.where(deeper, np.arctan2(point[0], point[1]), cs_angle[zone])
+            fs_angle[zone] = np.where(deeper, np.arctan2(arm[0], arm[1]) + theta / RATIO, fs_angle[zone])
+    return Zones(depth, cs_angle, fs_angle)
+
+
+def base_teeth(errors):
+    """Per-tooth tangential deviations (mm) of circular spline and flexspline: one sine over each circumference."""
+    cs = 2 * np.pi * np.arange(CS_TEETH) / CS_TEETH
+    fs = 2 * np.pi * np.arange(FS_TEETH) / FS_TEETH
+    return (
+        errors.cs_sin_mm * np.sin(cs) + errors.cs_cos_mm * np.cos(cs),
+        errors.fs_sin_mm * np.sin(fs) + errors.fs_cos_mm * np.cos(fs),
+    )
+
+
+def at_angle(teeth_mm, angle):
+    """Deviation at `angle` (rad), interpolated between the teeth around it."""
+    place = np.asarray(angle) * (teeth_mm.size / (2 * np.pi))
+    below = np.floor(place)
+    part = place - below
+    index = below.astype(np.int64) % teeth_mm.size
+    closed = np.append(teeth_mm, teeth_mm[0])
+    return closed[index] * (1 - part) + closed[index + 1] * part
+
+
+def zone_deviation_mm(zones, cs_teeth_mm, fs_teeth_mm, extra_depth_mm=0.0):
+    """Tangential deviation tau (mm) of both zones."""
+    depth = (zones.depth_mm + extra_depth_mm) * np.tan(PRESSURE_ANGLE)
+    return depth + at_angle(cs_teeth_mm, zones.cs_angle) + at_angle(fs_teeth_mm, zones.fs_angle)
+
+
+def kinematic_error(errors, theta):
+    """Kinematic error (rad at the output, k_e = 1) of the base drive: the zone that deviates more drives."""
+    zones = find_zones(errors, theta)
+    return RAD_PER_MM * zone_deviation_mm(zones, *base_teeth(errors)).max(axis=0)

@@ -1,0 +1,136 @@
+"""Physics that no entry of the catalogue describes. A diagnosis has to say that it does not know it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from hdopt.bench.geometry import ARCMIN, RATIO
+from hdopt.bench.motion import TURN
+from hdopt.bench.signal_chain import Hidden
+
+# Orders that no bearing of a plausible size (ball/pitch 0.05-0.2), no encoder and no tooth has.
+FOREIGN_ORDERS = ((0.17, 0.35), (0.66, 0.94), (1.28, 1.9), (2.08, 2.92), (3.08, 3.92), (5.1, 5.9))
+
+
+def foreign_order(rng):
+    low, high = FOREIGN_ORDERS[rng.integers(len(FOREIGN_ORDERS))]
+    order = rng.uniform(low, high)
+    while abs(order * RATIO - round(order * RATIO)) < 0.35:  # not a multiple of the output's turn either
+        order = rng.uniform(low, high)
+    return order
+
+
+@dataclass(frozen=True)
+class Outside(Hidden):
+    """A wave (arcmin per unit of scale) of one of the kinds below.
+
+    What belongs to the machine (an order, a frequency) is the same in every recording, what is chance differs.
+    """
+
+    variant: str
+    seed: int
+    turn_hz: float = 1.0
+    scale: float = 0.1
+    id = ""
+
+    @classmethod
+    def draw(cls, rng, kind=None):
+        return cls(kind or str(rng.choice(list(KINDS))), int(rng.integers(2**31)))
+
+    def for_plans(self, plans):
+        return replace(self, turn_hz=max(rpm for plan in plans for _, rpm in plan.legs) / 60)
+
+    def lag(self, run, ke):
+        machine = np.random.default_rng(self.seed)
+        chance = np.random.default_rng([self.seed, run.time.size])
+        return self.scale * ARCMIN * KINDS[self.variant](run, self.turn_hz, machine, chance)
+
+
+def _samples_per_turn(run):
+    return TURN / np.abs(run.speed).max() / run.step
+
+
+def belt_order(run, turn_hz, machine, chance):
+    """A belt stage ahead of the input: its tooth-count ratio gives an order locked to nothing in the drive."""
+    order, harmonics = foreign_order(machine), machine.integers(1, 4)
+    return sum(np.cos(k * order * run.theta + machine.uniform(0, TURN)) / k**1.5 for k in range(1, harmonics + 1))
+
+
+def auxiliary_gear(run, turn_hz, machine, chance):
+    """A gear pair between output and its encoder: run-out of the second gear, and its pitch cut in two settings."""
+    shaft = foreign_order(machine) * run.theta
+    return np.cos(shaft + machine.uniform(0, TURN)) + np.abs(np.sin(shaft / 2 + machine.uniform(0, TURN)))
+
+
+def hub_slip(run, turn_hz, machine, chance):
+    """A coupling hub that slips: jumps at random instants, to either side, each taking a few samples."""
+    jumps = chance.integers(6, 15)
+    at = chance.uniform(0, run.time[-1], jumps)
+    width = run.time[-1] * 1e-3
+    wave = 0.0
+    for t, size in zip(at, chance.standard_normal(jumps), strict=True):
+        wave = wave + size * (0.5 + 0.5 * np.tanh((run.time - t) / width))
+    return wave
+
+
+def one_off_bump(run, turn_hz, machine, chance):
+    """A chip drawn through once: one bump, gone after a turn or two."""
+    at = chance.uniform(0.2, 0.8) * run.time.size
+    place = (np.arange(run.time.size) - at) / (chance.uniform(0.5, 1.5) * _samples_per_turn(run))
+    return np.exp(-0.5 * place**2) * np.cos(2.5 * place)
+
+
+def modulated_order(run, turn_hz, machine, chance):
+    """A motor's cogging behind a slipping clutch: an order whose amplitude and phase wander."""
+    order = foreign_order(machine) * run.theta
+    wander = gaussian_filter1d(chance.standard_normal((2, run.time.size)), 3 * _samples_per_turn(run), axis=1)
+    wander /= wander.std(axis=1, keepdims=True)
+    return wander[0] * np.cos(order) + wander[1] * np.sin(order)
+
+
+def mains(run, turn_hz, machine, chance):
+    """Mains pick-up: 50 Hz and its third harmonic in time, folded where the sampling is slower."""
+    frequency = 50 * (1 + 1e-4 * machine.standard_normal())
+    third = machine.uniform(0, 0.6)
+    phase = chance.uniform(0, TURN, 2)
+    return np.cos(TURN * frequency * run.time + phase[0]) + third * np.cos(3 * TURN * frequency * run.time + phase[1])
+
+
+def floor_vibration(run, turn_hz, machine, chance):
+    """A narrow band of the building's vibration, fixed in Hz, random in amplitude."""
+    # Away from the harmonics of the highest input speed, where the drive has its own orders.
+    centre = (machine.integers(1, 6) + machine.uniform(0.35, 0.65)) * turn_hz
+    hz = np.fft.rfftfreq(run.time.size, run.step)
+    spectrum = np.fft.rfft(chance.standard_normal(run.time.size))
+    wave = np.fft.irfft(spectrum * np.exp(-0.5 * ((hz - centre) / (0.06 * centre)) ** 2), run.time.size)
+    return wave / wave.std()
+
+
+def slow_wave(run, turn_hz, machine, chance):
+    """The room's air conditioning on the bench: slow cycles in time with nothing logged that would show them."""
+    part = run.time / run.time[-1]
+    cycles = chance.uniform(1.6, 4.5)
+    return np.sin(TURN * (cycles * part + chance.uniform(-0.3, 0.3) * part**2) + chance.uniform(0, TURN))
+
+
+def stick_slip(run, turn_hz, machine, chance):
+    """Relaxation oscillation of a dry seal: saw teeth of irregular length along the path of the input."""
+    path = np.concatenate([[0], np.cumsum(np.abs(np.diff(run.theta)))]) / TURN
+    edges = np.concatenate([[0], np.cumsum(chance.uniform(0.15, 1.6, int(path[-1] * 4) + 20))])
+    rank = np.searchsorted(edges, path, side="right") - 1
+    size = chance.uniform(0.5, 1.5, edges.size)[rank]
+    return size * ((path - edges[rank]) / (edges[rank + 1] - edges[rank]) - 0.5)
+
+
+KINDS = {
+    "belt order": belt_order,
+    "auxiliary gear": auxiliary_gear,
+    "hub slip": hub_slip,
+    "one-off bump": one_off_bump,
+    "modulated order": modulated_order,
+    "mains": mains,
+    "floor vibration": floor_vibration,
+    "slow wave": slow_wave,
+    "stick-slip": stick_slip,
+}

@@ -1,0 +1,65 @@
+"""Path-dependent elements, stepped along the samples."""
+
+import numba
+import numpy as np
+
+
+@numba.njit(cache=True)
+def play(position, gap):
+    """Follower of a play (backlash) operator whose full width `gap` may change from sample to sample."""
+    follower = np.empty_like(position)
+    y = position[0] - 0.5 * gap[0] * np.sign(position[min(20, position.size - 1)] - position[0])
+    for i in range(position.size):
+        y = min(max(y, position[i] - 0.5 * gap[i]), position[i] + 0.5 * gap[i])
+        follower[i] = y
+    return follower
+
+
+@numba.njit(cache=True)
+def maxwell_slip(position, slip, weight):
+    """Force of Jenkins elements in parallel: element k slips at a deflection of slip[k] with force weight[k]."""
+    force = np.empty_like(position)
+    deflection = np.zeros(slip.size)
+    last = position[0]
+    for i in range(position.size):
+        move = position[i] - last
+        last = position[i]
+        total = 0.0
+        for k in range(slip.size):
+            deflection[k] = min(max(deflection[k] + move, -slip[k]), slip[k])
+            total += weight[k] * deflection[k] / slip[k]
+        force[i] = total
+    return force
+
+
+@numba.njit(cache=True)
+def bouc_wen(position, length, exponent, beta):
+    """Bouc-Wen force, +-1 when it slips; each sample's move in short steps, so that it depends on the path alone."""
+    force = np.empty_like(position)
+    z = 0.0
+    last = position[0]
+    for i in range(position.size):
+        move = (position[i] - last) / length
+        last = position[i]
+        steps = int(abs(move) / 0.05) + 1
+        for _ in range(steps):
+            d = move / steps
+            along = 1.0 if d * z > 0 else -1.0
+            rate = 1 - abs(z) ** exponent * (1 - beta + beta * along)
+            middle = z + 0.5 * d * rate
+            along = 1.0 if d * middle > 0 else -1.0
+            z += d * (1 - abs(middle) ** exponent * (1 - beta + beta * along))
+        force[i] = z
+    return force
+
+
+@numba.njit(cache=True)
+def first_order_noise(white, keep):
+    """AR(1) noise of unit variance from white noise of unit variance."""
+    coloured = np.empty_like(white)
+    x = white[0]
+    drive = np.sqrt(1 - keep * keep)
+    for i in range(white.size):
+        x = keep * x + drive * white[i]
+        coloured[i] = x
+    return coloured

@@ -1,0 +1,34 @@
+"""A whole proof within one process, for a small run in continuous integration or while a diagnosis is being built."""
+
+from hdopt.bench.cases import generate
+from hdopt.bench.score import score
+from hdopt.bench.suite import plan
+
+
+def prove(diagnose, seed, spread=map, **sizes):
+    """Scores of `diagnose`, a function from a case's recordings (tuple of tables) to an answer by the contract.
+
+    `sizes` are those of `suite.plan`: families, nothing, repeats, pairs, share. The keys stay in here until every
+    answer is given; an answer that raises counts as none, and its message is what `Scores.invalid` shows. `spread` is
+    a map that may do the cases elsewhere, results in order.
+    """
+    answers, keys, raised = {}, [], {}
+
+    def cases():
+        for number, spec in enumerate(plan(seed, **sizes), start=1):
+            case, key = generate(spec, f"case-{number:04d}")
+            keys.append(key.to_dict())
+            yield case
+
+    def answered(case):
+        try:
+            return case.id, diagnose(case.recordings), None
+        except Exception as error:
+            return case.id, None, f"{type(error).__name__}: {error}"
+
+    for name, answer, failure in spread(answered, cases()):
+        if failure is None:
+            answers[name] = answer
+        else:
+            raised[name] = failure
+    return score(answers, keys, raised)

@@ -1,0 +1,120 @@
+"""The bench: motor, drive, encoders, and the stages at which concealed physics acts on the signal chain."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hdopt.bench.geometry import (
+    RAD_PER_MM,
+    RATIO,
+    BaseErrors,
+    Zones,
+    base_teeth,
+    find_zones,
+    zone_deviation_mm,
+)
+from hdopt.bench.motion import Run
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of concealed physics as the key states it. `identifiable` says whether the records can carry it."""
+
+    value: float
+    unit: str
+    identifiable: bool = True
+
+
+class Hidden:
+    """Concealed physics: does nothing at any stage until a subclass says otherwise."""
+
+    id: str  # of the catalogue; empty outside it
+    variant: str
+    needs = frozenset()
+    torque_gain = 1.0
+    scale_range = (1e-4, 1e4)
+
+    def for_plans(self, plans):
+        """The same physics, with what depends on the test's conditions set."""
+        return self
+
+    def scaled(self, scale):
+        """The same physics, `scale` times as large as it was drawn."""
+        return replace(self, scale=scale)
+
+    def teeth(self, cs_mm, fs_mm):
+        """Per-tooth deviations (mm) with this physics in them."""
+        return cs_mm, fs_mm
+
+    def depth_mm(self, run, zones):
+        """Extra meshing depth (mm) of both zones."""
+        return 0.0
+
+    def lag(self, run, ke):
+        """Extra lag (rad) of the output behind input/N - `ke`."""
+        return 0.0
+
+    def read_input(self, angle, run):
+        return angle
+
+    def read_output(self, angle, run):
+        return angle
+
+    def clock(self, time, input_angle, output_angle):
+        return input_angle, output_angle
+
+    def truth(self):
+        """Parameters, name to Parameter."""
+        return {}
+
+
+@dataclass(frozen=True)
+class Setup:
+    """One recording's true motion with the base drive's zones along it."""
+
+    run: Run
+    zones: Zones
+    errors: BaseErrors
+
+
+def set_up(errors, run):
+    return Setup(run, find_zones(errors, run.theta), errors)
+
+
+def read_angles(setup, hidden=()):
+    """Input and output angles (rad) as ideal electronics would read them, with the `hidden` physics in place."""
+    run = setup.run
+    gain = np.prod([physics.torque_gain for physics in hidden])
+    run = replace(run, torque=run.torque * gain)
+    cs_mm, fs_mm = base_teeth(setup.errors)
+    extra = 0.0
+    for physics in hidden:
+        cs_mm, fs_mm = physics.teeth(cs_mm, fs_mm)
+        extra = extra + physics.depth_mm(run, setup.zones)
+    ke = RAD_PER_MM * zone_deviation_mm(setup.zones, cs_mm, fs_mm, extra).max(axis=0)
+    output_angle = run.theta / RATIO - ke - sum(physics.lag(run, ke) for physics in hidden)
+    input_angle = run.theta
+    for physics in hidden:
+        input_angle = physics.read_input(input_angle, run)
+        output_angle = physics.read_output(output_angle, run)
+    for physics in hidden:
+        input_angle, output_angle = physics.clock(run.time, input_angle, output_angle)
+    return input_angle, output_angle
+
+
+def read_error(setup, hidden=()):
+    """Kinematic error (rad) of the ideal readings: input/N - output."""
+    input_angle, output_angle = read_angles(setup, hidden)
+    return input_angle / RATIO - output_angle
+
+
+def hidden_wave(setup, hidden):
+    """What the hidden physics adds to the recorded kinematic error (rad), mean removed."""
+    wave = read_error(setup, hidden) - read_error(setup)
+    return wave - wave.mean()
+
+
+def joint_rms(waves):
+    """Rms over all recordings of a case, each with its mean removed."""
+    centred = np.concatenate([wave - wave.mean() for wave in waves])
+    return float(np.sqrt(np.mean(centred**2)))
