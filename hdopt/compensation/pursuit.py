@@ -1,0 +1,97 @@
+"""Harmonics of input and output angle that a record supports, found one after another.
+
+Orthogonal matching pursuit (Pati, Rezaiifar and Krishnaprasad 1993) over k input orders and j output orders; it stops
+where the next term would take away no more than noise does (Bayes' information criterion, with the noise's colour).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.compensation.surface import Harmonics
+
+Array = NDArray[np.float64]
+
+INPUT_ORDERS = 10
+OUTPUT_ORDERS = 10
+"""Orders k + j/N up to these are tried: those of both splines and their products lie there."""
+LEAST_NEW = 0.2
+"""A term whose columns lie so far within those already there cannot be told from them by this record."""
+CELLS = 4000
+"""Rows that the search looks at; the fit at the end takes all."""
+
+
+def dictionary(span_output_turns: float) -> list[tuple[int, int]]:
+    """The pairs (k, j) to try for a record that spans `span_output_turns`: neighbours in j only where it parts them."""
+    # Orders j/N apart are a cycle apart over a whole output turn; a shorter record carries every second, third ... one.
+    step = max(1, math.ceil(0.9 / max(span_output_turns, 1e-9)))
+    if step > OUTPUT_ORDERS:
+        return [(k, 0) for k in range(1, INPUT_ORDERS + 1)]
+    pairs = [(k, j) for k in range(INPUT_ORDERS + 1) for j in range(-OUTPUT_ORDERS, OUTPUT_ORDERS + 1) if j % step == 0]
+    return [(k, j) for k, j in pairs if k > 0 or j > 0]
+
+
+def pursue(
+    angles: tuple[Array, Array],
+    residual: Array,
+    zeros: Array,
+    direction: Array | None,
+    pairs: list[tuple[int, int]],
+    terms: int,
+) -> Harmonics:
+    """At most `terms` harmonics of `residual` (n,) arcmin over input and output `angles`, both (n,) rad.
+
+    `pairs` are the (k, j) to try. `zeros` (n, q) are columns that are free anyway; `direction` (n,) +1/-1 gives a
+    return error, None none. Effective independent values are counted by the first autocorrelation of what is left, so
+    that coloured noise is not taken for harmonics.
+    """
+    free = zeros if direction is None else np.column_stack([zeros, direction])
+    stride = max(1, len(residual) // CELLS)
+    y = residual[::stride]
+    basis, _ = np.linalg.qr(free[::stride])
+    left = y - basis @ (basis.T @ y)
+    phases = np.array(pairs, float) @ np.vstack([angles[0][::stride], angles[1][::stride]])
+    cos, sin = np.cos(phases), np.sin(phases)
+    chosen: list[int] = []
+    for _ in range(terms):
+        score = (cos @ left) ** 2 + (sin @ left) ** 2
+        score[chosen] = 0.0
+        best = int(np.argmax(score))
+        new = np.column_stack([cos[best], sin[best]])
+        for _ in range(2):
+            new = new - basis @ (basis.T @ new)
+        part, size = np.linalg.qr(new)
+        if np.abs(np.diag(size)).min() < LEAST_NEW * math.sqrt(len(y)):
+            break
+        after = left - part @ (part.T @ left)
+        gain = len(y) * math.log(max(float(left @ left), 1e-300) / max(float(after @ after), 1e-300))
+        if gain * _effective(after) < 2 * math.log(len(y)) + 2 * math.log(len(pairs)):
+            break
+        chosen.append(best)
+        basis = np.column_stack([basis, part])
+        left = after
+    return _fitted(angles, residual, zeros, direction, [pairs[c] for c in chosen])
+
+
+def _effective(left: Array) -> float:
+    """Share of independent values in what is left: (1 - r)/(1 + r) by its first autocorrelation r."""
+    r = float(left[1:] @ left[:-1]) / max(float(left @ left), 1e-300)
+    return (1 - min(max(r, 0.0), 0.98)) / (1 + min(max(r, 0.0), 0.98))
+
+
+def _fitted(
+    angles: tuple[Array, Array], residual: Array, zeros: Array, direction: Array | None, pairs: list[tuple[int, int]]
+) -> Harmonics:
+    """The chosen pairs fitted together on all rows."""
+    m = len(pairs)
+    phases = [k * angles[0] + j * angles[1] for k, j in pairs]
+    blocks = [*(np.cos(p) for p in phases), *(np.sin(p) for p in phases), zeros]
+    if direction is not None:
+        blocks.append(direction)
+    solution = np.linalg.lstsq(np.column_stack(blocks), residual, rcond=1e-8)[0]
+    k, j = np.array(pairs, np.int64).reshape(m, 2).T
+    back = float(solution[-1]) if direction is not None else 0.0
+    return Harmonics(k, j, np.asarray(solution[:m], float), np.asarray(solution[m : 2 * m], float), back)

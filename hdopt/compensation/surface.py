@@ -1,0 +1,94 @@
+"""The error as a surface over input and output angle: on a grid, or as a few harmonics of both.
+
+The circular spline's errors turn with the input angle a, the flexspline's with a + b, b the output angle: over the beat
+of N input turns the error is one function F(a, b), 2 pi periodic in both. A table over one input turn would mix the
+turns of a beat.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+INPUT_CELLS, OUTPUT_CELLS = 192, 96
+"""Grid of a surface: 1.9 deg of the input, 3.75 deg of the output; straight lines in between are off by half a per cent
+of an amplitude of order 4."""
+
+
+@dataclass(frozen=True)
+class Harmonics:
+    """Terms c cos(k a + j b) + s sin(k a + j b), arcmin: `k` and `j` (m,) whole, `cos` and `sin` (m,); `back` is half
+    the return error, added forward and taken away backward."""
+
+    k: Index
+    j: Index
+    cos: Array
+    sin: Array
+    back: float = 0.0
+
+    def __len__(self) -> int:
+        return len(self.k)
+
+    def at(self, inputs: Array, outputs: Array, direction: Array | float = 0.0) -> Array:
+        """Error (arcmin, n) at input and output angles `inputs`, `outputs` (n,) rad and `direction` +1, -1 or 0."""
+        value = np.zeros(np.shape(inputs)) + self.back * np.asarray(direction)
+        for k, j, c, s in zip(self.k, self.j, self.cos, self.sin, strict=True):
+            phase = k * inputs + j * outputs
+            value += c * np.cos(phase) + s * np.sin(phase)
+        return np.asarray(value, float)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The error on an even grid, `values` (n_input, n_output) arcmin, mean zero; `back` as in `Harmonics`."""
+
+    values: Array
+    back: float = 0.0
+
+    def at(self, inputs: Array, outputs: Array, direction: Array | float = 0.0) -> Array:
+        """Error (arcmin, n) by straight lines between grid points at `inputs`, `outputs` (n,) rad and `direction`."""
+        rows, columns = self.values.shape
+        x = np.mod(inputs / (2 * np.pi), 1.0) * rows
+        y = np.mod(outputs / (2 * np.pi), 1.0) * columns
+        i, j = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+        p, q = x - i, y - j
+        i0, i1, j0, j1 = i % rows, (i + 1) % rows, j % columns, (j + 1) % columns
+        v = self.values
+        low = v[i0, j0] * (1 - p) + v[i1, j0] * p
+        high = v[i0, j1] * (1 - p) + v[i1, j1] * p
+        return np.asarray(low * (1 - q) + high * q + self.back * np.asarray(direction), float)
+
+    def harmonics(self, terms: int) -> Harmonics:
+        """The `terms` largest harmonics of this surface, by its Fourier transform."""
+        rows, columns = self.values.shape
+        spectrum = np.fft.fft2(self.values) / self.values.size
+        k = np.fft.fftfreq(rows, 1 / rows).astype(np.int64)[:, None] * np.ones(columns, np.int64)
+        j = np.ones((rows, 1), np.int64) * np.fft.fftfreq(columns, 1 / columns).astype(np.int64)
+        upper = ((k > 0) | ((k == 0) & (j > 0))) & (np.abs(k) < rows // 2) & (np.abs(j) < columns // 2)
+        found = spectrum[upper]
+        keep = np.argsort(-np.abs(found), kind="stable")[:terms]
+        chosen = found[keep]
+        return Harmonics(k[upper][keep], j[upper][keep], 2 * chosen.real, -2 * chosen.imag, self.back)
+
+
+def grid_angles() -> tuple[Array, Array]:
+    """Input and output angles of the grid's points, both (n_input, n_output), rad."""
+    a = np.arange(INPUT_CELLS) * (2 * np.pi / INPUT_CELLS)
+    b = np.arange(OUTPUT_CELLS) * (2 * np.pi / OUTPUT_CELLS)
+    inputs, outputs = np.meshgrid(a, b, indexing="ij")
+    return np.asarray(inputs, float), np.asarray(outputs, float)
+
+
+def surface_of(parts: Sequence[Harmonics], base: Array | None = None, back: float = 0.0) -> Surface:
+    """The sum of `parts` on the grid, with a `base` already there (n_input, n_output); `back` half a return error."""
+    inputs, outputs = grid_angles()
+    values = np.zeros(inputs.shape) if base is None else np.asarray(base, float).copy()
+    for part in parts:
+        values += part.at(inputs.ravel(), outputs.ravel()).reshape(values.shape)
+    return Surface(values - values.mean(), back)

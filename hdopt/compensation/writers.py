@@ -1,0 +1,123 @@
+"""A compensation as a file for a controller: CSV, JSON, or C with constant tables and one function."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from hdopt.compensation.surface import Harmonics, Surface
+
+FORMATS = ("csv", "json", "c")
+
+
+def written(found: Harmonics | Surface, form: str, facts: Mapping[str, Any]) -> str:
+    """The text of `found` in a `form` of `FORMATS`; `facts` (plain values) say what it is and what it needs."""
+    return {"csv": _csv, "json": _json, "c": _c}[form](found, facts)
+
+
+def _csv(found: Harmonics | Surface, facts: Mapping[str, Any]) -> str:
+    head = [f"# {key}: {str(value).replace(chr(10), ' ')}" for key, value in facts.items()]
+    head.append(f"# half_return_arcmin: {found.back!r}")
+    if isinstance(found, Harmonics):
+        rows = ["k_input,j_output,cos_arcmin,sin_arcmin"]
+        rows += [f"{k},{j},{c!r},{s!r}" for k, j, c, s in _terms(found)]
+        return "\n".join([*head, *rows]) + "\n"
+    inputs, outputs = found.values.shape
+    rows = ["input_deg\\output_deg," + ",".join(f"{360 * j / outputs:g}" for j in range(outputs))]
+    rows += [
+        f"{360 * i / inputs:g}," + ",".join(f"{value:.6g}" for value in row)
+        for i, row in enumerate(found.values.tolist())
+    ]
+    return "\n".join([*head, *rows]) + "\n"
+
+
+def _terms(found: Harmonics) -> list[tuple[int, int, float, float]]:
+    return list(zip(found.k.tolist(), found.j.tolist(), found.cos.tolist(), found.sin.tolist(), strict=True))
+
+
+def _json(found: Harmonics | Surface, facts: Mapping[str, Any]) -> str:
+    content: dict[str, Any] = {"schema": 1, **facts, "half_return_arcmin": found.back}
+    if isinstance(found, Harmonics):
+        content["terms"] = [{"k": k, "j": j, "cos_arcmin": c, "sin_arcmin": s} for k, j, c, s in _terms(found)]
+    else:
+        content["table_arcmin"] = found.values.tolist()
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+FUNCTION = "hdopt_error_arcmin"
+
+_HEAD = """/* Kinematic error of a drive, to be subtracted: output = input/N - error.
+{facts}
+   input_rad from the zero of the recording's input count, output_rad = input_rad/N counted on;
+   direction: +1 forward, -1 backward, 0 neither. */
+#include <math.h>
+"""
+
+_C_TERMS = """
+#define HDOPT_TERMS {count}
+static const int hdopt_k[] = {{{k}}};
+static const int hdopt_j[] = {{{j}}};
+static const double hdopt_cos[] = {{{cos}}};
+static const double hdopt_sin[] = {{{sin}}};
+
+double hdopt_error_arcmin(double input_rad, double output_rad, int direction)
+{{
+    double error = direction * ({back});
+    for (int i = 0; i < HDOPT_TERMS; i++) {{
+        double phase = hdopt_k[i] * input_rad + hdopt_j[i] * output_rad;
+        error += hdopt_cos[i] * cos(phase) + hdopt_sin[i] * sin(phase);
+    }}
+    return error;
+}}
+"""
+
+_C_TABLE = """
+#define HDOPT_INPUTS {inputs}
+#define HDOPT_OUTPUTS {outputs}
+static const double hdopt_table[HDOPT_INPUTS][HDOPT_OUTPUTS] = {{
+{rows}
+}};
+
+double hdopt_error_arcmin(double input_rad, double output_rad, int direction)
+{{
+    const double turn = 6.283185307179586476925;
+    double x = input_rad / turn, y = output_rad / turn;
+    x = (x - floor(x)) * HDOPT_INPUTS;
+    y = (y - floor(y)) * HDOPT_OUTPUTS;
+    int i = (int)floor(x), j = (int)floor(y);
+    double p = x - i, q = y - j;
+    int i0 = i % HDOPT_INPUTS, i1 = (i + 1) % HDOPT_INPUTS, j0 = j % HDOPT_OUTPUTS, j1 = (j + 1) % HDOPT_OUTPUTS;
+    double low = hdopt_table[i0][j0] * (1 - p) + hdopt_table[i1][j0] * p;
+    double high = hdopt_table[i0][j1] * (1 - p) + hdopt_table[i1][j1] * p;
+    return low * (1 - q) + high * q + direction * ({back});
+}}
+"""
+
+
+def _c(found: Harmonics | Surface, facts: Mapping[str, Any]) -> str:
+    said = "\n".join(f"   {key}: {value}" for key, value in facts.items()).replace("*/", "* /")
+    head = _HEAD.format(facts=said)
+    if isinstance(found, Harmonics):
+        numbers = {name: _list(getattr(found, name).tolist()) for name in ("cos", "sin", "k", "j")}
+        return head + _C_TERMS.format(count=len(found), back=repr(found.back), **numbers)
+    rows = ",\n".join("{" + _list(row) + "}" for row in found.values.tolist())
+    inputs, outputs = found.values.shape
+    return head + _C_TABLE.format(inputs=inputs, outputs=outputs, rows=rows, back=repr(found.back))
+
+
+def _list(values: Sequence[float]) -> str:
+    return ", ".join(repr(value) for value in values) or "0"
+
+
+def homing_arcmin(found: Harmonics | Surface, ratio: float, off_deg: float = 1.0) -> tuple[float, float]:
+    """Rms (arcmin) that `found` adds wrongly where the input's, or the output's, zero is off by `off_deg` of its shaft;
+    `ratio` is N."""
+    import numpy as np
+
+    theta = np.linspace(0.0, 2 * math.pi * ratio, 20_000)
+    here = found.at(theta, theta / ratio)
+    off = math.radians(off_deg)
+    moved = found.at(theta + off, theta / ratio), found.at(theta, theta / ratio + off)
+    return float(np.std(moved[0] - here)), float(np.std(moved[1] - here))
