@@ -26,7 +26,10 @@ MOST_ARCS = 20000
 def outline_of(contour: Contour) -> Array:
     """A contour as tangent arcs, counter-clockwise."""
     if isinstance(contour, Circle):
-        return _arc(contour.radius, 0.0, 2 * math.pi)[:-1] + np.array([0.0, contour.offset, 0.0])
+        moved = _arc(contour.radius, 0.0, 2 * math.pi)[:-1] + np.array([0.0, contour.offset, 0.0])
+        return np.asarray(moved, float)
+    if not isinstance(contour, ParallelCurve):
+        raise TypeError(f"no arcs are known for a {type(contour).__name__}")
     return _biarcs(contour)
 
 
@@ -139,4 +142,4 @@ def _turn(first: Array, second: Array) -> Array:
 
 
 def _dot(a: Array, b: Array) -> Array:
-    return np.einsum("ij,ij->i", a, b)
+    return np.asarray(np.einsum("ij,ij->i", a, b))

@@ -11,17 +11,19 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
-from hdopt.drive import Drive, Structure
+from hdopt.drive.geometry import Drive, Structure
+from hdopt.drive.profiles import TwoDisk, tip_radius_of_curvature
 from hdopt.errors import HdoptError, MissingValue
+from hdopt.geometry.budget import FIT_SHARE, Bounds, Plan, plan
 from hdopt.geometry.context import context_parts
 from hdopt.geometry.contour import Circle, Contour, ParallelCurve
 from hdopt.geometry.din6885 import SMALLEST_BORE, key_for_bore
 from hdopt.geometry.features import BoltCircle, Bore, BrokenEdge, DBore, KeywayBore, PlainBore, Slot
+from hdopt.geometry.options import RULES, ExportOptions
 from hdopt.geometry.part import SHARP, Colour, Part, Prism, Tongue
-from hdopt.profiles import TwoDisk, tip_radius_of_curvature
-from hdopt.study.export import ExportSection
+from hdopt.geometry.walls import require_walls
 
 STEEL: Colour = (0.36, 0.52, 0.68, 1.0)
 DARK_STEEL: Colour = (0.30, 0.33, 0.38, 1.0)
@@ -40,6 +42,12 @@ THREADS = {"M2": (2.4, 1.6), "M3": (3.4, 2.5), "M4": (4.5, 3.3), "M5": (5.5, 4.2
 
 THREAD_FOR_RADIUS = ((15.0, "M2"), (35.0, "M3"), (50.0, "M4"), (70.0, "M5"), (100.0, "M6"), (math.inf, "M8"))
 """Thread taken for a cam up to this radius, mm, where none is given."""
+
+
+CAM_STEP_DEG, WHEEL_RADIUS = 0.5, 200.0
+"""Step of the cam's table and radius of the grinding wheel (mm) where nobody gives them; the files name them."""
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -61,7 +69,15 @@ class WaveGeneratorModel:
     structure: Structure
     parts: tuple[Part, ...]
     assumptions: tuple[Assumption, ...]
+    profile_zone: float
+    """Full width of the profile's tolerance zone, mm."""
+    plan: Plan
+    """Its fits, and the budgets of eccentricity and tilt that they keep."""
     notes: tuple[str, ...] = ()
+    cam_resolution_deg: float = CAM_STEP_DEG
+    """Step of the cam's table."""
+    wheel_radius: float = WHEEL_RADIUS
+    """Of the grinding wheel, mm."""
 
     def part(self, name: str) -> Part:
         return next(part for part in self.parts if part.name == name)
@@ -74,31 +90,48 @@ class WaveGeneratorModel:
 
 @dataclass
 class Choices:
-    """Reads the export section and remembers which values were not given."""
+    """Reads the options and remembers which values were not given."""
 
-    options: ExportSection
+    options: ExportOptions
+    bounds: Bounds
     assumptions: list[Assumption] = field(default_factory=list)
 
-    def take(self, key: str, rule: Callable[[], Any] | None = None) -> Any:
-        value = getattr(self.options, key)
-        if value is None and rule is not None:
-            value = rule()
-        if key not in self.options.model_fields_set and not any(a.key == f"export.{key}" for a in self.assumptions):
-            reason = ExportSection.model_fields[key].description or ""
-            self.assumptions.append(Assumption(f"export.{key}", value, reason))
+    def take(self, key: str, rule: Callable[[], T]) -> T:
+        """The value of an option, or what `rule` makes of it where nobody gave one."""
+        given: T | None = getattr(self.options, key)
+        if given is not None:
+            return given
+        name = f"export.{key}"
+        if (known := next((a for a in self.assumptions if a.key == name), None)) is not None:
+            return known.value  # type: ignore[no-any-return]  # assumptions are of any type
+        value = rule()
+        self.assumptions.append(Assumption(name, value, RULES[key]))
         return value
 
 
-def wave_generator_model(drive: Drive, options: ExportSection | None = None) -> WaveGeneratorModel:
-    """All parts of a drive's wave generator; `HdoptError` where the numbers leave no part to make."""
-    choices = Choices(options or ExportSection())
+def wave_generator_model(
+    drive: Drive, options: ExportOptions | None = None, bounds: Bounds | None = None
+) -> WaveGeneratorModel:
+    """All parts of a drive's wave generator; `HdoptError` where the numbers leave no part to make.
+
+    `bounds` limit its eccentricity (mm) and tilt (rad); the fits follow from them.
+    """
+    bounds = bounds or Bounds()
+    choices = Choices(options or ExportOptions(), bounds)
     carrier = _TwoDiscs(drive, choices) if isinstance(drive.wave_generator.profile, TwoDisk) else _Cam(drive, choices)
     structure = drive.wave_generator.structure
     parts = _integral(carrier) if structure is Structure.INTEGRAL else _sliding(carrier, structure)
+    require_walls(parts, carrier.wall)
+    given = {key: getattr(choices.options, key) for key in ("shaft_fit", "seat_fit")}
+    gap = choices.take("axial_gap_mm", lambda: 0.0) if structure.slots else 0.0
+    fits = plan(structure, parts, bounds, drive.clearances, given, gap)
+    located = fits.zone(carrier.profiled_part, "wg_eccentricity")
+    zone = choices.take("profile_tolerance_mm", lambda: min(0.010, located or math.inf))
     if choices.options.context:
-        share = choices.take("race_share")
+        share = choices.take("race_share", lambda: 0.25)
         parts += context_parts(drive, carrier.bearing_thickness, share, carrier.clear_of_profile)
-    return WaveGeneratorModel(structure, parts, tuple(choices.assumptions), carrier.notes)
+    step, wheel = choices.options.cam_resolution_deg or CAM_STEP_DEG, choices.options.wheel_radius_mm or WHEEL_RADIUS
+    return WaveGeneratorModel(structure, parts, tuple(choices.assumptions), zone, fits, carrier.notes, step, wheel)
 
 
 class _Carrier:
@@ -106,12 +139,13 @@ class _Carrier:
 
     notes: tuple[str, ...] = ()
     clear_of_profile = 0.0
+    profiled_part = "cam"
 
     def __init__(self, drive: Drive, choices: Choices) -> None:
         generator = drive.wave_generator
         if generator.bearing_thickness is None:
             raise MissingValue("the cam's outline", "wave_generator.bearing_thickness_mm")
-        self.drive, self.take, self.options = drive, choices.take, choices.options
+        self.drive, self.take, self.options, self.bounds = drive, choices.take, choices.options, choices.bounds
         self.width = generator.width
         self.bearing_thickness = generator.bearing_thickness
 
@@ -126,8 +160,10 @@ class _Carrier:
     def outer_edges(self) -> tuple[BrokenEdge, BrokenEdge]:
         """Chamfer at the input end, lead-in for the bearing at the other."""
         length = self.take("lead_in_length_mm", lambda: round(min(1.0, 0.12 * self.width), 2))
-        lead_in = BrokenEdge.lead_in(length, math.radians(self.take("lead_in_angle_deg"))) if length else SHARP
-        return self.chamfer(), lead_in
+        if not length:
+            return self.chamfer(), SHARP
+        angle = math.radians(self.take("lead_in_angle_deg", lambda: 15.0))
+        return self.chamfer(), BrokenEdge.lead_in(length, angle)
 
     def require_room_for_edges(self, height: float) -> None:
         chamfer, lead_in = self.outer_edges()
@@ -178,12 +214,21 @@ class _Carrier:
         """Radius of the largest circle about the axis inside the carrier."""
         raise NotImplementedError
 
-    def countersink(self) -> float:
-        return self.take("bore_chamfer_mm", lambda: round(min(0.5, 0.05 * self.shaft_diameter()), 2))
+    def countersink(self, bore: Bore) -> float:
+        """The bore's countersink; a bore with a flat has none, for a cone cuts the flat in a curve no edge follows."""
+        if isinstance(bore, DBore):
+            if self.options.bore_chamfer_mm:
+                raise HdoptError(
+                    f"export.bore_chamfer_mm is {self.options.bore_chamfer_mm:g} mm, but a D-bore is not countersunk: "
+                    "its edges are broken by hand (ISO 13715); leave the key out"
+                )
+            return 0.0
+        rule = min(0.5, 0.05 * self.shaft_diameter(), 0.1 * self.width)
+        return self.take("bore_chamfer_mm", lambda: round(rule, 2))
 
     def clearance_bore(self) -> PlainBore:
         """The hole in parts that slide: past the shaft's end with the slide's travel all round."""
-        return PlainBore(self.shaft_diameter() / 2 + self.take("cross_slide_travel_mm"))
+        return PlainBore(self.shaft_diameter() / 2 + self.take("cross_slide_travel_mm", lambda: 0.5))
 
 
 class _Cam(_Carrier):
@@ -208,7 +253,7 @@ class _Cam(_Carrier):
         body = Prism(self.contour, -half, half, bottom_edge, top_edge)
         sliding = slot is not None
         return (
-            Part("cam", STEEL, (body,), bore, self.countersink(), faces, slot, bolts, self.contour, False, sliding),
+            Part("cam", STEEL, (body,), bore, self.countersink(bore), faces, slot, bolts, self.contour, False, sliding),
         )
 
     def integral_parts(self) -> tuple[Part, ...]:
@@ -230,7 +275,7 @@ class _Cam(_Carrier):
         )
         tapped = BoltCircle(bolts.count, tap, bolts.radius) if bolts else None
         faces = ((-half - thickness, -1), (half, 1))
-        hub = Part("hub", DARK_STEEL, body, bore, self.countersink(), faces, bolts=tapped)
+        hub = Part("hub", DARK_STEEL, body, bore, self.countersink(bore), faces, bolts=tapped)
         return (hub, *self.parts(PlainBore(seat), bolts))
 
     def _seat_for(self, bore: Bore) -> float:
@@ -240,7 +285,7 @@ class _Cam(_Carrier):
     def _hub_fits(self, seat: float) -> bool:
         """Whether there is room between seat and rim for the usual circle of bolts."""
         hole = THREADS[self._thread()][0]
-        return seat + 1.7 * hole + self.wall <= self.room
+        return seat + max(1.7 * hole, hole + self.wall) + self.wall <= self.room
 
     def _require_hub_room(self, seat: float) -> None:
         if seat + self.wall > self.room:
@@ -259,8 +304,8 @@ class _Cam(_Carrier):
         count = self.take("bolt_count", lambda: usual_count)
         if not count:
             return None
-        radius = self.take("bolt_circle_mm", lambda: round(2 * (inside + 1.2 * hole), 1)) / 2
-        low, high = inside + hole / 2 + self.wall / 2, self.room - hole / 2 - self.wall
+        radius = self.take("bolt_circle_mm", lambda: round(2 * (inside + max(1.2 * hole, hole / 2 + self.wall)), 1)) / 2
+        low, high = inside + hole / 2 + self.wall, self.room - hole / 2 - self.wall
         if not low <= radius <= high:
             raise HdoptError(
                 f"a bolt circle of {2 * radius:.4g} mm with {hole:g} mm holes does not fit: between the bore or seat "
@@ -286,10 +331,11 @@ class _TwoDiscs(_Carrier):
         self.offset = profile.semi_major - tip_radius
         wall_circle = Circle(tip_radius, self.offset)
         self.disc = wall_circle.inward(self.bearing_thickness)
-        self.gap = self.take("disc_gap_mm")
+        self.gap = self.take("disc_gap_mm", lambda: 0.2)
         self.disc_height = (self.width - self.gap) / 2
         self.require_room_for_edges(self.disc_height)
         self.clear_of_profile = arc_departure(profile)
+        self.profiled_part = "disc_1"
         self.notes = (
             f"two discs of radius {self.disc.radius:.4f} mm, {self.offset:.4f} mm off the axis: the circle through the "
             "tip with the profile's curvature there; it lies up to "
@@ -322,8 +368,8 @@ class _TwoDiscs(_Carrier):
         )
         faces = ((half, 1),) if slot else ((step - thickness, -1), (half, 1))
         sliding = slot is not None
-        hub = Part("eccentric_hub", DARK_STEEL, body, bore, self.countersink(), faces, slot, clearance_hole=sliding)
-        hole = journal + self.take("journal_clearance_mm")
+        hub = Part("eccentric_hub", DARK_STEEL, body, bore, self.countersink(bore), faces, slot, clearance_hole=sliding)
+        hole = journal + self.take("journal_clearance_mm", lambda: 0.0)
         bottom_edge, top_edge = self.outer_edges()
         discs = tuple(
             Part(
@@ -404,10 +450,17 @@ class _CrossSlide:
         self.clearance, self.radius = clearances.cross_slide, clearances.disc_radius
         self.widths = {n: getattr(clearances, f"slot_{n}_width") for n in structure.slots}
         self.depth = take("slot_depth_mm", lambda: max(round(2 * carrier.width / 3) / 2, round(carrier.width / 3, 1)))
-        self.gap = take("axial_gap_mm")
-        self.travel = take("cross_slide_travel_mm")
+        self.gap = take("axial_gap_mm", self._usual_gap)
+        self.travel = take("cross_slide_travel_mm", lambda: 0.5)
         self.thickness = take("disc_thickness_mm", lambda: self.depth + 2 * carrier.wall)
         self._check()
+
+    def _usual_gap(self) -> float:
+        """0.1 mm, or less where the slides would lean by more than their part of the tilt that is allowed."""
+        if self.carrier.bounds.tilt is None:
+            return 0.1
+        lean = FIT_SHARE * self.carrier.bounds.tilt / (1 + len(self.structure.slots))
+        return min(0.1, math.floor(1e3 * 2 * self.radius * lean) / 1e3)
 
     def _check(self) -> None:
         wall = self.carrier.wall
@@ -472,7 +525,7 @@ class _CrossSlide:
             Tongue(self.radius, self.widths[number] - self.clearance, direction, top, top + self.depth),
         )
         face = ((body[0].bottom, -1),)
-        return Part("input_disc", BRONZE, body, bore, self.carrier.countersink(), face)
+        return Part("input_disc", BRONZE, body, bore, self.carrier.countersink(bore), face)
 
     def _require_disc_around(self, bore: PlainBore) -> None:
         if bore.radius + self.carrier.wall > self.radius:

@@ -5,10 +5,10 @@ These parts show the deformed shapes as the model has them; they are not meant t
 
 from __future__ import annotations
 
-from hdopt.drive import Drive
+from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.geometry.contour import Circle, ParallelCurve
-from hdopt.geometry.part import Part, Prism
+from hdopt.geometry.part import Colour, Part, Prism
 
 RACE = (0.72, 0.74, 0.78, 0.55)
 FLEXSPLINE = (0.86, 0.62, 0.22, 0.45)
@@ -25,22 +25,23 @@ def context_parts(drive: Drive, bearing: float, race_share: float, clear: float)
     whole stands off the profile, so that discs which lie outside it by so much do not cut into it.
     """
     profile, half = drive.wave_generator.profile, drive.wave_generator.width / 2
-    wall, geometry = drive.geometry.flexspline_wall, drive.geometry
+    wall, addendum = drive.geometry.flexspline_wall, drive.geometry.circular_spline_addendum
     missing = {
         "drive.flexspline_wall_mm": wall,
-        "drive.circular_spline_addendum_mm": geometry.circular_spline_addendum,
+        "drive.circular_spline_addendum_mm": addendum,
     }
-    if lacking := [key for key, value in missing.items() if value is None]:
+    if wall is None or addendum is None:
+        lacking = [key for key, value in missing.items() if value is None]
         raise MissingValue("the context of an export", *lacking)
     race = race_share * bearing
-    tips = geometry.module * geometry.circular_spline_teeth / 2 - geometry.circular_spline_addendum
+    tips = drive.geometry.module * drive.geometry.circular_spline_teeth / 2 - addendum
     if profile.semi_major + clear + wall >= tips:
         raise HdoptError(
             f"the flexspline ring reaches {profile.semi_major + wall:.4f} mm, the circular spline's tips are at "
             f"{tips:.4f} mm: they collide; check drive.flexspline_wall_mm and drive.circular_spline_addendum_mm"
         )
 
-    def ring(name: str, colour, inside: float, outside: float) -> Part:
+    def ring(name: str, colour: Colour, inside: float, outside: float) -> Part:
         outline = ParallelCurve(profile, outside - clear)
         body = Prism(outline, -half, half, inner=ParallelCurve(profile, inside - clear))
         return Part(name, colour, (body,), contour=outline, context=True)

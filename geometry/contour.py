@@ -14,8 +14,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hdopt.drive.profiles import MeasuredProfile, TwoDisk, WaveGeneratorProfile, curvature
 from hdopt.errors import HdoptError
-from hdopt.profiles import MeasuredProfile, TwoDisk, WaveGeneratorProfile, curvature
 
 Array = NDArray[np.float64]
 Box = tuple[float, float, float, float]
@@ -91,6 +91,11 @@ class ParallelCurve:
         _, tangent, _ = self._frame(phi)
         return tangent * (1 - self.distance * curvature(self.profile, phi))[:, None]
 
+    def curvature(self, phi: ArrayLike) -> Array:
+        """Curvature of the parallel curve, 1/mm: kappa/(1 - distance kappa)."""
+        kappa = curvature(self.profile, phi)
+        return np.asarray(kappa / (1 - self.distance * kappa))
+
     def _frame(self, phi: ArrayLike) -> tuple[Array, Array, Array]:
         """The profile's point, its derivative and its outward unit normal."""
         phi = np.atleast_1d(np.asarray(phi, float))
@@ -135,7 +140,7 @@ class ParallelCurve:
             away = points - point
             phi = phi - _dot(away, tangent) / (_dot(away, second) - _dot(tangent, tangent))
         point, _, normal = self._frame(phi)
-        return _dot(points - point, normal) + self.distance
+        return np.asarray(_dot(points - point, normal) + self.distance)
 
 
 @dataclass(frozen=True)
@@ -171,7 +176,7 @@ class Circle:
 
     def deviation(self, points: ArrayLike) -> Array:
         points = np.asarray(points, float)
-        return np.hypot(points[:, 0], points[:, 1] - self.offset) - self.radius
+        return np.asarray(np.hypot(points[:, 0], points[:, 1] - self.offset) - self.radius)
 
 
 def break_angles(profile: WaveGeneratorProfile) -> list[float]:
@@ -213,4 +218,4 @@ def _support(profile: WaveGeneratorProfile, direction_deg: float) -> float:
 
 
 def _dot(a: Array, b: Array) -> Array:
-    return np.einsum("ij,ij->i", a, b)
+    return np.asarray(np.einsum("ij,ij->i", a, b))

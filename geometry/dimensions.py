@@ -8,11 +8,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from hdopt.deviations import AMPLITUDE_NAMES, STUDY_KEYS
-from hdopt.drive import Structure
-from hdopt.errors import HdoptError
+from hdopt.drive.errors import AMPLITUDE_NAMES, STUDY_KEYS
+from hdopt.drive.geometry import Structure
+from hdopt.geometry.assembly import WaveGeneratorModel
+from hdopt.geometry.budget import Plan
 from hdopt.geometry.contour import Circle
 from hdopt.geometry.features import DBore, KeywayBore
+from hdopt.geometry.iso286 import deviations
 from hdopt.geometry.part import Part, Prism, Tongue
 
 ECCENTRICITY, TILTS = "wg_eccentricity_mm", ("wg_tilt_major_deg", "wg_tilt_minor_deg")
@@ -31,6 +33,9 @@ class Dimension:
     nominal: float | None
     tolerance: str
     source: str
+    lower: float | None = None
+    upper: float | None = None
+    """Deviations from the nominal size, mm; None where the tolerance is a zone."""
 
     def to_dict(self) -> dict[str, Any]:
         return asdict(self)
@@ -47,77 +52,106 @@ def tolerance_bounds(data: Mapping[str, Any]) -> dict[str, float]:
     return bounds
 
 
-def allocated_bounds(result: Mapping[str, Any]) -> dict[str, float]:
-    """The tolerances in the JSON of `hdopt allocate`: every named entry that has a `tolerance`."""
-    found: dict[str, float] = {}
-
-    def visit(name: str, value: Any) -> None:
-        if isinstance(value, Mapping):
-            if isinstance(value.get("tolerance"), int | float):
-                found[name] = float(value["tolerance"])
-            for key, item in value.items():
-                visit(str(key), item)
-
-    visit("", result)
-    if not found:
-        raise HdoptError("the allocation holds no tolerances; give the JSON that `hdopt allocate --json FILE` wrote")
-    return found
-
-
 def key_dimensions(
-    structure: Structure,
-    parts: tuple[Part, ...],
+    model: WaveGeneratorModel,
     width: float,
-    profile_zone: float,
     bounds: Mapping[str, float],
     contributors: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> tuple[Dimension, ...]:
-    """The table for a wave generator's `parts`; `width` is the profile's and `profile_zone` its tolerance zone's, mm.
+    """The table for a wave generator's parts; `width` is the profile's, mm.
 
     `bounds` are tolerances by study key (mm or deg) or by contributor; `contributors` the study's callouts, which
     replace the errors they feed. A value of `bounds` under a contributor's name replaces the callout's own.
     """
-    rows = [row for part in parts if not part.context for row in _sizes(part, profile_zone)]
-    return (*rows, *_slides(parts), *_location(structure, width, bounds, contributors or {}))
+    parts = model.parts
+    rows = [row for part in parts if not part.context for row in _sizes(part, model)]
+    return (*rows, *_slides(parts), *_location(model.structure, width, bounds, contributors or {}))
 
 
-def _sizes(part: Part, zone: float) -> list[Dimension]:
-    rows = []
+class _Rows:
+    """Collects the dimensions of one part, each once."""
 
-    def add(name: str, nominal: float, tolerance: str, source: str) -> None:
-        row = Dimension(part.name, name, nominal, tolerance, source)
-        if row not in rows:
-            rows.append(row)
+    def __init__(self, part: str) -> None:
+        self.part = part
+        self.rows: list[Dimension] = []
 
+    def add(self, name: str, nominal: float, tolerance: str, source: str) -> None:
+        self._keep(Dimension(self.part, name, nominal, tolerance, source))
+
+    def limits(self, name: str, nominal: float, limits: tuple[float, float], label: str, source: str) -> None:
+        """A dimension with its lower and upper deviation, mm; `label` is the tolerance class, '' without one."""
+        lower, upper = limits
+        text = f"±{upper:.4g}" if math.isclose(-lower, upper) else f"{_signed(upper)}/{_signed(lower)}"
+        self._keep(Dimension(self.part, name, nominal, f"{label} {text}".strip(), source, lower, upper))
+
+    def _keep(self, row: Dimension) -> None:
+        if row not in self.rows:
+            self.rows.append(row)
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.4g}" if abs(value) > 5e-8 else "0"
+
+
+def _sizes(part: Part, model: WaveGeneratorModel) -> list[Dimension]:
+    rows = _Rows(part.name)
+    zone, first = model.profile_zone, part.body[0]
     if isinstance(part.contour, Circle):
-        add("disc diameter", 2 * part.contour.radius, "h6", "export")
-        add("offset of the disc's axis", abs(part.contour.offset), f"±{zone / 2:g}", "export")
+        # Radius and offset share the zone: each may use half of it to either side.
+        rows.limits("disc diameter", 2 * part.contour.radius, (-zone / 2, zone / 2), "", "profile tolerance")
+        rows.limits(
+            "offset of the disc's axis", abs(part.contour.offset), (-zone / 4, zone / 4), "", "profile tolerance"
+        )
     elif part.contour is not None:
         box = part.contour.box
-        add("major axis", box[3] - box[1], f"profile {zone:g}", "export")
-        add("minor axis", box[2] - box[0], f"profile {zone:g}", "export")
-    first = part.body[0]
+        rows.add("major axis", box[3] - box[1], f"profile {zone:g}", "export")
+        rows.add("minor axis", box[2] - box[0], f"profile {zone:g}", "export")
+        # The zone bounds the outline's length: a parallel curve half a zone off is pi zones longer.
+        rows.limits("perimeter", part.contour.perimeter, (-math.pi * zone, math.pi * zone), "", "profile tolerance")
     if isinstance(first, Prism):
         heights = sum(piece.height for piece in part.body if isinstance(piece, Prism))
-        add("width", heights, "ISO 2768-m", "general")
-        if isinstance(first.inner, Circle):
-            add("hole for the journal", 2 * first.inner.radius, "H7", "fit")
-    for piece in part.body[1:]:
-        if isinstance(piece, Prism) and isinstance(piece.outline, Circle):
-            add("seat" if not piece.outline.offset else "journals", 2 * piece.outline.radius, "h6", "fit")
-    if part.clearance_hole:
-        add("clearance hole", 2 * part.bore.radius, "H13", "fit")
-    elif part.bore:
-        add("bore", 2 * part.bore.radius, "H7", "fit")
-    if isinstance(part.bore, KeywayBore):
-        key = part.bore.key
-        add("keyway, width", key.width, "JS9", "DIN 6885-1")
-        add("keyway, d + t2", 2 * part.bore.radius + key.hub_depth, f"+{key.hub_depth_tolerance:g}/0", "DIN 6885-1")
+        rows.limits("width", heights, general_limits(heights), "", "ISO 2768-m")
+    _fitted(rows, part, model.plan)
+    key = part.bore.key if isinstance(part.bore, KeywayBore) else None
+    if key is not None and part.bore is not None:
+        rows.limits("keyway, width", key.width, deviations("JS9", key.width), "JS9", "DIN 6885-1")
+        depth = 2 * part.bore.radius + key.hub_depth
+        rows.limits("keyway, d + t2", depth, (0.0, key.hub_depth_tolerance), "", "DIN 6885-1")
     if isinstance(part.bore, DBore):
-        add("flat to the far side of the bore", part.bore.radius + part.bore.flat, "+0.05/0", "fit")
+        rows.limits("flat to the far side of the bore", part.bore.radius + part.bore.flat, (0.0, 0.05), "", "fit")
     if part.bolts:
-        add(f"circle of {part.bolts.count} holes of {part.bolts.hole:g}", 2 * part.bolts.radius, "position 0.1", "fit")
-    return rows
+        name = f"circle of {part.bolts.count} holes of {part.bolts.hole:g}"
+        rows.add(name, 2 * part.bolts.radius, "position 0.1", "fit")
+    return rows.rows
+
+
+def _fitted(rows: _Rows, part: Part, plan: Plan) -> None:
+    """Bores, seats and journals with the limits of their fits."""
+    hole, shaft = plan.hole_of(part.name), plan.shaft_of(part.name)
+    first = part.body[0]
+    if isinstance(first, Prism) and isinstance(first.inner, Circle) and hole is not None:
+        rows.limits("hole for the journal", 2 * first.inner.radius, hole.hole_limits, hole.hole, "budget")
+    for piece in part.body[1:]:
+        if isinstance(piece, Prism) and isinstance(piece.outline, Circle) and shaft is not None:
+            name = "seat" if not piece.outline.offset else "journals"
+            rows.limits(name, 2 * piece.outline.radius, shaft.shaft_limits, shaft.shaft, "budget")
+    if part.bore is None:
+        return
+    diameter = 2 * part.bore.radius
+    if part.clearance_hole:
+        rows.limits("clearance hole", diameter, deviations("H11", diameter), "H11", "fit")
+    elif hole is not None:
+        rows.limits("bore", diameter, hole.hole_limits, hole.hole, "budget")
+
+
+GENERAL = ((3.0, 0.1), (6.0, 0.1), (30.0, 0.2), (120.0, 0.3), (400.0, 0.5), (1000.0, 0.8))
+"""Upper end of a range of sizes and permissible deviation of class m, mm; ISO 2768-1:1989, Table 1."""
+
+
+def general_limits(nominal: float) -> tuple[float, float]:
+    """Deviations that ISO 2768-1, class m, permits a length without a tolerance of its own, mm."""
+    permitted = next((value for limit, value in GENERAL if nominal <= limit), GENERAL[-1][1])
+    return -permitted, permitted
 
 
 def _slides(parts: tuple[Part, ...]) -> list[Dimension]:
@@ -127,9 +161,16 @@ def _slides(parts: tuple[Part, ...]) -> list[Dimension]:
         block = below.body[-1]
         if isinstance(block, Tongue) and above.slot:
             clearance = above.slot.width - block.width
-            share = f"clearance {clearance:g} in all"
-            rows.append(Dimension(above.name, "slot", above.slot.width, share, "clearances"))
-            rows.append(Dimension(below.name, "block", block.width, share, "clearances"))
+            # The study's clearance is the middle one: slot and block share a quarter of it as their tolerance.
+            part_of = math.floor(clearance / 4 / 1e-4) * 1e-4
+            share = f"{{}}, clearance {clearance:g} with its mate"
+            slot, tongue = above.slot.width, block.width
+            rows.append(
+                Dimension(above.name, "slot", slot, share.format(f"+{part_of:.4g}/0"), "clearances", 0.0, part_of)
+            )
+            rows.append(
+                Dimension(below.name, "block", tongue, share.format(f"0/-{part_of:.4g}"), "clearances", -part_of, 0.0)
+            )
     return rows
 
 
@@ -149,7 +190,7 @@ def _location(
             text += f" over {spec['length_mm']:g}"
         rows.append(Dimension("assembly", name.replace("_", " "), None, text, f"contributor {name}"))
     if "wg_eccentricity" not in fed and ECCENTRICITY in bounds:
-        zone = f"coaxiality diameter {2 * bounds[ECCENTRICITY]:.4g}"
+        zone = f"axis within diameter {2 * bounds[ECCENTRICITY]:.4g}"
         if not (structure.passes_major or structure.passes_minor):
             zone = "free: the slides take it up"
         rows.append(Dimension("assembly", "profile to input axis", None, zone, ECCENTRICITY))

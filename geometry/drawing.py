@@ -19,7 +19,7 @@ import numpy as np
 from hdopt.geometry.arcs import outline_of_slot, sample
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.contour import Circle
-from hdopt.geometry.dimensions import ECCENTRICITY, TILTS
+from hdopt.geometry.dimensions import TILTS
 from hdopt.geometry.features import DBore, KeywayBore, polar
 from hdopt.geometry.part import Part, Prism
 from hdopt.geometry.sheet import SMALL, TEXT, Point, Sheet
@@ -35,7 +35,7 @@ from hdopt.geometry.views import (
 if TYPE_CHECKING:
     import cadquery as cq
 
-    from hdopt.geometry.export import Job
+    from hdopt.geometry.job import Job
 
 WIDTH, HEIGHT, BORDER = 420.0, 297.0, 10.0
 SCALES = (20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05)
@@ -94,7 +94,7 @@ def draw(job: Job) -> str:
         _title_block(sheet, job, scale)
     _front_view(sheet, front, made, job)
     _section(sheet, section, made, job)
-    _exploded(sheet, made)
+    draw_exploded(sheet, made)
     return sheet.svg()
 
 
@@ -129,7 +129,7 @@ def _border(sheet: Sheet) -> None:
     sheet.polyline([(BORDER, BORDER), (x, BORDER), (x, y), (BORDER, y)], "frame", closed=True)
 
 
-def _draw_view(sheet: Sheet, place: Placed, view: View) -> None:
+def draw_view(sheet: Sheet, place: Placed, view: View) -> None:
     for line in view.visible:
         sheet.polyline(place(line))
 
@@ -143,7 +143,7 @@ def _front_view(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], 
                 sheet.circle((x, y), place.scale * piece.outline.radius, "hidden")
         if part.slot and part.slot.closed:
             sheet.polyline(place(sample(outline_of_slot(part.slot))), "hidden", closed=True)
-    _draw_view(sheet, place, seen_from([solid for _, solid in made], *FRONT))
+    draw_view(sheet, place, seen_from([solid for _, solid in made], *FRONT))
     carrier = job.model.profiled[0]
     low_x, low_y, high_x, high_y = _extent(job.model.profiled)
     over = 5 / place.scale
@@ -187,16 +187,12 @@ def _profile_callout(sheet: Sheet, place: Placed, carrier: Part, job: Job, right
     sheet.line((x, y), (corner[0] - 2, corner[1] + 2.8))
     sheet.arrow((x, y), math.atan2(y - corner[1] - 2.8, x - corner[0] + 2))
     sheet.line((corner[0] - 2, corner[1] + 2.8), (corner[0], corner[1] + 2.8))
-    zone = f"{job.options.profile_tolerance_mm:g}"
-    sheet.frame(corner, "profile", zone)
+    zone = f"{job.model.profile_zone:g}"
+    sheet.frame(corner, "profile", zone, "B")
     rows = {dimension.source: dimension.tolerance for dimension in job.dimensions}
-    below = corner[1] + 5.6
-    if ECCENTRICITY in rows and "coaxiality" in rows[ECCENTRICITY]:
-        sheet.frame((corner[0], below), "coaxiality", "⌀" + rows[ECCENTRICITY].split()[-1], "B")
-        below += 5.6
     if TILTS[0] in rows:
         value = rows[TILTS[0]].removeprefix("parallelism ").replace(" over ", "/")
-        sheet.frame((corner[0], below), "parallelism", value, "B")
+        sheet.frame((corner[0], corner[1] + 5.6), "parallelism", value, "B")
 
 
 def _on_contour(part: Part, angle: float) -> Point:
@@ -252,7 +248,7 @@ def _section(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], job
         for region in section_at_minor_axis_zero(solid):
             sheet.region(place(region.outer), [place(hole) for hole in region.holes], fill)
     halves = [half_behind_minor_axis_zero(solid) for _, solid in made]
-    _draw_view(sheet, place, seen_from(halves, *FROM_LEFT))
+    draw_view(sheet, place, seen_from(halves, *FROM_LEFT))
     boxes = np.array([part.box for part, _ in made])
     low, high = boxes[:, 2].min(), boxes[:, 5].max()
     over = 5 / place.scale
@@ -304,15 +300,17 @@ def _holding_bore(sheet: Sheet, place: Placed, parts: Sequence[Part], left: floa
     sheet.datum((x, place.point(0, -radius)[1]), "B")
 
 
-def _exploded(sheet: Sheet, made: list[tuple[Part, cq.Solid]]) -> None:
-    """The parts pulled apart along the axis, with its line through them."""
+def draw_exploded(
+    sheet: Sheet, made: list[tuple[Part, cq.Solid]], centre: Point = EXPLODED_CENTRE, room: Point = EXPLODED_ROOM
+) -> None:
+    """The parts pulled apart along the axis, with their names, about `centre` within `room` (width, height), mm."""
     apart = pulled_apart(made)
     view = seen_from(apart, *EXPLODED)
     low_x, low_y, high_x, high_y = view.box
     high_y += 0.06 * (high_y - low_y)
-    scale = min(EXPLODED_ROOM[0] / (high_x - low_x), EXPLODED_ROOM[1] / (high_y - low_y))
+    scale = min(room[0] / (high_x - low_x), room[1] / (high_y - low_y))
     middle = ((low_x + high_x) / 2, (low_y + high_y) / 2)
-    place = Placed((EXPLODED_CENTRE[0] - scale * middle[0], EXPLODED_CENTRE[1] + scale * middle[1]), scale)
+    place = Placed((centre[0] - scale * middle[0], centre[1] + scale * middle[1]), scale)
     for line in view.visible:
         sheet.polyline(place(line), "thin")
     _names(sheet, place, made, apart)
@@ -391,10 +389,10 @@ def _title_block(sheet: Sheet, job: Job, scale: float) -> None:
     )
     for row, line in enumerate(lines):
         sheet.text((x + 4, y + 16 + 5.6 * row), line, SMALL + 0.2)
-    _first_angle(sheet, (x + width - 22, y + 9))
+    draw_first_angle(sheet, (x + width - 22, y + 9))
 
 
-def _first_angle(sheet: Sheet, at: Point) -> None:
+def draw_first_angle(sheet: Sheet, at: Point) -> None:
     """The symbol of first-angle projection (ISO 128)."""
     x, y = at
     sheet.polyline([(x - 10, y - 2), (x - 2, y - 4), (x - 2, y + 4), (x - 10, y + 2)], "thin", closed=True)

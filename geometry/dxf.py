@@ -14,7 +14,7 @@ from hdopt.geometry.check import PROFILE_TOLERANCE, CheckFailed
 from hdopt.geometry.contour import Circle, Contour
 
 if TYPE_CHECKING:
-    from hdopt.geometry.export import Job
+    from hdopt.geometry.job import Job
     from hdopt.geometry.part import Part
 
 MILLIMETRES = 4
@@ -63,7 +63,7 @@ def outlines(part: Part, zone: float, suffix: str = "") -> list[Outline]:
 
 def all_outlines(job: Job) -> list[Outline]:
     """The outlines of the cam, or of both discs with their names at the end of the layers'."""
-    parts, zone = job.model.profiled, job.options.profile_tolerance_mm
+    parts, zone = job.model.profiled, job.model.profile_zone
     if len(parts) == 1:
         return outlines(parts[0], zone)
     return [outline for part in parts for outline in outlines(part, zone, f"_{part.name.upper()}")]
@@ -92,7 +92,7 @@ def write_dxf(path: Path, job: Job) -> None:
         job.identity.title,
         job.identity.description,
         "mm; PROFILE is the cutting line, TOLERANCE_* bound the profile tolerance of "
-        f"{job.options.profile_tolerance_mm:g} mm; +y is the major axis",
+        f"{job.model.profile_zone:g} mm; +y is the major axis",
     )
     for row, text in enumerate(notes):
         place = (-reach, -reach - (2 * row + 2) * height)

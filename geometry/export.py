@@ -5,46 +5,21 @@ A file that has not passed its check never bears its name; a file of an earlier 
 
 from __future__ import annotations
 
-import hashlib
-import json
-import os
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, fields, is_dataclass
-from enum import Enum
-from functools import cached_property
-from importlib.metadata import version
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from hdopt.drive import Drive
+from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, MissingLibrary, unknown_name
-from hdopt.geometry.assembly import WaveGeneratorModel, wave_generator_model
-from hdopt.geometry.dimensions import Dimension, key_dimensions, tolerance_bounds
+from hdopt.files import replacing_all
+from hdopt.geometry.assembly import WaveGeneratorModel
+from hdopt.geometry.dimensions import Dimension
 from hdopt.geometry.formats import FORMATS
+from hdopt.geometry.job import make_job
+from hdopt.geometry.mating import MatingRow
+from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.step import Identity
-from hdopt.study.export import ExportSection
-
-if TYPE_CHECKING:
-    import cadquery as cq
-
-    from hdopt.geometry.part import Part
-    from hdopt.study import Study
-
-
-@dataclass(frozen=True)
-class Job:
-    """What every format needs to write its file: the model, its solids (built once), and what the files say."""
-
-    drive: Drive
-    model: WaveGeneratorModel
-    options: ExportSection
-    dimensions: tuple[Dimension, ...]
-    identity: Identity
-
-    @cached_property
-    def solids(self) -> tuple[tuple[Part, cq.Solid], ...]:
-        return tuple((part, part.build()) for part in self.model.parts)
 
 
 @dataclass(frozen=True)
@@ -56,6 +31,9 @@ class ExportResult:
     model: WaveGeneratorModel
     dimensions: tuple[Dimension, ...]
     identity: Identity
+    mating: tuple[MatingRow, ...]
+    replaced: tuple[str, ...] = ()
+    """Kinds of file of which an earlier one bore the name."""
 
     @property
     def profile_deviation_um(self) -> float | None:
@@ -73,10 +51,13 @@ class ExportResult:
         return {
             "file": str(self.files.get("step", first)) if self.files else None,
             "files": {kind: str(path) for kind, path in self.files.items()},
+            "replaced": list(self.replaced),
             "structure": self.model.structure.value,
             "parts": parts,
             "max_profile_deviation_um": self.profile_deviation_um,
             "dimensions": [dimension.to_dict() for dimension in self.dimensions],
+            "mating": [row.to_dict() for row in self.mating],
+            "budgets": [budget.to_dict() for budget in self.model.plan.budgets],
             "checks": dict(self.checks),
             "assumptions": {assumption.key: assumption.value for assumption in self.model.assumptions},
             "notes": list(self.model.notes),
@@ -84,61 +65,40 @@ class ExportResult:
         }
 
 
-def export(
-    study: Study, files: Mapping[str, str | Path], tolerances: Mapping[str, float] | None = None
-) -> ExportResult:
-    """Write a study's wave generator to `files` (a key of `FORMATS` -> path) and check each file from disk.
-
-    `tolerances` are those of an allocation, by study key (mm or deg) or contributor; without them the study's own hold.
-    Raises `HdoptError` for input that cannot be made, and `hdopt.geometry.check.CheckFailed` where a file fails its
-    check: then no file of this export is left.
-    """
-    section = study.sections.get("export", ExportSection())
-    bounds = {**tolerance_bounds(study.data), **(tolerances or {})}
-    return export_drive(study.drive, files, section, study.name, bounds, study.data.get("contributors"))
-
-
 def export_drive(
     drive: Drive,
     files: Mapping[str, str | Path],
-    options: ExportSection | None = None,
+    options: ExportOptions | None = None,
     name: str = "wave generator",
     bounds: Mapping[str, float] | None = None,
     contributors: Mapping[str, Any] | None = None,
 ) -> ExportResult:
-    """The same for a drive at hand; `name` is what the files call their study."""
-    options = options or ExportSection()
+    """Write a drive's wave generator to `files` (a key of `FORMATS` -> path) and check each file from disk.
+
+    `name` is what the files call their study; `bounds` are tolerances by study key (mm or deg) or contributor, and
+    `contributors` the study's callouts. Raises `HdoptError` for input that cannot be made, and
+    `hdopt.geometry.check.CheckFailed` where a file fails its check: then no file of this export is left.
+    """
+    options = options or ExportOptions()
     for kind in files:
         if kind not in FORMATS:
             raise HdoptError(unknown_name("file format", kind, FORMATS))
     targets = {kind: Path(path) for kind, path in files.items()}
     if len({path.resolve() for path in targets.values()}) < len(targets):
         raise HdoptError("two files of the export have the same name; give each its own")
+    _require_suffixes(targets)
     job = make_job(drive, options, name, bounds, contributors)
     if any(FORMATS[kind].needs_solids for kind in targets):
         require_cadquery()
     checks = {}
-    with staged(targets) as passing:
+    replaced = tuple(kind for kind, path in targets.items() if path.exists())
+    with replacing_all(targets.values()) as paths:
+        passing = dict(zip(targets, paths, strict=True))
         for kind, path in passing.items():
             FORMATS[kind].write(path, job)
         for kind, path in passing.items():
             checks[kind] = FORMATS[kind].check(path, job, targets[kind].name)
-    return ExportResult(targets, checks, job.model, job.dimensions, job.identity)
-
-
-def make_job(
-    drive: Drive,
-    options: ExportSection,
-    name: str,
-    bounds: Mapping[str, float] | None = None,
-    contributors: Mapping[str, Any] | None = None,
-) -> Job:
-    """Everything that is known before a solid is made: the parts, their key dimensions, and what files will say."""
-    model = wave_generator_model(drive, options)
-    identity = Identity(f"wave generator {name}", name, fingerprint(drive, options), version("hdopt"))
-    width, zone = drive.wave_generator.width, options.profile_tolerance_mm
-    table = key_dimensions(model.structure, model.parts, width, zone, bounds or {}, contributors)
-    return Job(drive, model, options, table, identity)
+    return ExportResult(targets, checks, job.model, job.dimensions, job.identity, job.mating, replaced)
 
 
 def require_cadquery() -> None:
@@ -151,46 +111,11 @@ def require_cadquery() -> None:
         ) from error
 
 
-def fingerprint(drive: Drive, options: ExportSection) -> str:
-    """Twelve digits that change with any number the solids are made from."""
-    plain = json.dumps([_plain(drive.wave_generator), _plain(drive.clearances), options.model_dump()], sort_keys=True)
-    return hashlib.sha256(plain.encode()).hexdigest()[:12]
-
-
-def _plain(value: Any) -> Any:
-    if is_dataclass(value):
-        numbers = {field.name: getattr(value, field.name) for field in fields(value) if not field.name.startswith("_")}
-        value = {"kind": type(value).__name__, **numbers}
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, Enum):
-        return value.value
-    return value.tolist() if hasattr(value, "tolist") else value
-
-
-@contextmanager
-def staged(targets: Mapping[str, Path]) -> Iterator[dict[str, Path]]:
-    """Passing names beside the targets; they become the targets' at the end, all of them, unless anything fails."""
-    passing = {kind: path.with_name(f".{path.name}.unchecked-{os.getpid()}") for kind, path in targets.items()}
-    try:
-        for kind, path in passing.items():
-            _require_writable(path, targets[kind])
-        yield passing
-        for kind, path in passing.items():
-            os.replace(path, targets[kind])
-    finally:
-        for path in passing.values():
-            if path.exists():
-                path.unlink()
-
-
-def _require_writable(passing: Path, target: Path) -> None:
-    """Create the passing file, or say in one sentence why that cannot be done."""
-    if target.is_dir():
-        raise HdoptError(f"cannot write {target}: it is a folder; give the name of a file")
-    try:
-        passing.touch()
-    except OSError as error:
-        raise HdoptError(
-            f"cannot write {target}: {error.strerror}; give a file in a folder that exists and can be written"
-        ) from error
+def _require_suffixes(targets: Mapping[str, Path]) -> None:
+    """Each file bears the suffix of its kind."""
+    for kind, path in targets.items():
+        allowed = FORMATS[kind].suffixes
+        if path.suffix.lower() not in allowed:
+            raise HdoptError(
+                f"--{kind} {path.name} does not end in {' or '.join(allowed)}; give it the suffix of what it will hold"
+            )

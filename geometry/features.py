@@ -162,7 +162,9 @@ class DBore:
 
 
 def countersink_volume(bore: Bore, size: float) -> float:
-    """Volume that a 45 degree countersink of `size` mm takes off beyond the bore itself."""
+    """Volume that a 45 degree countersink of `size` mm takes off beyond the bore itself; none where `size` is 0."""
+    if size == 0:
+        return 0.0
     plain = bore.area_with_disc(0.0)
     shares, weights = (1 + _GAUSS_NODES) / 2, _GAUSS_WEIGHTS / 2
     volume = 0.0

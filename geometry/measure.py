@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from hdopt.drive.profiles import MeasuredProfile, TwoDisk
 from hdopt.errors import HdoptError
 from hdopt.geometry.step import StepFile
 from hdopt.geometry.surface import walls
-from hdopt.profiles import MeasuredProfile, TwoDisk
 
 SHARES = tuple((k + 0.5) / 8 for k in range(8))
 """Where each span of the wall is measured: close enough to follow a tip whose curvature has a corner (Resal)."""
@@ -61,7 +61,7 @@ def _offset_wall(file: StepFile, name: str, distance: float) -> NDArray[np.float
     curve = CubicSpline(closed, np.concatenate([level, level[:1]]), bc_type="periodic")
     tangent = curve(angle, 1)
     normal = np.stack([-tangent[:, 1], tangent[:, 0]], 1) / np.hypot(*tangent.T)[:, None]
-    return level + distance * normal
+    return np.asarray(level + distance * normal)
 
 
 def _as_profile(points: NDArray[np.float64], file: StepFile) -> MeasuredProfile:

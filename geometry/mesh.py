@@ -15,7 +15,7 @@ from hdopt.geometry.check import CheckFailed
 if TYPE_CHECKING:
     import cadquery as cq
 
-    from hdopt.geometry.export import Job
+    from hdopt.geometry.job import Job
     from hdopt.geometry.part import Part
 
 CHORD = 0.005
@@ -122,8 +122,8 @@ def check_3mf(path: Path, job: Job, name: str) -> dict[str, Any]:
         item = objects.get(part.name)
         if item is None:
             continue
-        vertices = np.array([[float(v.get(axis)) for axis in "xyz"] for v in item.iter(f"{{{CORE}}}vertex")])
-        indices = [[int(t.get(f"v{k}")) for k in (1, 2, 3)] for t in item.iter(f"{{{CORE}}}triangle")]
+        vertices = np.array([[float(v.get(axis, "nan")) for axis in "xyz"] for v in item.iter(f"{{{CORE}}}vertex")])
+        indices = [[int(t.get(f"v{k}", "0")) for k in (1, 2, 3)] for t in item.iter(f"{{{CORE}}}triangle")]
         count += len(indices)
         failures += _faults(vertices[np.array(indices)], [part], job, part.name)
     if failures:

@@ -148,12 +148,14 @@ class Part:
             already = self.bore.area_in_strip(self.slot.width) if self.bore else 0.0
             volume -= (self.slot.area - already) * self.slot.depth
         if self.bolts:
-            volume -= self.bolts.area * sum(piece.height for piece in self.body if self._holds_bolts(piece))
+            volume -= self.bolts.area * sum(piece.height for piece in self.body if self.holds_bolts(piece))
         return volume
 
-    def _holds_bolts(self, piece: Prism | Tongue) -> bool:
+    def holds_bolts(self, piece: Prism | Tongue) -> bool:
         """Whether the bolt holes lie in this piece (they pass beside a hub's seat)."""
-        return isinstance(piece, Prism) and piece.outline.least_radius >= self.bolts.radius + self.bolts.hole / 2
+        if self.bolts is None or isinstance(piece, Tongue):
+            return False
+        return piece.outline.least_radius >= self.bolts.radius + self.bolts.hole / 2
 
     @property
     def box(self) -> tuple[float, float, float, float, float, float]:
@@ -161,7 +163,7 @@ class Part:
         boxes = [piece.outline.box for piece in self.body if isinstance(piece, Prism)]
         low = [min(box[axis] for box in boxes) for axis in (0, 1)]
         high = [max(box[axis] for box in boxes) for axis in (2, 3)]
-        return (*low, self.bottom, *high, self.top)
+        return low[0], low[1], self.bottom, high[0], high[1], self.top
 
     @property
     def size(self) -> tuple[float, float, float]:

@@ -20,7 +20,7 @@ from hdopt.geometry.views import sharp_edges
 if TYPE_CHECKING:
     import cadquery as cq
 
-    from hdopt.geometry.export import Job
+    from hdopt.geometry.job import Job
     from hdopt.geometry.part import Part
 
 LEAST_COLOURS = 20

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
+Numbers = NDArray[Any]
+"""Points, indices or colours; VTK's own objects have no types."""
 
 SIZE = (1600, 1000)
 EDGE_COLOUR = (0.10, 0.13, 0.17)
@@ -44,7 +49,7 @@ def render(scene: str, picture: str) -> None:
     writer.Write()
 
 
-def _surface(vertices: np.ndarray, corners: np.ndarray, colour: np.ndarray):
+def _surface(vertices: Numbers, corners: Numbers, colour: Numbers) -> Any:
     from vtkmodules.vtkFiltersCore import vtkPolyDataNormals
     from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
@@ -66,7 +71,7 @@ def _surface(vertices: np.ndarray, corners: np.ndarray, colour: np.ndarray):
     return actor
 
 
-def _edges(points: np.ndarray, lengths: np.ndarray):
+def _edges(points: Numbers, lengths: Numbers) -> Any:
     from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
     data = _poly_data(points)
@@ -84,7 +89,7 @@ def _edges(points: np.ndarray, lengths: np.ndarray):
     return actor
 
 
-def _poly_data(points: np.ndarray):
+def _poly_data(points: Numbers) -> Any:
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkPolyData
@@ -96,7 +101,7 @@ def _poly_data(points: np.ndarray):
     return data
 
 
-def _cells(indices: np.ndarray, lengths: np.ndarray):
+def _cells(indices: Numbers, lengths: Numbers) -> Any:
     from vtkmodules.util.numpy_support import numpy_to_vtkIdTypeArray
     from vtkmodules.vtkCommonDataModel import vtkCellArray
 
@@ -108,7 +113,7 @@ def _cells(indices: np.ndarray, lengths: np.ndarray):
     return cells
 
 
-def _lights(renderer) -> None:
+def _lights(renderer: Any) -> None:
     from vtkmodules.vtkRenderingCore import vtkLight
 
     renderer.AutomaticLightCreationOff()
@@ -120,7 +125,7 @@ def _lights(renderer) -> None:
         renderer.AddLight(light)
 
 
-def _look(renderer, eye: np.ndarray) -> None:
+def _look(renderer: Any, eye: Numbers) -> None:
     camera = renderer.GetActiveCamera()
     camera.ParallelProjectionOn()
     camera.SetFocalPoint(0, 0, 0)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hdopt.errors import HdoptError
 
 if TYPE_CHECKING:
     import cadquery as cq
+    from OCP.TDocStd import TDocStd_Document
 
+    from hdopt.geometry.callouts import Callout
     from hdopt.geometry.part import Colour, Part
 
 SCHEMAS = {"AP214": ("AP214IS", "AUTOMOTIVE_DESIGN"), "AP242": ("AP242DIS", "AP242_MANAGED_MODEL_BASED_3D_ENGINEERING")}
@@ -54,35 +56,69 @@ class StepFile:
     parts: tuple[StepPart, ...]
 
 
-def write_step(path: Path, parts: Sequence[tuple[Part, cq.Solid]], identity: Identity, schema: str = "AP214") -> None:
-    """Write an assembly of named, coloured parts, in mm."""
+@dataclass(frozen=True)
+class ProductData:
+    """What a file says of one part beside its shape: number, material, density (kg/mm^3), tolerances of its faces."""
+
+    number: str
+    material: str
+    density: float
+    callouts: tuple[Callout, ...] = ()
+
+
+def write_step(
+    path: Path,
+    parts: Sequence[tuple[Part, cq.Solid]],
+    identity: Identity,
+    schema: str = "AP214",
+    products: Mapping[str, ProductData] | None = None,
+) -> None:
+    """Write an assembly of named, coloured parts, in mm; with `products`, by part, their data and tolerances too."""
     import cadquery as cq
     from cadquery.occ_impl.assembly import toCAF
-    from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
     from OCP.IFSelect import IFSelect_ReturnStatus
     from OCP.Interface import Interface_Static
-    from OCP.STEPCAFControl import STEPCAFControl_Writer
+    from OCP.STEPCAFControl import STEPCAFControl_Controller, STEPCAFControl_Writer
     from OCP.STEPControl import STEPControl_StepModelType
-    from OCP.TCollection import TCollection_HAsciiString
     from OCP.XSControl import XSControl_WorkSession
 
     assembly = cq.Assembly(name=_ascii(identity.title))
     for part, solid in parts:
         assembly.add(solid, name=part.name, color=cq.Color(*part.colour))
     _, document = toCAF(assembly, True)
+    for part, _ in parts:
+        if products and part.name in products:
+            _add_product(document, part.name, products[part.name])
 
-    Interface_Static.SetCVal_s("write.step.schema", SCHEMAS[schema][0])
-    Interface_Static.SetCVal_s("write.step.unit", "MM")
-    Interface_Static.SetCVal_s("xstep.cascade.unit", "MM")
+    # The controller registers the parameters when it is made: set before that, they are lost.
+    STEPCAFControl_Controller.Init_s()
+    parameters = {"write.step.schema": SCHEMAS[schema][0], "write.step.unit": "MM", "xstep.cascade.unit": "MM"}
+    for name, value in parameters.items():
+        if not Interface_Static.SetCVal_s(name, value):
+            raise RuntimeError(f"Open CASCADE does not know the parameter {name}")
     # Curves on surfaces repeat what the surfaces say and double the file; readers make them anew.
-    Interface_Static.SetIVal_s("write.surfacecurve.mode", 0)
+    if not Interface_Static.SetIVal_s("write.surfacecurve.mode", 0):
+        raise RuntimeError("Open CASCADE does not know the parameter write.surfacecurve.mode")
     writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
     writer.SetColorMode(True)
     writer.SetNameMode(True)
+    writer.SetDimTolMode(bool(products))
+    writer.SetMaterialMode(bool(products))
     if not writer.Transfer(document, STEPControl_StepModelType.STEPControl_AsIs):
         raise RuntimeError("Open CASCADE could not translate the parts to STEP")
 
-    header = APIHeaderSection_MakeHeader(writer.ChangeWriter().Model())
+    _number_products(writer.ChangeWriter().Model(), products or {})
+    _write_header(writer.ChangeWriter().Model(), identity)
+    if writer.Write(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
+        raise HdoptError(f"cannot write {path}; give a file in a folder that can be written")
+
+
+def _write_header(model: Any, identity: Identity) -> None:
+    """What the file says of its origin."""
+    from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
+    from OCP.TCollection import TCollection_HAsciiString
+
+    header = APIHeaderSection_MakeHeader(model)
 
     def text(value: str) -> TCollection_HAsciiString:
         return TCollection_HAsciiString(_ascii(value))
@@ -93,8 +129,43 @@ def write_step(path: Path, parts: Sequence[tuple[Part, cq.Solid]], identity: Ide
     header.SetOrganizationValue(1, text(""))
     header.SetOriginatingSystem(text(f"hdopt {identity.version}"))
     header.SetAuthorisation(text(""))
-    if writer.Write(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
-        raise HdoptError(f"cannot write {path}; give a file in a folder that can be written")
+
+
+def _add_product(document: TDocStd_Document, name: str, product: ProductData) -> None:
+    """Material and tolerances of a part."""
+    from OCP.TCollection import TCollection_HAsciiString
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+    from hdopt.geometry.semantic import annotate, shape_label
+
+    label = shape_label(document, name)
+    names = [
+        TCollection_HAsciiString(_ascii(text))
+        for text in (
+            product.material,
+            "assumed where the study names none",
+            "density measure",
+            "POSITIVE_RATIO_MEASURE",
+        )
+    ]
+    # XCAF counts in g/cm^3.
+    XCAFDoc_DocumentTool.MaterialTool_s(document.Main()).SetMaterial(
+        label, names[0], names[1], 1e6 * product.density, names[2], names[3]
+    )
+    annotate(document, label, product.callouts)
+
+
+def _number_products(model: Any, products: Mapping[str, ProductData]) -> None:
+    """The products' identifiers are their part numbers, their descriptions the material; their names stay."""
+    from OCP.StepBasic import StepBasic_Product
+    from OCP.TCollection import TCollection_HAsciiString
+
+    for index in range(1, model.NbEntities() + 1):
+        entity = model.Value(index)
+        if isinstance(entity, StepBasic_Product) and entity.Name().ToCString() in products:
+            product = products[entity.Name().ToCString()]
+            entity.SetId(TCollection_HAsciiString(_ascii(product.number)))
+            entity.SetDescription(TCollection_HAsciiString(_ascii(product.material)))
 
 
 def read_step(path: Path) -> StepFile:

@@ -6,7 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +39,7 @@ class Wall:
 
 def walls(solid: cq.Solid, shares: Sequence[float] = BETWEEN) -> list[Wall]:
     """The rings of upright faces joined to each other, as points at these shares of spline spans; widest first."""
-    upright = [face for face in (face.wrapped for face in solid.Faces()) if _is_upright(face)]
+    upright = [face for face in (face.wrapped for face in solid.Faces()) if is_upright(face)]
     rings = [Wall(np.concatenate([_wall_points(face, shares) for face in ring])) for ring in _rings(upright)]
     return sorted(rings, key=lambda wall: -np.ptp(wall.points[:, 1]))
 
@@ -64,14 +64,14 @@ def face_points(solid: cq.Solid, per_side: int = 5) -> NDArray[np.float64]:
     return np.array(points)
 
 
-def _is_upright(face: TopoDS_Face) -> bool:
+def is_upright(face: TopoDS_Face) -> bool:
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_SurfaceType
     from OCP.gp import gp_Pnt, gp_Vec
 
     surface = BRepAdaptor_Surface(face)
     if surface.GetType() == GeomAbs_SurfaceType.GeomAbs_Plane:
-        return abs(surface.Plane().Axis().Direction().Z()) < UPRIGHT
+        return bool(abs(surface.Plane().Axis().Direction().Z()) < UPRIGHT)
     u0, u1, v0, v1 = _bounds(face)
     for u in (0.2, 0.7):
         for v in (0.2, 0.7):
@@ -120,7 +120,7 @@ def _wall_points(face: TopoDS_Face, shares: Sequence[float]) -> NDArray[np.float
     return np.array([(p.X(), p.Y(), p.Z()) for p in points])
 
 
-def _samples(surface, axis: str, low: float, high: float, shares: Sequence[float]) -> list[float]:
+def _samples(surface: Any, axis: str, low: float, high: float, shares: Sequence[float]) -> list[float]:
     """Parameters between the knots of a spline surface; evenly spread on any other."""
     from OCP.GeomAbs import GeomAbs_SurfaceType
 
@@ -131,10 +131,12 @@ def _samples(surface, axis: str, low: float, high: float, shares: Sequence[float
     else:
         knots = np.linspace(low, high, SPANS_OF_A_CYLINDER + 1 if axis == "U" else 2)
     knots = np.unique(np.clip(knots, low, high))
-    return (knots[:-1, None] + np.diff(knots)[:, None] * np.array(shares)).ravel().tolist()
+    between = knots[:-1, None] + np.diff(knots)[:, None] * np.array(shares)
+    return [float(value) for value in between.ravel()]
 
 
 def _bounds(face: TopoDS_Face) -> tuple[float, float, float, float]:
     from OCP.BRepTools import BRepTools
 
-    return BRepTools.UVBounds_s(face)
+    u0, u1, v0, v1 = BRepTools.UVBounds_s(face)
+    return u0, u1, v0, v1

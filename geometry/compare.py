@@ -1,0 +1,168 @@
+"""A measured cam against the one that was designed: best fit, deviations along the normal, verdict."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.errors import HdoptError
+from hdopt.files import read_text
+from hdopt.geometry.contour import Circle, Contour
+
+Array = NDArray[np.float64]
+
+POLAR, CARTESIAN = ("angle_deg", "radius_mm"), ("x_mm", "y_mm")
+FEWEST_POINTS = 16
+LARGEST_GAP = math.radians(30)
+FARTHEST = 1.0
+"""A point farther from the cam than this, mm, is not of it."""
+
+
+@dataclass(frozen=True)
+class CamFit:
+    """A measured cam laid onto the nominal one.
+
+    `rotation` rad clockwise and `shift` (x, y) mm are what the measured cam is turned and moved by against the nominal
+    one; `angles` (rad, clockwise from the major axis) and `deviations` (mm along the normal, positive outside) are
+    those of every point after both are taken away, in the order of the angles. `points` (n, 2), mm, are the surface
+    itself, less the probe, turned back but not moved: as it lies about the axis that it was measured from.
+    """
+
+    rotation: float
+    shift: tuple[float, float]
+    angles: Array
+    deviations: Array
+    points: Array
+
+    @property
+    def largest(self) -> float:
+        """Largest deviation, mm."""
+        return float(np.abs(self.deviations).max())
+
+    @property
+    def rms(self) -> float:
+        """Root mean square deviation, mm."""
+        return float(np.sqrt(np.mean(self.deviations**2)))
+
+    @property
+    def noise(self) -> float:
+        """Scatter of a single point, mm, from second differences (a smooth error of form has almost none)."""
+        second = np.roll(self.deviations, 1) - 2 * self.deviations + np.roll(self.deviations, -1)
+        return float(np.sqrt(np.mean(second**2) / 6))
+
+
+def read_cam(path: Path) -> Array:
+    """Points (n, 2), mm, of a CSV with columns angle_deg,radius_mm (clockwise from the major axis) or x_mm,y_mm.
+
+    `#` starts a comment; further columns are left alone. Raises `HdoptError` with the line of what cannot be used.
+    """
+    lines = [
+        (number, line)
+        for number, line in enumerate(read_text(path, "a CSV of a measured cam").splitlines(), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    header = [cell.strip() for cell in next(csv.reader([lines[0][1]]))] if lines else []
+    kind = next((names for names in (POLAR, CARTESIAN) if set(names) <= set(header)), None)
+    if kind is None:
+        raise HdoptError(
+            f"{path}: its first line must name the columns {','.join(POLAR)} or {','.join(CARTESIAN)}; add it"
+        )
+    columns = [header.index(name) for name in kind]
+    values = []
+    for number, line in lines[1:]:
+        cells = next(csv.reader([line]))
+        try:
+            row = [float(cells[column]) for column in columns]
+        except (ValueError, IndexError):
+            raise HdoptError(f"{path}, line {number}: does not hold {' and '.join(kind)} as numbers") from None
+        if not all(math.isfinite(value) for value in row):
+            raise HdoptError(f"{path}, line {number}: holds a number that is not finite; leave the point out")
+        values.append(row)
+    if len(values) < FEWEST_POINTS:
+        raise HdoptError(f"{path} has {len(values)} points; at least {FEWEST_POINTS} are needed")
+    table = np.array(values)
+    if kind is CARTESIAN:
+        return table
+    angle = np.radians(table[:, 0])
+    return np.column_stack([table[:, 1] * np.sin(angle), table[:, 1] * np.cos(angle)])
+
+
+def fit_cam(points: Array, contour: Contour, probe_radius: float = 0.0) -> CamFit:
+    """Turn and move measured points onto a contour so that the sum of squared deviations is least.
+
+    `points` of shape (n, 2), mm, are centres of a ball of `probe_radius` mm that touches the cam from outside (0: they
+    are on the surface). Raises `HdoptError` where points are missing over more than 30 degrees or are not of this cam.
+    """
+    from scipy.optimize import least_squares
+
+    if not 0 <= probe_radius < math.inf:
+        raise HdoptError(f"the probe radius is {probe_radius:g} mm; it must be a finite number, 0 or above")
+    turns = not isinstance(contour, Circle)
+
+    def moved(x: Array) -> Array:
+        sin, cos = math.sin(x[2]), math.cos(x[2])
+        # Turned back counter-clockwise by the rotation, for angles count clockwise.
+        away = points - x[:2]
+        return np.column_stack([away[:, 0] * cos - away[:, 1] * sin, away[:, 0] * sin + away[:, 1] * cos])
+
+    def residuals(x: Array) -> Array:
+        return contour.deviation(moved(np.append(x, [0.0] * (3 - len(x))))) - probe_radius
+
+    middle = np.array([0.0, contour.offset]) if isinstance(contour, Circle) else np.zeros(2)
+    _require_all_round(points - points.mean(0))
+    starts = [0.0, math.pi / 2] if turns else [0.0]
+    fits = []
+    for start in starts:
+        guess = [*(points.mean(0) - middle), start] if turns else [*(points.mean(0) - middle)]
+        fits.append(least_squares(residuals, guess, x_scale=[0.01, 0.01, 0.01][: len(guess)], xtol=1e-14, ftol=1e-14))
+    best = np.append(min(fits, key=lambda fit: fit.cost).x, [0.0] * (not turns))
+    # Half a turn is no difference to a cam with two like lobes.
+    best[2] = (best[2] + math.pi / 2) % math.pi - math.pi / 2 if turns else 0.0
+    at = moved(best)
+    deviation = residuals(best)
+    if np.abs(deviation).max() > FARTHEST:
+        raise HdoptError(
+            f"the points lie up to {np.abs(deviation).max():.4g} mm off the cam of this study; give its own "
+            "measurement, the probe's radius (--probe-radius-mm), or --surface bearing"
+        )
+    angle = np.mod(np.arctan2(at[:, 0], at[:, 1]), 2 * math.pi)
+    order = np.argsort(angle)
+    surface = at - probe_radius * _normals(at, contour)
+    sin, cos = math.sin(best[2]), math.cos(best[2])
+    shift = np.array([best[0] * cos - best[1] * sin, best[0] * sin + best[1] * cos])
+    return CamFit(
+        float(best[2]), (float(shift[0]), float(shift[1])), angle[order], deviation[order], (surface + shift)[order]
+    )
+
+
+def _normals(points: Array, contour: Contour) -> Array:
+    """Outward unit normals (n, 2) of the contour's parallel through each point: the gradient of its deviation."""
+    step = 1e-5
+    gradient = [
+        (contour.deviation(points + move) - contour.deviation(points - move)) / (2 * step)
+        for move in (np.array([step, 0.0]), np.array([0.0, step]))
+    ]
+    normal = np.column_stack(gradient)
+    return np.asarray(normal / np.hypot(*normal.T)[:, None])
+
+
+def _require_all_round(points: Array) -> None:
+    angle = np.sort(np.mod(np.arctan2(points[:, 0], points[:, 1]), 2 * math.pi))
+    gap = float(np.diff(np.append(angle, angle[0] + 2 * math.pi)).max())
+    if gap > LARGEST_GAP:
+        raise HdoptError(
+            f"the points leave {math.degrees(gap):.3g} deg of the cam out; gaps of up to "
+            f"{math.degrees(LARGEST_GAP):g} deg are allowed: measure all round"
+        )
+
+
+def table_of(fit: CamFit) -> list[dict[str, Any]]:
+    """One row a point: angle in degrees, deviation in um."""
+    rows = zip(np.degrees(fit.angles).tolist(), (1e3 * fit.deviations).tolist(), strict=True)
+    return [{"angle_deg": angle, "deviation_um": deviation} for angle, deviation in rows]

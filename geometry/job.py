@@ -1,0 +1,83 @@
+"""One export before any file is written: the parts, their key dimensions, and what the files say of their origin."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, is_dataclass
+from enum import Enum
+from functools import cached_property
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+from hdopt.drive.geometry import Drive
+from hdopt.geometry.assembly import WaveGeneratorModel, wave_generator_model
+from hdopt.geometry.budget import bounds_from
+from hdopt.geometry.dimensions import Dimension, key_dimensions
+from hdopt.geometry.mating import MatingRow, mating_rows
+from hdopt.geometry.options import ExportOptions
+from hdopt.geometry.part import Part
+from hdopt.geometry.step import Identity
+
+if TYPE_CHECKING:
+    import cadquery as cq
+
+
+@dataclass(frozen=True)
+class Job:
+    """What every format needs to write its file: the model, its solids (built once), and what the files say."""
+
+    drive: Drive
+    model: WaveGeneratorModel
+    options: ExportOptions
+    dimensions: tuple[Dimension, ...]
+    identity: Identity
+    bounds: Mapping[str, float]
+    contributors: Mapping[str, Mapping[str, Any]]
+
+    @cached_property
+    def solids(self) -> tuple[tuple[Part, cq.Solid], ...]:
+        return tuple((part, part.build()) for part in self.model.parts)
+
+    @property
+    def mating(self) -> tuple[MatingRow, ...]:
+        """What the parts around the wave generator must keep."""
+        return mating_rows(self.drive, self.model, self.bounds, self.contributors)
+
+    @property
+    def made(self) -> tuple[tuple[Part, cq.Solid], ...]:
+        """The solids of the parts that are made, without their surroundings."""
+        return tuple((part, solid) for part, solid in self.solids if not part.context)
+
+
+def make_job(
+    drive: Drive,
+    options: ExportOptions,
+    name: str,
+    bounds: Mapping[str, float] | None = None,
+    contributors: Mapping[str, Any] | None = None,
+) -> Job:
+    """Everything that is known before a solid is made: the parts, their key dimensions, and what files will say."""
+    bounds, contributors = bounds or {}, contributors or {}
+    model = wave_generator_model(drive, options, bounds_from(bounds, contributors))
+    identity = Identity(f"wave generator {name}", name, fingerprint(drive, options), version("hdopt"))
+    table = key_dimensions(model, drive.wave_generator.width, bounds, contributors)
+    return Job(drive, model, options, table, identity, bounds, contributors)
+
+
+def fingerprint(drive: Drive, options: ExportOptions) -> str:
+    """Twelve digits that change with any number the solids are made from."""
+    plain = json.dumps([_plain(drive.wave_generator), _plain(drive.clearances), asdict(options)], sort_keys=True)
+    return hashlib.sha256(plain.encode()).hexdigest()[:12]
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value):
+        numbers = {field.name: getattr(value, field.name) for field in fields(value) if not field.name.startswith("_")}
+        value = {"kind": type(value).__name__, **numbers}
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, Enum):
+        return value.value
+    return value.tolist() if hasattr(value, "tolist") else value
