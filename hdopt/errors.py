@@ -22,11 +22,40 @@ class MissingLibrary(HdoptError):
     """A library of the system is needed that this machine lacks. The message names its package."""
 
 
+MOST_LINES = 3
+LONGEST_LINE = 600
+LONGEST_NAME = 60
+
+
+def in_brief(message: str, lines: int = MOST_LINES) -> str:
+    """`message` in at most `lines` lines of bounded length, with control characters written out: whatever came in."""
+    kept = message.split("\n")
+    if len(kept) > lines:
+        kept = [*kept[: lines - 1], f"and {len(kept) - lines + 1} more faults of this kind"]
+    return "\n".join(_shortened(_printable(line), LONGEST_LINE) for line in kept)
+
+
+def shown(text: str) -> str:
+    """`text`, a name or a value from outside, in quotes; short whatever its length."""
+    return repr(_shortened(text, LONGEST_NAME))
+
+
+def _shortened(text: str, most: int) -> str:
+    if len(text) <= most:
+        return text
+    half = (most - 5) // 2
+    return f"{text[:half]} ... {text[-half:]}"
+
+
+def _printable(line: str) -> str:
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
+
+
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
-    """'unknown KIND 'NAME'', with the nearest known one, or all of them where none is near."""
+    """'unknown `kind` `name`', with the nearest of the `known`, or all of them where none is near."""
     import difflib
 
     known = list(known)
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
+    near = difflib.get_close_matches(name[:LONGEST_NAME], known, n=1, cutoff=0.6)
     hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(map(str, known))}"
-    return f"unknown {kind} {name!r}; {hint}"
+    return f"unknown {kind} {shown(name)}; {hint}"

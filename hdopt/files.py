@@ -1,14 +1,37 @@
-"""How results leave the program: JSON that every reader accepts, and files whose failure is one sentence."""
+"""How bytes come in and go out: text and JSON read with a message for every fault, outputs written whole or not at all.
+
+An output gets a passing name in its own folder, reaches the disk, and only then takes its name: whoever looks sees the
+old file or the new one. A symbolic link is followed (the link stays, its target changes); a device, pipe or socket is
+written to as it is.
+"""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+import os
+import secrets
+import stat
+import tempfile
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from hdopt.errors import HdoptError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+LARGEST_TEXT = 16 * 2**20
+"""Bytes of the largest study file or JSON input; real ones have a few thousand."""
+STREAMS = ("/dev/fd/", "/dev/stdout", "/dev/stderr", "/proc/self/fd/")
+"""Names of open streams: where one leads to a plain file, that file is still written through the stream."""
+PASSING = ".hdopt-passing"
+"""End of the names that files bear until they are whole."""
 
 
 def to_json(result: Mapping[str, Any]) -> str:
@@ -28,19 +51,293 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a text file, or say in one sentence why that cannot be done."""
+@dataclass
+class FilesOfWork:
+    """Which files one piece of work reads and which it is going to write: none may be both."""
+
+    inputs: dict[Path, str] = field(default_factory=dict)
+    """Real path -> SHA-256 of what was read."""
+    outputs: dict[Path, Path] = field(default_factory=dict)
+    """Real path -> the name it was given by."""
+    began: float = field(default_factory=time.time)
+    facts: dict[str, str] = field(default_factory=dict)
+    """What else is to be known of the work: its study and that one's hash."""
+
+
+_of_work: ContextVar[FilesOfWork | None] = ContextVar("hdopt_files_of_work", default=None)
+
+
+@contextmanager
+def watching_files() -> Iterator[FilesOfWork]:
+    """Note which files are read and written meanwhile; an output that is an input is refused."""
+    work = FilesOfWork()
+    token = _of_work.set(work)
     try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise HdoptError(
-            f"cannot write {path}: {error.strerror}; give a file in a folder that can be written"
-        ) from error
+        yield work
+    finally:
+        _of_work.reset(token)
+
+
+def files_of_work() -> FilesOfWork | None:
+    """The files of the work under way, where they are watched."""
+    return _of_work.get()
+
+
+def note_input(path: Path, content: bytes | None = None) -> None:
+    """Say that `path` is read (`content`: what was in it, where that is at hand): it can then be no output."""
+    work = _of_work.get()
+    if work is None:
+        return
+    import hashlib
+
+    real = _real(path)
+    if real in work.outputs:
+        raise HdoptError(f"{path} is read and was also given as an output; give the output another name")
+    if content is None:
+        if real.is_dir():
+            for inside in sorted(real.iterdir()):
+                note_input(inside)
+            return
+        try:
+            with open(path, "rb") as file:
+                work.inputs[real] = hashlib.file_digest(file, "sha256").hexdigest()
+        except OSError:
+            work.inputs[real] = ""
+    else:
+        work.inputs[real] = hashlib.sha256(content).hexdigest()
+
+
+def read_text(path: Path, wanted: str) -> str:
+    """The text of the UTF-8 file `path`; `wanted` says in messages what to give instead, as 'a study file'."""
+    try:
+        with open(path, "rb") as file:
+            content = file.read(LARGEST_TEXT + 1)
+    except (OSError, ValueError) as error:
+        raise HdoptError(f"cannot read {path}: {_why(error)}; give {wanted}") from error
+    if len(content) > LARGEST_TEXT:
+        raise HdoptError(f"{path} is larger than {LARGEST_TEXT // 2**20} MiB; give {wanted}")
+    note_input(path, content)
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise HdoptError(f"{path} is not a text file (byte {error.start} is not UTF-8); give {wanted}") from error
+
+
+def read_json(path: Path, wanted: str) -> Any:
+    """The JSON value in the file `path`; `wanted` says in messages what to give instead. Numbers that are not finite,
+    or that no float can hold, are refused; nothing of the content is echoed."""
+    text = read_text(path, wanted)
+
+    def refuse(number: str) -> NoReturn:
+        raise ValueError(f"holds the number {number[:12]}, which is not finite")
+
+    def integer(digits: str) -> int:
+        if len(digits) > 18:
+            raise ValueError(f"holds an integer of {len(digits)} digits")
+        return int(digits)
+
+    def number(digits: str) -> float:
+        value = float(digits)
+        if not math.isfinite(value):
+            refuse(digits)
+        return value
+
+    try:
+        return json.loads(text, parse_constant=refuse, parse_int=integer, parse_float=number)
+    except json.JSONDecodeError as error:
+        raise HdoptError(f"{path}, line {error.lineno}: is not valid JSON ({error.msg}); give {wanted}") from error
+    except RecursionError as error:
+        raise HdoptError(f"{path}: is nested too deeply; give {wanted}") from error
+    except ValueError as error:
+        raise HdoptError(f"{path}: {error}; give {wanted}") from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write `text` to the file `path` whole or not at all, or say in one sentence why that cannot be done."""
+    write_bytes(path, text.encode("utf-8", "surrogateescape"))
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write `content` to the file `path` whole or not at all, or say in one sentence why that cannot be done."""
+    with replacing(path) as passing:
+        passing.write_bytes(content)
+
+
+SPREADSHEET_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""How a cell begins that a spreadsheet takes for a formula (OWASP, "CSV Injection")."""
+
+
+def to_csv(frame: pd.DataFrame, index: bool = False) -> str:
+    """CSV text of `frame`, with its index where `index`: texts that a spreadsheet would run as formulas begin with an
+    apostrophe, which it hides; numbers stay numbers. Lines end with a line feed."""
+    # A cell with a carriage return is only quoted where that ends a line, and unquoted it would cut the line in two.
+    return harmless(frame).to_csv(index=index, lineterminator="\r\n").replace("\r\n", "\n")
+
+
+def harmless(frame: pd.DataFrame) -> pd.DataFrame:
+    """`frame` with an apostrophe before every text, in cells, column names and index, that begins like a formula."""
+    safe = frame.copy()
+    for place, kind in enumerate(safe.dtypes):
+        if not (kind.kind in "biufcmM" if hasattr(kind, "kind") else False):
+            safe.isetitem(place, [harmless_cell(cell) for cell in safe.iloc[:, place]])
+    safe.columns = safe.columns.map(harmless_cell)
+    safe.index = safe.index.map(harmless_cell) if len(safe.index) else safe.index
+    safe.index.names = [harmless_cell(name) for name in frame.index.names]
+    return safe
+
+
+def harmless_cell(cell: Any) -> Any:
+    """A text `cell` that begins like a formula, with an apostrophe before it; anything else as it is."""
+    if isinstance(cell, str) and cell.startswith(SPREADSHEET_FORMULA) and not _is_number(cell):
+        return "'" + cell
+    return cell
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A passing name in the folder of `path`, for a writer that opens files itself.
+
+    What stands under it at the end reaches the disk and takes the place of `path`; where anything fails, and on Ctrl-C
+    and SIGTERM too, `path` stays as it was and the passing file goes. Raises `HdoptError` for what cannot be written.
+    """
+    check_output(path)
+    real = _real(path)
+    passing = _passing_name(real)
+    try:
+        try:
+            _create(passing, real)
+            yield passing
+            _finish(passing, real)
+        except OSError as error:
+            if isinstance(error, BrokenPipeError):
+                raise
+            raise HdoptError(
+                f"cannot write {path}: {_why(error)}; give a file in a folder that can be written"
+            ) from error
+    finally:
+        with suppress(OSError):
+            passing.unlink(missing_ok=True)
+
+
+@contextmanager
+def replacing_all(paths: Iterable[Path]) -> Iterator[list[Path]]:
+    """The same for several `paths` that belong together: none takes its name before all are whole."""
+    from contextlib import ExitStack
+
+    with ExitStack() as stack:
+        yield [stack.enter_context(replacing(path)) for path in paths]
+
+
+def is_special(path: Path) -> bool:
+    """Whether `path` is a device, pipe or socket, which is written to and never replaced."""
+    if str(path).startswith(STREAMS):
+        return True
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return False
+    return not stat.S_ISREG(mode) and not stat.S_ISDIR(mode)
+
+
+def _passing_name(real: Path) -> Path:
+    folder = Path(tempfile.gettempdir()) if is_special(real) else real.parent
+    return folder / f".{real.name[:120]}.{os.getpid()}-{secrets.token_hex(4)}{PASSING}{real.suffix[:20]}"
+
+
+def _create(passing: Path, real: Path) -> None:
+    """An empty passing file with the rights that the old file has, or that a new one would get."""
+    os.close(os.open(passing, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+    if real.is_file():
+        passing.chmod(stat.S_IMODE(real.stat().st_mode))
+
+
+def _finish(passing: Path, real: Path) -> None:
+    if is_special(real):
+        with open(real, "wb") as device:
+            device.write(passing.read_bytes())
+        return
+    with open(passing, "rb") as file:
+        os.fsync(file.fileno())
+    os.replace(passing, real)
+    sync_folder(real.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Let the names in a folder reach the disk, where the system can."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def check_output(path: Path) -> None:
+    """Raise `HdoptError` where `path` cannot be written, before any work is done for it.
+
+    It must be no folder and no input of this work, and its folder must exist and be writable.
+    """
+    try:
+        real = _real(path)
+        name = real.name
+        if real.is_dir() or str(path).endswith(os.sep) or not name:
+            raise HdoptError(f"cannot write {path}: it is a folder; give the name of a file")
+        if real.is_symlink():
+            raise HdoptError(f"cannot write {path}: the link leads nowhere; give the name of a file")
+        if is_special(real):
+            if not os.access(real, os.W_OK):
+                raise HdoptError(f"cannot write {path}: permission denied; give a file that can be written")
+            return
+        if len(os.fsencode(name)) > 255 or "\0" in str(path):
+            raise HdoptError(f"cannot write {path}: the name is too long or not one; give a shorter name")
+        if not real.parent.is_dir():
+            raise HdoptError(
+                f"cannot write {path}: there is no folder {real.parent}; give a file in a folder that exists and "
+                "can be written"
+            )
+        if not os.access(real.parent, os.W_OK | os.X_OK):
+            raise HdoptError(f"cannot write {path}: its folder cannot be written; give a file in one that can")
+    except (OSError, ValueError, RuntimeError) as error:
+        if isinstance(error, HdoptError):
+            raise
+        raise HdoptError(f"cannot write {path}: {_why(error)}; give a file in a folder that can be written") from error
+    work = _of_work.get()
+    if work is not None and real in work.inputs:
+        raise HdoptError(f"{path} is an input of this command; give the output another name")
+
+
+def claim_output(path: Path) -> None:
+    """Check the output `path`, to be written later; a later input or second output of that name is refused."""
+    check_output(path)
+    work = _of_work.get()
+    if work is None or is_special(path):
+        return
+    real = _real(path)
+    if real in work.outputs:
+        raise HdoptError(f"{path} is given for two outputs; give each a name of its own")
+    work.outputs[real] = path
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder, its parents too, or say in one sentence why that cannot be done."""
+    """Make the folder `path`, its parents too, or say in one sentence why that cannot be done."""
     try:
         path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise HdoptError(f"cannot make the folder {path}: {error.strerror}; give a folder that can be made") from error
+    except (OSError, ValueError) as error:
+        raise HdoptError(f"cannot make the folder {path}: {_why(error)}; give a folder that can be made") from error
+
+
+def _real(path: Path) -> Path:
+    """The file that a name means in the end; a stream of this process stays as it is."""
+    return path if is_special(path) else Path(os.path.realpath(path))
+
+
+def _why(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error) or type(error).__name__

@@ -1,79 +1,133 @@
-"""The command line. Each command lives in a module of its own that is imported only when the command is used."""
+"""The command line. `main` answers every ending of a command; the commands are in `hdopt.cli.app`."""
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
-from collections.abc import Sequence
-from importlib import import_module
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from types import FrameType
+from typing import NoReturn
 
-import click
-
-from hdopt.errors import HdoptError
-
-COMMANDS: dict[str, str] = {
-    "ke": "Kinematic error of one drive: peak-to-peak, orders, contact, lag.",
-    "profile": "The wave generator's profile: contact angle, curvature change, bending stress.",
-    "stack": "Monte Carlo stack of the tolerances: distribution, yield, Ppk; tails and worst case on request.",
-    "sobol": "Which tolerances matter: Sobol' indices with intervals, Shapley effects where inputs are correlated.",
-    "allocate": "Least-cost tolerances that keep the requirement, verified.",
-    "diagnose": "What physics recordings of a drive hold that the model leaves out.",
-    "search": "Which design: the best under limits, fronts, and what the choice costs.",
-    "export": "The wave generator as checked STEP, DXF, STL, 3MF, drawing and picture.",
-    "run": "Everything a study file asks for, with report.html.",
-    "studies": "The shipped studies, a line each.",
-}
-"""Command -> its line in `hdopt --help`; the command is `command` in `hdopt.cli.<name>`."""
+DONE, UNUSABLE, INTERRUPTED, TERMINATED = 0, 2, 130, 143
+"""Exit statuses besides 1, which is an answer: "no"."""
 
 
-class LazyGroup(click.Group):
-    """A group that knows its commands' names and help lines without importing them."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
-        if name not in COMMANDS:
-            return None
-        return import_module(f"hdopt.cli.{name}").command
-
-    def resolve_command(self, ctx: click.Context, args: list[str]):
-        if args and not args[0].startswith("-") and args[0] not in COMMANDS:
-            from hdopt.errors import unknown_name
-
-            raise click.UsageError(unknown_name("command", args[0], COMMANDS))
-        return super().resolve_command(ctx, args)
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+class Terminated(BaseException):
+    """SIGTERM came: whatever is half-written is cleaned up on the way out, as on Ctrl-C."""
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="hdopt")
-def cli() -> None:
-    """Design optimization and tolerancing for harmonic drives (strain wave gears).
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run the command line and exit: unusable input ends with one message and status 2, never a traceback.
 
-    Exit status: 0 done, 1 the answer is "no", 2 unusable input.
+    `arguments` stand in for those of the process. HDOPT_TRACEBACK=1 in the environment shows where a fault arose.
     """
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit: unusable input ends with one message and status 2, never a traceback."""
     try:
-        status = cli.main(args=arguments, prog_name="hdopt", standalone_mode=False)
-        sys.exit(status if isinstance(status, int) else 0)
+        with _sigterm_raises():
+            status = _run(arguments)
+            sys.stdout.flush()
+    except KeyboardInterrupt:
+        _leave(INTERRUPTED, "interrupted", at_once=arguments is None)
+    except Terminated:
+        _leave(TERMINATED, "ended by SIGTERM", at_once=arguments is None)
+    except BrokenPipeError:
+        _drop_output()
+        sys.exit(DONE)
+    except Exception as error:
+        if os.environ.get("HDOPT_TRACEBACK"):
+            raise
+        _drop_broken_output(error)
+        _say(_message(error))
+        sys.exit(UNUSABLE)
+    sys.exit(status)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    import warnings
+
+    import click
+
+    from hdopt.cli.app import cli
+    from hdopt.files import watching_files
+
+    if not os.environ.get("HDOPT_TRACEBACK"):
+        # Results are checked to be finite where they are made; NumPy's own lines would stand beside the one message.
+        warnings.filterwarnings("ignore", category=RuntimeWarning)
+    try:
+        with watching_files():
+            status = cli.main(args=arguments, prog_name="hdopt", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as help_text:
         help_text.show()
-        sys.exit(2)
-    except click.ClickException as error:
-        print(f"hdopt: {error.format_message()}", file=sys.stderr)
-        sys.exit(2)
-    except (HdoptError, ValueError) as error:
-        # Physics refuses impossible values with ValueError; at the command line that is unusable input.
-        print(f"hdopt: {error}", file=sys.stderr)
-        sys.exit(2)
-    except BrokenPipeError:
-        sys.exit(0)
-    except (KeyboardInterrupt, click.Abort):
-        print("hdopt: interrupted", file=sys.stderr)
-        sys.exit(130)
+        return UNUSABLE
+    except click.Abort:
+        raise KeyboardInterrupt from None
+    except SystemExit:  # Click's own answer to a closed pipe
+        raise BrokenPipeError from None
+    return status if isinstance(status, int) else DONE
+
+
+def _message(error: Exception) -> str:
+    """What is wrong, in three lines at most."""
+    import click
+
+    from hdopt.errors import HdoptError, in_brief
+
+    if isinstance(error, click.ClickException):
+        return in_brief(error.format_message())
+    if isinstance(error, HdoptError):
+        return in_brief(str(error))
+    if isinstance(error, OSError):
+        name = f"reading or writing {error.filename}" if error.filename else "writing to standard output"
+        return in_brief(f"{name} failed: {error.strerror or error}")
+    if isinstance(error, MemoryError):
+        return "this needs more memory than there is; ask for fewer samples, or use --engine dask://HOST:PORT"
+    if isinstance(error, ValueError | ArithmeticError):
+        return in_brief(f"these numbers lead to no result: {error}; see whether each has the unit its name says")
+    kind = type(error).__name__
+    return in_brief(f"cannot go on: {kind}: {error}", 2) + "\nHDOPT_TRACEBACK=1 in the environment shows where"
+
+
+def _say(message: str) -> None:
+    with suppress(OSError, ValueError):
+        print(f"hdopt: {message}", file=sys.stderr, flush=True)
+
+
+def _leave(status: int, message: str, at_once: bool) -> NoReturn:
+    """End after an interruption. A process of our own ends `at_once`: threads under way and the unloading of compiled
+    libraries, which an interruption may have left in any state, are not waited for."""
+    _say(message)
+    if at_once:
+        with suppress(OSError, ValueError):
+            sys.stdout.flush()
+        os._exit(status)
+    sys.exit(status)
+
+
+@contextmanager
+def _sigterm_raises() -> Iterator[None]:
+    """SIGTERM as an exception, so that what is half-written goes; only the main thread may ask for that."""
+
+    def terminate(number: int, frame: FrameType | None) -> None:
+        raise Terminated
+
+    try:
+        before = signal.signal(signal.SIGTERM, terminate)
+    except ValueError:  # not the main thread
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _drop_broken_output(error: Exception) -> None:
+    """Where standard output itself cannot be written (a full disk), nothing more is tried at the end."""
+    if isinstance(error, OSError) and error.filename is None:
+        _drop_output()
+
+
+def _drop_output() -> None:
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

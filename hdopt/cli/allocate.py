@@ -6,7 +6,18 @@ import sys
 
 import click
 
-from hdopt.cli.common import drive_option, emit, json_option, progress, seed_option, set_option, study_argument
+from hdopt.cli.common import (
+    check_option,
+    drive_option,
+    emit,
+    engine_option,
+    json_option,
+    progress,
+    seed_option,
+    set_option,
+    status,
+    study_argument,
+)
 
 
 @click.command()
@@ -15,23 +26,23 @@ from hdopt.cli.common import drive_option, emit, json_option, progress, seed_opt
 @set_option
 @click.option("--rule", metavar="RULE", help="worst_case, rss or yield; the study's own if omitted.")
 @click.option("--compare/--no-compare", default=None, help="Also the other rules, in one table.")
-@click.option("--engine", metavar="ENGINE", help="process, threads or dask://HOST:PORT; threads if omitted.")
+@engine_option
+@check_option
 @json_option
 @seed_option
-def command(study, drive, overrides, rule, compare, engine, json_file, seed) -> int:
+def command(study, drive, overrides, rule, compare, json_file, seed) -> int:
     """Least-cost tolerances that keep the requirement, verified once on a fresh seed.
 
     STUDY is a study file or a shipped study with costs. Exit status 1: the requirement cannot be met.
     """
-    from hdopt.allocation import allocate
+    from hdopt.allocation.convex import Infeasible
     from hdopt.study import load_study
-    from hdopt.tolerance.allocate import Infeasible
+    from hdopt.workflow.allocate import allocate
+    from hdopt.workflow.requirement import of_allocation
 
     loaded = load_study(study, overrides, drive)
     try:
-        result = allocate(
-            loaded, rule, compare=compare, seed=seed, engine=engine, progress=lambda rules: progress(rules, "rules")
-        )
+        result = allocate(loaded, rule, compare=compare, seed=seed, progress=lambda rules: progress(rules, "rules"))
     except Infeasible as error:
         answer = {
             "study": loaded.name,
@@ -42,8 +53,9 @@ def command(study, drive, overrides, rule, compare, engine, json_file, seed) -> 
         emit(answer, json_file, ())
         print(f"hdopt: {error}", file=sys.stderr)
         return 1
-    emit(result.to_dict(), json_file, _lines(result))
-    return 0 if result.accepted else 1
+    verdict = of_allocation(result)
+    emit(result.to_dict(), json_file, _lines(result), verdict)
+    return status(result.accepted, verdict)
 
 
 def _lines(result):

@@ -3,37 +3,102 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from hdopt.files import to_json, write_text
+from hdopt.files import claim_output, to_json, write_text
+
+if TYPE_CHECKING:
+    from hdopt.parallel.engine import Engine
+    from hdopt.study import Study
+    from hdopt.workflow.requirement import Verdict
 
 T = TypeVar("T")
+R = TypeVar("R")
+
+
+class OutputFile(click.ParamType):  # type: ignore[type-arg]  # generic in newer Click only
+    """A file that the command will write: checked before any work is done, refused where it is an input as well."""
+
+    name = "file"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        path = Path(value)
+        if str(value) != "-":
+            claim_output(path)
+        return path
+
 
 json_option = click.option(
-    "--json", "json_file", metavar="FILE", help="Write the result as JSON; '-' writes it, alone, to standard output."
+    "--json",
+    "json_file",
+    metavar="FILE",
+    type=OutputFile(),
+    help="Write the result as JSON; '-' writes it, alone, to standard output.",
 )
-seed_option = click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Random seed.")
+seed_option = click.option(
+    "--seed", type=click.IntRange(0, 2**63 - 1), default=1, show_default=True, help="Random seed."
+)
 set_option = click.option(
     "--set", "overrides", metavar="KEY=VALUE", multiple=True, help="Change a key of the study; may be repeated."
 )
 drive_option = click.option("--drive", metavar="NAME", help="A shipped drive, by name.")
 study_argument = click.argument("study", required=False, metavar="[STUDY]")
+check_option = click.option(
+    "--check",
+    is_flag=True,
+    expose_value=False,
+    callback=lambda ctx, parameter, value: ctx.meta.__setitem__(CHECK, value),
+    help="End with status 1 where the requirement is missed.",
+)
+"""For every command that can say whether a study's requirement is met; `status` turns the verdict into the status."""
+CHECK = "hdopt.check"
 
 
-def emit(result: Mapping[str, Any], json_file: str | None, lines: Iterable[str]) -> None:
-    """Write `result` as JSON where asked, and `lines` for a person unless JSON takes standard output."""
-    if json_file == "-":
+def status(answer: bool, verdict: Verdict | None) -> int:
+    """Exit status: 1 where the answer is "no", or where --check was given and the requirement is missed."""
+    missed = verdict is not None and not verdict.met
+    return 0 if answer and not (missed and click.get_current_context().meta.get(CHECK)) else 1
+
+
+def emit(
+    result: Mapping[str, Any], json_file: str | Path | None, lines: Iterable[str], verdict: Verdict | None = None
+) -> None:
+    """Write `result` as JSON where asked, and `lines` for a person unless JSON takes standard output.
+
+    The verdict, where there is one, is the last line, and `requirement` in the JSON; `provenance` is there always.
+    Where the JSON cannot be written, the lines are printed all the same: the work is not lost.
+    """
+    result = dict(result)
+    if verdict is not None:
+        result["requirement"] = verdict.to_dict()
+    if json_file is not None:
+        result["provenance"] = _provenance()
+    if str(json_file) == "-":
         click.echo(to_json(result))
         return
-    for line in lines:
-        click.echo(line)
-    if json_file:
-        write_text(Path(json_file), to_json(result) + "\n")
+    try:
+        if json_file:
+            write_text(Path(json_file), to_json(result) + "\n")
+    finally:
+        for line in lines:
+            click.echo(line)
+        if verdict is not None:
+            click.echo(verdict.line)
+
+
+def _provenance() -> dict[str, Any]:
+    from hdopt.workflow.provenance import provenance
+
+    context = click.get_current_context(silent=True)
+    if context is None:
+        return provenance()
+    return provenance(seed=context.params.get("seed"), command=context.info_name)
 
 
 def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterable[T]:
@@ -43,11 +108,54 @@ def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterab
     return tqdm(items, desc=label, total=total, file=sys.stderr, disable=not sys.stderr.isatty(), leave=False)
 
 
-def watched(engine, label: str):
-    """An engine by its name, with a progress bar over what it maps where standard error is a terminal."""
-    from hdopt.engine import engine_from
+def _put_in_force(ctx: click.Context, parameter: click.Parameter, name: str | None) -> None:
+    from hdopt.parallel.engine import engine_in_force
 
-    chosen = engine_from(engine)
+    if name is not None:
+        ctx.with_resource(engine_in_force(name))
+
+
+engine_option = click.option(
+    "--engine",
+    metavar="ENGINE",
+    callback=_put_in_force,
+    expose_value=False,
+    help="What does the work: process, threads[:N], processes[:N] or dask://HOST:PORT; threads if omitted.",
+)
+"""For every command with long work. The engine is in force for all that the command does; no function passes it on."""
+
+
+@contextmanager
+def finished_parts_kept(study: Study, resume: bool) -> Iterator[None]:
+    """Keep the finished parts of work of more than some seconds in the user's cache folder until it is done, so that
+    the same command with --resume goes on with them: the same study, options, seed and version."""
+    import hashlib
+    from importlib import metadata
+
+    from hdopt.parallel.engine import engine_from, engine_in_force
+    from hdopt.parallel.kept import Kept, Parts, cache_folder, forget_old
+
+    context = click.get_current_context()
+    asked = {name: value for name, value in context.params.items() if name not in ("json_file", "resume")}
+    key = f"{context.info_name} {study.sha256} {asked} {metadata.version('hdopt')}"
+    forget_old(cache_folder())
+    parts = Parts.open(cache_folder() / hashlib.sha256(key.encode()).hexdigest()[:32], key, resume)
+    with engine_in_force(Kept(engine_from(None), parts, quiet_s=QUIET_S, needed=False)):
+        yield
+    parts.clear()
+
+
+QUIET_S = 10.0
+"""Work shorter than this is repeated sooner than kept."""
+
+resume_option = click.option("--resume", is_flag=True, help="Go on where the same command was interrupted.")
+
+
+def watched(label: str) -> Engine:
+    """The engine in force, with a progress bar over what it maps where standard error is a terminal."""
+    from hdopt.parallel.engine import engine_from
+
+    chosen = engine_from(None)
     return Watched(chosen, label) if sys.stderr.isatty() else chosen
 
 
@@ -55,9 +163,17 @@ def watched(engine, label: str):
 class Watched:
     """An engine whose results pass a progress bar."""
 
-    engine: Any
+    engine: Engine
     label: str
 
-    def map(self, function, items):
+    @property
+    def elsewhere(self) -> bool:
+        return self.engine.elsewhere
+
+    @property
+    def threads(self) -> int:
+        return self.engine.threads
+
+    def map(self, function: Callable[[T], R], items: Iterable[T]) -> Iterator[R]:
         items = list(items)
-        return progress(self.engine.map(function, items), self.label, len(items))
+        return iter(progress(self.engine.map(function, items), self.label, len(items)))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from hdopt.cli.common import emit, json_option, seed_option
+from hdopt.cli.common import OutputFile, emit, engine_option, json_option, seed_option
 
 MOST_LISTED = 12
 """Parameters of one effect that the terminal shows."""
@@ -22,14 +22,15 @@ MOST_LISTED = 12
 @click.option(
     "--nuisance", metavar="NAME,...", default="", help="Fit beside every model, and never name: drift, time-warp."
 )
-@click.option("--report", "report_file", metavar="FILE", type=click.Path(path_type=Path), help="Write an HTML report.")
+@click.option("--report", "report_file", metavar="FILE", type=OutputFile(), help="Write an HTML report.")
 @click.option(
     "--write-study",
     "study_file",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=OutputFile(),
     help="Write a study with the drive's fitted errors and the effects found.",
 )
+@engine_option
 @json_option
 @seed_option
 def command(recordings, drive, ratio, columns, nuisance, report_file, study_file, json_file, seed) -> None:
@@ -41,17 +42,20 @@ def command(recordings, drive, ratio, columns, nuisance, report_file, study_file
 
     asked = tuple(name.strip() for name in nuisance.split(",") if name.strip())
     diagnosis = diagnose(recordings, drive_of(drive, ratio), ratio, columns, seed, asked)
-    if report_file is not None:
-        from hdopt.files import write_text
-        from hdopt.report.html import render
-        from hdopt.report.sections.diagnosis import diagnosis_report
+    try:
+        if report_file is not None:
+            from hdopt.files import write_text
+            from hdopt.report.html import render
+            from hdopt.report.sections.diagnosis import diagnosis_report
 
-        write_text(report_file, render(diagnosis_report(diagnosis, [path.name for path in recordings])))
-    if study_file is not None:
-        from hdopt.diagnosis.write_back import write_study
+            write_text(report_file, render(diagnosis_report(diagnosis, [path.name for path in recordings])))
+        if study_file is not None:
+            from hdopt.workflow.write_fitted import write_study
 
-        write_study(diagnosis, drive, study_file)
-    emit(diagnosis.to_dict(), json_file, _lines(diagnosis))
+            write_study(diagnosis, drive, study_file)
+    finally:
+        # A file that cannot be written after minutes of work must not take the answer with it.
+        emit(diagnosis.to_dict(), json_file, _lines(diagnosis))
 
 
 def drive_of(name: str, ratio: float | None):

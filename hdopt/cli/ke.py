@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import click
 
-from hdopt.cli.common import drive_option, emit, json_option, seed_option, set_option, study_argument
+from hdopt.cli.common import (
+    check_option,
+    drive_option,
+    emit,
+    json_option,
+    set_option,
+    status,
+    study_argument,
+)
 
 
 @click.command()
@@ -14,24 +22,31 @@ from hdopt.cli.common import drive_option, emit, json_option, seed_option, set_o
 @click.option("--structure", metavar="S", help="integral, automatic, one_way_major or one_way_minor.")
 @click.option("--sampling-deg", type=float, help="Also take the peak-to-peak only on this grid, from 0.")
 @click.option("--turns", type=float, help="Input turns of that grid; one full relative turn if omitted.")
+@check_option
+@click.option("--method", default="exact", help="exact (the default) or 'closed form', to second order in the errors.")
 @json_option
-@seed_option
-def command(study, drive, overrides, structure, sampling_deg, turns, json_file, seed) -> None:
+@click.option("--seed", type=int, expose_value=False, help="Taken as in every command; nothing here is random.")
+def command(study, drive, overrides, structure, sampling_deg, turns, method, json_file) -> int:
     """Kinematic error of one drive: peak-to-peak, orders, contact, lag.
 
     STUDY is a study file or a shipped study; without one, the shipped drive csf-25-80 is taken.
     """
-    from hdopt.analysis import kinematic_error
     from hdopt.study import load_study
+    from hdopt.workflow.kinematic_error import kinematic_error
+    from hdopt.workflow.requirement import of_kinematic_error
 
     chosen = (f"wave_generator.structure={structure}",) if structure else ()
-    result = kinematic_error(load_study(study, (*overrides, *chosen), drive), sampling_deg, turns)
-    emit(result.to_dict(), json_file, _lines(result))
+    loaded = load_study(study, (*overrides, *chosen), drive)
+    result = kinematic_error(loaded, sampling_deg=sampling_deg, turns=turns, method=method)
+    verdict = of_kinematic_error(loaded, result)
+    emit(result.to_dict(), json_file, _lines(result), verdict)
+    return status(True, verdict)
 
 
 def _lines(result):
     yield f"{result.study}: {result.profile} wave generator, {result.structure}"
     yield f"  peak-to-peak, converged (k_e = 1)    {result.peak_to_peak_arcmin:9.4f} arcmin"
+    yield f"    that holds over a tooth's width      {result.tooth_width_peak_to_peak_arcmin:9.4f} arcmin"
     if result.effects:
         yield f"    of the base model, without effects   {result.base_peak_to_peak_arcmin:9.4f} arcmin"
     for effect in result.effects:

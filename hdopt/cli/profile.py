@@ -19,8 +19,8 @@ def command(study, drive, overrides, profile, json_file, seed) -> None:
 
     STUDY is a study file or a shipped study; without one, the shipped drive csf-25-80 is taken.
     """
-    from hdopt.analysis import profile as analyse
     from hdopt.study import load_study
+    from hdopt.workflow.kinematic_error import profile as analyse
 
     chosen = (f"wave_generator.profile={profile}",) if profile else ()
     result = analyse(load_study(study, (*overrides, *chosen), drive))

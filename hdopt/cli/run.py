@@ -2,37 +2,69 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from hdopt.cli.common import drive_option, emit, json_option, progress, seed_option, set_option, study_argument
+from hdopt.cli.common import (
+    check_option,
+    drive_option,
+    emit,
+    engine_option,
+    json_option,
+    progress,
+    seed_option,
+    set_option,
+    status,
+    study_argument,
+)
+
+if TYPE_CHECKING:
+    from hdopt.workflow.run import RunResult
 
 
 @click.command()
 @study_argument
 @click.option("-o", "--output", "folder", metavar="DIR", help="Folder to write to; out/STUDY if omitted.")
+@click.option("--resume", is_flag=True, help="Go on where an interrupted run of the same study stood.")
+@click.option("--verify", is_flag=True, help="Do the run in the folder STUDY (or -o DIR) again and compare every file.")
 @drive_option
 @set_option
+@engine_option
+@check_option
 @json_option
 @seed_option
-def command(study, folder, drive, overrides, json_file, seed) -> int:
+def command(study: str | None, folder: str | None, resume: bool, verify: bool, **options: Any) -> int:
     """Everything a study asks for: results, tables, and report.html.
 
     STUDY is a study file or a shipped study (see `hdopt studies`); without one, the shipped drive csf-25-80 is taken.
+    The folder is replaced as a whole at the end. With --verify, status 1 says that a file came out otherwise.
     """
-    from hdopt.run import run_study
+    if verify:
+        return _verify(Path(folder or study or "."), options["json_file"])
     from hdopt.study import load_study
+    from hdopt.workflow.requirement import of_run
+    from hdopt.workflow.run import run_study
 
-    loaded = load_study(study, overrides, drive)
-    result = run_study(
-        loaded, Path(folder) if folder else Path("out") / loaded.name, seed, lambda names: progress(names, loaded.name)
-    )
-    emit(result.to_dict(), json_file, _lines(result))
-    return 0 if result.answer else 1
+    loaded = load_study(study, options["overrides"], options["drive"])
+    place = Path(folder) if folder else Path("out") / loaded.name
+    result = run_study(loaded, place, options["seed"], lambda names: progress(names, loaded.name), resume)
+    verdict = of_run(loaded, result)
+    emit(result.to_dict(), options["json_file"], _lines(result), verdict)
+    return status(result.answer, verdict)
 
 
-def _lines(result):
+def _verify(folder: Path, json_file: Path | None) -> int:
+    from hdopt.workflow.verify import lines, verify_run
+
+    result = verify_run(folder, lambda names: progress(names, str(folder)))
+    emit(result.to_dict(), json_file, lines(result))
+    return 0 if result.repeated else 1
+
+
+def _lines(result: RunResult) -> Iterator[str]:
     for name, step in result.steps.items():
         for line in step.says or ((f"left out: {step.results['left_out']}",) if "left_out" in step.results else ()):
             yield f"{name.replace('_', ' ')}: {line}"

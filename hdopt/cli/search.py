@@ -6,7 +6,7 @@ import sys
 
 import click
 
-from hdopt.cli.common import drive_option, emit, json_option, seed_option, set_option, study_argument
+from hdopt.cli.common import drive_option, emit, engine_option, json_option, seed_option, set_option, study_argument
 
 
 @click.command()
@@ -14,6 +14,7 @@ from hdopt.cli.common import drive_option, emit, json_option, seed_option, set_o
 @drive_option
 @set_option
 @click.option("--fronts/--no-fronts", default=True, help="Also trace the fronts between the two objectives.")
+@engine_option
 @json_option
 @seed_option
 def command(study, drive, overrides, fronts, json_file, seed) -> int:
@@ -22,9 +23,9 @@ def command(study, drive, overrides, fronts, json_file, seed) -> int:
     STUDY is a study file or a shipped study; its [search] section says what may vary. Ctrl-C ends with the best so far.
     Exit status 1 where no design meets all limits.
     """
+    from hdopt.optimize.summary import result_lines
     from hdopt.study import load_study
-    from hdopt.trade import search
-    from hdopt.trade.words import result_lines
+    from hdopt.workflow.search import search
 
     loaded = load_study(study, overrides, drive)
     result = search(loaded, seed, _stages() if sys.stderr.isatty() else lambda stage: None, fronts)

@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
-from hdopt.cli.common import drive_option, emit, json_option, seed_option, set_option, study_argument, watched
+from hdopt.cli.common import (
+    check_option,
+    drive_option,
+    emit,
+    engine_option,
+    finished_parts_kept,
+    json_option,
+    resume_option,
+    seed_option,
+    set_option,
+    status,
+    study_argument,
+    watched,
+)
 
 
 @click.command()
 @study_argument
 @drive_option
 @set_option
-@click.option("-n", "n", type=click.IntRange(min=1), default=2**18, show_default=True, help="Samples in all.")
+@click.option("-n", "n", type=click.IntRange(1, 10**13), default=2**18, show_default=True, help="Samples in all.")
 @click.option("--tail", type=float, metavar="LIMIT", help="Also the probability of exceeding LIMIT, down to 1e-7.")
 @click.option("--worst-case", is_flag=True, help="Also the worst case over the tolerance box, with its certificate.")
 @click.option("--quantile", "quantiles", type=float, multiple=True, help="A further quantile; may be repeated.")
@@ -22,28 +37,26 @@ from hdopt.cli.common import drive_option, emit, json_option, seed_option, set_o
     show_default=True,
     help="'sobol', 16 scramblings, or 'monte-carlo', independent points.",
 )
-@click.option("--engine", metavar="ENGINE", help="process, threads or dask://HOST:PORT; threads if omitted.")
+@resume_option
+@engine_option
+@check_option
 @json_option
 @seed_option
-def command(study, drive, overrides, n, tail, worst_case, quantiles, sampling, engine, json_file, seed) -> None:
+def command(study: str | None, drive: str | None, overrides: tuple[str, ...], resume: bool, **options: Any) -> int:
     """Monte Carlo stack of the tolerances: distribution, yield, Ppk; tails and worst case on request.
 
     STUDY is a study file or a shipped study; without one, the shipped drive csf-25-80 is taken.
     """
     from hdopt.study import load_study
-    from hdopt.tolerancing import stack
+    from hdopt.workflow.requirement import of_stack
+    from hdopt.workflow.stack import stack
 
-    result = stack(
-        load_study(study, overrides, drive),
-        n,
-        tail=tail,
-        worst_case=worst_case,
-        sampling=sampling,
-        quantiles=quantiles,
-        seed=seed,
-        engine=watched(engine, "samples"),
-    )
-    emit(result.to_dict(), json_file, _lines(result))
+    loaded, json_file = load_study(study, overrides, drive), options.pop("json_file")
+    with finished_parts_kept(loaded, resume):
+        result = stack(loaded, engine=watched("samples"), **options)
+    verdict = of_stack(result)
+    emit(result.to_dict(), json_file, _lines(result), verdict)
+    return status(True, verdict)
 
 
 def _lines(result):

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
+
+REPORT_FILE = "report.html"
+RESULTS_FILE = "results.json"
 
 
 @dataclass(frozen=True)
@@ -19,6 +22,16 @@ class Figure:
     title: str
     figure: go.Figure
     caption: str = ""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Traces and layout as they are: Plotly's own way to pickle turns arrays into text that tables cannot read."""
+        traces = [trace.to_plotly_json() for trace in self.figure.data]
+        return {**self.__dict__, "figure": {"data": traces, "layout": self.figure.layout.to_plotly_json()}}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        import plotly.graph_objects as go
+
+        self.__dict__.update(state, figure=go.Figure(state["figure"]))
 
 
 @dataclass(frozen=True)

@@ -21,14 +21,12 @@ from typing import Any
 from markupsafe import Markup, escape
 
 from hdopt.errors import HdoptError
-from hdopt.files import make_folder, to_json, write_text
-from hdopt.report import Figure, Item, KeyFigures, Picture, Report, Table, Text
+from hdopt.files import make_folder, to_csv, to_json, write_text
+from hdopt.report import REPORT_FILE, RESULTS_FILE, Figure, Item, KeyFigures, Picture, Report, Table, Text
 from hdopt.report.cells import columns, index_has_meaning, minus
 from hdopt.report.numbers import figure_frame
 from hdopt.report.theme import HEIGHT, template
 
-REPORT_FILE = "report.html"
-RESULTS_FILE = "results.json"
 ROWS_SHOWN = 60
 """Rows of a table in the page; a longer one goes on in its CSV file."""
 
@@ -54,7 +52,7 @@ def write_report(report: Report, folder: Path) -> Path:
     make_folder(folder)
     tables = dict(_csv_tables(report))
     for name, frame in tables.items():
-        write_text(folder / name, frame.to_csv(index=index_has_meaning(frame), lineterminator="\n"))
+        write_text(folder / name, to_csv(frame, index=index_has_meaning(frame)))
     if report.results:
         write_text(folder / RESULTS_FILE, to_json(report.results) + "\n")
     page = folder / REPORT_FILE
@@ -90,7 +88,7 @@ def render(report: Report, csv_files: set[str] = frozenset()) -> str:
         content_security_policy=CONTENT_SECURITY_POLICY,
         results_file=RESULTS_FILE if report.results else "",
         version=version("hdopt"),
-        date=_today(),
+        date=date_of_page(),
     )
 
 
@@ -226,7 +224,7 @@ def _full_stop(title: str) -> str:
     return title if title.endswith((".", "?", "!")) else title + "."
 
 
-def _today() -> str:
+def date_of_page() -> str:
     """The date, or that of SOURCE_DATE_EPOCH where a reproducible page is wanted."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     moment = datetime.fromtimestamp(int(epoch), UTC) if epoch else datetime.now().astimezone()

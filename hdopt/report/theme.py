@@ -57,31 +57,33 @@ def faded(colour: str, opacity: float) -> str:
     return f"rgba({red},{green},{blue},{opacity:g})"
 
 
+_AXIS = {
+    "automargin": True,
+    "gridcolor": GRID,
+    "linecolor": AXIS,
+    "showline": True,
+    "ticks": "outside",
+    "ticklen": 4,
+    "tickcolor": AXIS,
+    "zeroline": False,
+    "title": {"font": {"size": 13, "color": MUTED}, "standoff": 10},
+    "hoverformat": ".4~g",
+    "minor": {"showgrid": False},
+}
+_COLOUR_BAR = {
+    "outlinewidth": 0,
+    "thickness": 12,
+    "ticklen": 4,
+    "tickcolor": AXIS,
+    "title": {"side": "right", "font": {"size": 13, "color": MUTED}},
+}
+
+
 def template() -> go.layout.Template:
     """The template that `hdopt.report.html` gives to every figure of a report."""
     import plotly.graph_objects as go
 
-    axis = {
-        "automargin": True,
-        "gridcolor": GRID,
-        "linecolor": AXIS,
-        "showline": True,
-        "ticks": "outside",
-        "ticklen": 4,
-        "tickcolor": AXIS,
-        "zeroline": False,
-        "title": {"font": {"size": 13, "color": MUTED}, "standoff": 10},
-        "hoverformat": ".4~g",
-        "minor": {"showgrid": False},
-    }
     polar_axis = {"gridcolor": GRID, "linecolor": AXIS, "tickcolor": AXIS}
-    colour_bar = {
-        "outlinewidth": 0,
-        "thickness": 12,
-        "ticklen": 4,
-        "tickcolor": AXIS,
-        "title": {"side": "right", "font": {"size": 13, "color": MUTED}},
-    }
     sequential = [list(stop) for stop in SEQUENTIAL]
     return go.layout.Template(
         layout={
@@ -108,8 +110,8 @@ def template() -> go.layout.Template:
                 "bgcolor": "rgba(0,0,0,0)",
                 "title": {"font": {"color": MUTED}},
             },
-            "xaxis": axis,
-            "yaxis": axis,
+            "xaxis": _AXIS,
+            "yaxis": _AXIS,
             "polar": {"bgcolor": PAPER, "radialaxis": polar_axis, "angularaxis": polar_axis},
             "bargap": 0.35,
             "bargroupgap": 0.08,
@@ -118,10 +120,10 @@ def template() -> go.layout.Template:
             "separators": ".\u202f",
         },
         data={
-            "scatter": [{"line": {"width": 2, "simplify": False}, "marker": {"size": 7, "colorbar": colour_bar}}],
+            "scatter": [{"line": {"width": 2, "simplify": False}, "marker": {"size": 7, "colorbar": _COLOUR_BAR}}],
             "bar": [{"marker": {"line": {"width": 0}}}],
-            "heatmap": [{"colorscale": sequential, "colorbar": colour_bar}],
-            "contour": [{"colorscale": sequential, "colorbar": colour_bar}],
+            "heatmap": [{"colorscale": sequential, "colorbar": _COLOUR_BAR}],
+            "contour": [{"colorscale": sequential, "colorbar": _COLOUR_BAR}],
             "histogram": [{"marker": {"line": {"width": 0}}}],
         },
     )

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hdopt.drive import Clearances, Drive, Load
 from hdopt.errors import HdoptError, unknown_name
+from hdopt.files import files_of_work
 from hdopt.study.document import (
     SET_ON_COMMAND_LINE,
     Document,
@@ -23,8 +25,10 @@ from hdopt.study.document import (
 )
 
 if TYPE_CHECKING:
-    from hdopt.deviations import DriveErrors
-    from hdopt.extended import AddedEffect, Operation
+    from hdopt.drive.errors import DriveErrors
+    from hdopt.drive.geometry import Drive
+    from hdopt.drive.teeth import MeasuredTeeth
+    from hdopt.simulation import EffectValues, Operation
     from hdopt.study.base import Section
 
 DEFAULT_STUDY = "csf-25-80"
@@ -47,6 +51,8 @@ class Study:
     folder: Path
     source: str
     document: Document = field(repr=False)
+    recipe: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
+    """The arguments of `load_study` that give this study again; {} for one that was made otherwise."""
 
     def section(self, name: str, needed_by: str = "this") -> Section:
         """The section `name`; a clear error where the study has none."""
@@ -57,6 +63,8 @@ class Study:
     @cached_property
     def drive(self) -> Drive:
         """The drive: geometry, wave generator, clearances, material, load."""
+        from hdopt.drive.geometry import Clearances, Drive, Load
+
         geometry = self._built("drive")
         wave_generator = self._built("wave_generator", geometry, self.folder)
         return Drive(
@@ -65,15 +73,31 @@ class Study:
             self._built("clearances") if "clearances" in self.sections else Clearances(),
             self._built("material") if "material" in self.sections else None,
             self._built("load") if "load" in self.sections else Load(),
+            self._teeth("cs_teeth", geometry.circular_spline_teeth),
+            self._teeth("fs_teeth", geometry.flexspline_teeth),
+        )
+
+    def _teeth(self, name: str, teeth: int) -> MeasuredTeeth | None:
+        built: MeasuredTeeth | None = self._built(name, teeth, self.folder) if name in self.sections else None
+        return built
+
+    @property
+    def measured_instead(self) -> tuple[str, ...]:
+        """Names of the tooth amplitudes in [errors] and [tolerances] that measured teeth stand instead of."""
+        return tuple(
+            f"{spline}_tooth_amplitude"
+            for spline in ("cs", "fs")
+            if f"{spline}_teeth" in self.sections and self.sections[f"{spline}_teeth"].sine == "instead"
         )
 
     @cached_property
     def errors(self) -> DriveErrors:
         """The errors of the one drive in [errors]."""
-        return self._built("errors")
+        errors: DriveErrors = self._built("errors")
+        return errors.with_(**dict.fromkeys(self.measured_instead, 0.0))
 
     @cached_property
-    def effects(self) -> tuple[AddedEffect, ...]:
+    def effects(self) -> tuple[EffectValues, ...]:
         """The effects in [effects], which the base model leaves out; () where there are none."""
         if "effects" not in self.sections:
             return ()
@@ -90,9 +114,26 @@ class Study:
     @cached_property
     def operation(self) -> Operation:
         """The operating condition in [operation]; forward motion and nothing else where the study does not say."""
-        from hdopt.extended import Operation
+        from hdopt.simulation import Operation
 
         return self._built("operation") if "operation" in self.sections else Operation()
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of the study's numbers: all that ships and every --set merged in, keys in order. Layout, comments and
+        the order of keys in the file do not change it."""
+        text = json.dumps(self.data, sort_keys=True, separators=(",", ":"), default=str)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def with_(self, changes: Mapping[str, Any] | None = None, /, **more: Any) -> Study:
+        """This study with other values: `changes` by dotted path or last name of the key, `more` by last name.
+
+        `study.with_(width_mm=8)` and `study.with_({"wave_generator.width_mm": 8})` are the same; a section's name with
+        a table takes the section's place. The new study is checked like a file, and no file is read again. Raises
+        `HdoptError` for an unknown or ambiguous key.
+        """
+        values = {**(changes or {}), **more}
+        return study_of(with_values(self.document, values.items(), "with_"), self.name, self.folder)
 
     @property
     def title(self) -> str:
@@ -104,11 +145,34 @@ class Study:
             return self.section(name, "a drive" if name in DRIVE_SECTIONS else "this").build(*context)
         except HdoptError as error:
             raise HdoptError(f"{self.document.where((name,))}: {error}") from error
+        except (ValueError, ArithmeticError) as error:
+            raise HdoptError(
+                f"{self.document.where((name,))}: these numbers lead to no result ({error}); see whether each has the "
+                "unit its name says"
+            ) from error
+
+
+AnyStudy = Study | str | Path | None
+"""What every command takes: a study, the name of a shipped one, the path of a file; None for the shipped CSF-25-80."""
+
+
+def as_study(study: AnyStudy) -> Study:
+    """The `study` itself, or the one that a path or a shipped name means; the shipped CSF-25-80 for None."""
+    return study if isinstance(study, Study) else load_study(study)
+
+
+def study_of_drive(drive: Drive, errors: DriveErrors, name: str = "drive") -> Study:
+    """A study of the records of one `drive` and its `errors`, called `name`, for calls that take a study: it has no
+    file, no tolerances and no effects."""
+    study = Study(name, {}, {}, Path(), name, Document({}, name, {}))
+    # the properties that a file's sections would be built into, filled from the records
+    study.__dict__.update(drive=drive, errors=errors)
+    return study
 
 
 def shipped_drives() -> tuple[str, ...]:
     """Names of the drives that ship with hdopt."""
-    return _names(resources.files("hdopt") / "data")
+    return _names(resources.files("hdopt.drive") / "data")
 
 
 def shipped_studies() -> tuple[str, ...]:
@@ -140,19 +204,24 @@ def load_study(source: str | Path | None = None, overrides: Sequence[str] = (), 
         own = {key: value for key, value in document.data.items() if key != "drive"}
         base = _shipped_drive(document.data["drive"], document.where(("drive",))).data
         document = Document(merge(base, own), document.source, document.lines)
-    return study_of(apply_overrides(document, overrides), name, folder)
+    given = str(Path(source).resolve()) if source is not None and _is_file(Path(source)) else source
+    recipe = {"source": given, "overrides": list(overrides), "drive": drive}
+    return replace(study_of(apply_overrides(document, overrides), name, folder), recipe=recipe)
 
 
 def study_of(document: Document, name: str, folder: Path) -> Study:
     """The study in a document whose shipped parts are merged in already."""
     from hdopt.study.schema import check_sections
 
-    return Study(name, check_sections(document), document.data, folder, document.source, document)
+    study = Study(name, check_sections(document), document.data, folder, document.source, document)
+    if (work := files_of_work()) is not None:
+        work.facts |= {"study": name, "study_sha256": study.sha256, "source": document.source}
+    return study
 
 
 def _document(source: str | Path) -> tuple[Document, Path, str]:
     path = Path(source)
-    if path.suffix == ".toml" or path.is_file():
+    if path.suffix == ".toml" or _is_file(path):
         return read_document(path), path.parent, path.stem
     names = shipped_studies()
     if str(source) not in names:
@@ -161,48 +230,92 @@ def _document(source: str | Path) -> tuple[Document, Path, str]:
     return parse_document(file.read_text(encoding="utf-8"), f"{source}.toml"), Path(str(file)).parent, str(source)
 
 
+def _is_file(path: Path) -> bool:
+    """Whether `path` is a file; a name that no file can have is none."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
 def _shipped_drive(name: str, where: str = "") -> Document:
     if name not in shipped_drives():
         raise HdoptError(f"{where + ': ' if where else ''}{unknown_name('drive', name, shipped_drives())}")
-    file = resources.files("hdopt") / "data" / f"{name}.toml"
+    file = resources.files("hdopt.drive") / "data" / f"{name}.toml"
     return parse_document(file.read_text(encoding="utf-8"), f"{name}.toml")
 
 
 def apply_overrides(document: Document, overrides: Sequence[str]) -> Document:
-    """`document` with each KEY=VALUE set; messages then name --set as the place."""
-    if not overrides:
-        return document
-    data, lines = merge({}, document.data), dict(document.lines)
+    """`document` with each of `overrides`, KEY=VALUE, set; messages then name --set as the place."""
+    values = []
     for override in overrides:
         key, equals, value = override.partition("=")
         if not equals:
             raise HdoptError(f"--set {override!r} has no '='; write KEY=VALUE, as in --set wave_generator.width_mm=8")
-        path = _resolve(key.strip(), data)
-        set_value(data, path, parse_value(value.strip()))
+        values.append((key.strip(), parse_value(value.strip())))
+    return with_values(document, values)
+
+
+def with_values(document: Document, values: Iterable[tuple[str, Any]], place: str = "--set") -> Document:
+    """`document` with each (key, value) of `values` set; messages name `place` as the one that asked for it."""
+    from hdopt.study.schema import SECTIONS
+
+    data, lines = merge({}, document.data), dict(document.lines)
+    for key, value in values:
+        path = (key,) if key in SECTIONS and isinstance(value, Mapping) else _resolve(key, data, place)
+        set_value(data, path, value)
         lines[path] = SET_ON_COMMAND_LINE
     return Document(data, document.source, lines)
 
 
-def _resolve(key: str, data: Mapping[str, Any]) -> tuple[str, ...]:
+def _resolve(key: str, data: Mapping[str, Any], place: str) -> tuple[str, ...]:
     """The dotted path that a key's last name or path means; an unknown or ambiguous one is an error."""
-    from hdopt.study.schema import SECTIONS, section_model
+    from hdopt.study.schema import ANY_NAME, known_paths
 
-    known = {(name, field) for name in SECTIONS if name != "study" for field in section_model(name).model_fields}
-    known |= set(leaves(data))
     parts = tuple(key.split("."))
-    matches = sorted(path for path in known if path[-len(parts) :] == parts)
-    values = [path for path in matches if not isinstance(_get(data, path), Mapping)]
-    matches = values or matches
-    if len(matches) > 1:
-        options = " or ".join(".".join(path) for path in matches)
-        raise HdoptError(f"--set {key}: ambiguous; write {options}")
-    if not matches:
-        names = {path[-1] for path in known} if len(parts) == 1 else {".".join(path) for path in known}
-        raise HdoptError(f"--set {unknown_name('key', key, sorted(names))}")
-    return matches[0]
+    if parts[0] != "effects":
+        # The effects compile: they are asked only about what no other section has.
+        found = _match(key, parts, data, known_paths(data, without=("effects",)), place)
+        if found:
+            return found
+    possible = known_paths(data)
+    found = _match(key, parts, data, possible, place)
+    if found:
+        return found
+    possible = {path for path in possible if ANY_NAME not in path}
+    names = {path[-1] for path in possible} if len(parts) == 1 else {".".join(path) for path in possible}
+    raise HdoptError(f"{place} {unknown_name('key', key, sorted(names))}")
+
+
+def _match(
+    key: str, parts: tuple[str, ...], data: Mapping[str, Any], possible: set[tuple[str, ...]], place: str
+) -> tuple[str, ...] | None:
+    """The one of the `possible` paths that `parts` means, None where there is none."""
+    from hdopt.study.schema import ANY_NAME
+
+    made_up = {path for path in possible if ANY_NAME in path}
+    if any(_same(path, parts, ANY_NAME) for path in made_up):
+        return parts
+    possible = possible - made_up
+    # a key that the study writes, or one a level below its section, comes before those deeper in the schema
+    for known in ({*leaves(data), *(path for path in possible if len(path) <= 2)}, possible):
+        matches = sorted(path for path in known if path[-len(parts) :] == parts)
+        values = [path for path in matches if not isinstance(_get(data, path), Mapping)]
+        matches = values or matches
+        if len(matches) > 1:
+            options = " or ".join(".".join(path) for path in matches)
+            raise HdoptError(f"{place} {key}: ambiguous; write {options}")
+        if matches:
+            return matches[0]
+    return None
+
+
+def _same(path: tuple[str, ...], parts: tuple[str, ...], any_name: str) -> bool:
+    return len(path) == len(parts) and all(a in (any_name, b) for a, b in zip(path, parts, strict=True))
 
 
 def _get(data: Any, path: tuple[str, ...]) -> Any:
+    """The value at `path`, None where there is none."""
     for part in path:
         data = data.get(part) if isinstance(data, Mapping) else None
     return data

@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from hdopt.allocation.cost import CostModel, Exponential, Grade, GradeTable, Piecewise, Power, Reciprocal
+from hdopt.allocation.grades import GradeValue, iso_1328_pitch, it_grade, jis_1702_pitch
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.study.base import NotNegative, Positive, Section
-from hdopt.tolerance.cost import CostModel, Exponential, Grade, GradeTable, Piecewise, Power, Reciprocal
-from hdopt.tolerance.grades import GradeValue, iso_1328_pitch, it_grade, jis_1702_pitch
 
 
 class CostRow(Section):

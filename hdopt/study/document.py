@@ -10,14 +10,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hdopt.errors import HdoptError
+from hdopt.errors import HdoptError, shown
+from hdopt.files import read_text
 
 Keys = tuple[str, ...]
 
 SET_ON_COMMAND_LINE = 0
 """Stands for the line of a key that --set gave."""
 
+DEEPEST = 12
+"""Levels of tables and arrays; the deepest study that ships has five."""
+LONGEST_KEY = 200
+LARGEST_INTEGER = 2**63 - 1
+LONGEST_HEAD = 1000
+"""Letters of a line that are searched for its key."""
+
 _TABLE = re.compile(r"^\s*\[\[?\s*([^\]]+?)\s*\]\]?\s*(#.*)?$")
+_PART = re.compile(r"\"[^\"]*\"|'[^']*'|[^.]+")
 _KEY = re.compile(r"^\s*((?:\"[^\"]*\"|'[^']*'|[A-Za-z0-9_.-])+)\s*=")
 
 
@@ -40,16 +49,8 @@ class Document:
 
 
 def read_document(path: Path) -> Document:
-    """Read and parse a TOML file; every failure is one sentence with the place."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise HdoptError(
-            f"{path} is not a text file (byte {error.start} is not UTF-8); give a TOML study file"
-        ) from error
-    except OSError as error:
-        raise HdoptError(f"cannot read {path}: {error.strerror}; give an existing TOML study file") from error
-    return parse_document(text, str(path))
+    """Read and parse the TOML file `path`; every failure is one sentence with the place."""
+    return parse_document(read_text(path, "an existing TOML study file"), str(path))
 
 
 def parse_document(text: str, source: str) -> Document:
@@ -58,14 +59,42 @@ def parse_document(text: str, source: str) -> Document:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise HdoptError(f"{source} is not valid TOML: {error}") from error
-    return Document(data, source, _key_lines(text))
+    except RecursionError as error:
+        raise HdoptError(f"{source} is nested too deeply; a study has {DEEPEST} levels at most") from error
+    except ValueError as error:  # Python refuses integers of more than 4300 digits
+        raise HdoptError(f"{source} holds an integer of more than 4300 digits; TOML allows 64 bits") from error
+    document = Document(data, source, _key_lines(text))
+    _check_size(document)
+    return document
+
+
+def _check_size(document: Document) -> None:
+    """Refuse what no study needs and other code trips over: deep nesting, integers beyond 64 bits, endless names."""
+    todo: list[tuple[Keys, Any]] = [((), document.data)]
+    while todo:
+        path, value = todo.pop()
+        if len(path) > DEEPEST:
+            raise HdoptError(
+                f"{document.where(path[:3])}: is nested {len(path)} levels deep; a study has {DEEPEST} levels at most"
+            )
+        if path and len(path[-1]) > LONGEST_KEY:
+            raise HdoptError(
+                f"{document.where(path[:-1])}: has a name of {len(path[-1])} letters; at most {LONGEST_KEY} are allowed"
+            )
+        if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
+            raise HdoptError(f"{document.where(path)}: is an integer of {len(hex(value)) * 4} bits; TOML allows 64")
+        if isinstance(value, Mapping):
+            todo += [((*path, key), item) for key, item in value.items()]
+        elif isinstance(value, list):
+            todo += [((*path, str(number)), item) for number, item in enumerate(value)]
 
 
 def _key_lines(text: str) -> dict[Keys, int]:
     """Line of every table header and of every key that starts a line."""
     lines: dict[Keys, int] = {}
     table: Keys = ()
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, whole in enumerate(text.split("\n"), 1):
+        line = whole[:LONGEST_HEAD]
         if header := _TABLE.match(line):
             table = _split(header.group(1))
             lines.setdefault(table, number)
@@ -75,7 +104,7 @@ def _key_lines(text: str) -> dict[Keys, int]:
 
 
 def _split(dotted: str) -> Keys:
-    return tuple(part.strip().strip("\"'") for part in dotted.split("."))
+    return tuple(part.strip().strip("\"'") for part in _PART.findall(dotted))
 
 
 KIND_KEYS = ("distribution", "model", "callout")
@@ -99,7 +128,7 @@ def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]
 
 
 def leaves(data: Mapping[str, Any], path: Keys = ()) -> Iterator[Keys]:
-    """Paths of all values that are not tables."""
+    """Paths of all values in `data` that are not tables, each after `path`."""
     for key, value in data.items():
         if isinstance(value, Mapping):
             yield from leaves(value, (*path, key))
@@ -108,15 +137,18 @@ def leaves(data: Mapping[str, Any], path: Keys = ()) -> Iterator[Keys]:
 
 
 def set_value(data: dict[str, Any], path: Keys, value: Any) -> None:
-    """Set one key, making the tables on the way."""
+    """Set the key at `path` of `data` to `value`, making the tables on the way."""
     for part in path[:-1]:
         data = data.setdefault(part, {})
     data[path[-1]] = value
 
 
 def parse_value(text: str) -> Any:
-    """A value as TOML writes it; what is not TOML is taken as a string."""
+    """The value that `text` is in TOML; what is not TOML is taken as a string."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
         return text
+    if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
+        raise HdoptError(f"the value {shown(text)} is an integer of {len(text)} digits; TOML allows 64 bits")
+    return value

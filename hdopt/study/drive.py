@@ -1,18 +1,31 @@
-"""The sections that describe a drive, and how they become the frozen records of `hdopt.drive`."""
+"""The sections that describe a drive, and how they become the frozen records of `hdopt.drive.geometry`."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
-from hdopt.deviations import PHASE_OF, STUDY_KEYS, DriveErrors, study_key
-from hdopt.drive import Clearances, DriveGeometry, Load, Material, Structure, WaveGenerator
-from hdopt.errors import MissingValue
-from hdopt.profiles import Ellipse, MeasuredProfile, Resal, TwoDisk, WaveGeneratorProfile
-from hdopt.study.base import NotNegative, Positive, Section
+from hdopt.drive.errors import PHASE_OF, STUDY_KEYS, DriveErrors, study_key
+from hdopt.drive.geometry import Clearances, DriveGeometry, Load, Material, Structure, WaveGenerator
+from hdopt.drive.profiles import Ellipse, MeasuredProfile, Resal, TwoDisk, WaveGeneratorProfile, parallel_profile
+from hdopt.drive.teeth import MeasuredTeeth, read_teeth
+from hdopt.errors import HdoptError, MissingValue
+from hdopt.study.base import Section
+
+MOST_TEETH = 2000
+"""Strain wave gears have 60 to 640 teeth; what is computed grows with the number."""
+LARGEST_MM = 2000.0
+"""Flexsplines have a radius of 8 to 300 mm."""
+LARGEST_ERROR_MM = 5.0
+"""Errors are small beside the drive: the model is of first order in them, and real ones are below 0.1 mm."""
+STEEPEST_DEG = 5.0
+"""The same for tilts; real ones are below 0.5 deg."""
+
+Size = Annotated[float, Field(gt=0, le=LARGEST_MM)]
+NotNegativeSize = Annotated[float, Field(ge=0, le=LARGEST_MM)]
 
 
 class StudySection(Section):
@@ -26,14 +39,14 @@ class StudySection(Section):
 class DriveSection(Section):
     """[drive]"""
 
-    flexspline_teeth: int = Field(gt=0)
-    circular_spline_teeth: int = Field(gt=0)
-    module_mm: Positive
+    flexspline_teeth: int = Field(gt=0, le=MOST_TEETH)
+    circular_spline_teeth: int = Field(gt=0, le=MOST_TEETH + 2)
+    module_mm: float = Field(ge=0.01, le=50)
     pressure_angle_deg: float = Field(gt=0, lt=45)
-    flexspline_inner_radius_mm: Positive
-    flexspline_addendum_mm: Positive | None = None
-    circular_spline_addendum_mm: Positive | None = None
-    flexspline_wall_mm: Positive | None = None
+    flexspline_inner_radius_mm: Size
+    flexspline_addendum_mm: Size | None = None
+    circular_spline_addendum_mm: Size | None = None
+    flexspline_wall_mm: Size | None = None
 
     def build(self) -> DriveGeometry:
         return DriveGeometry(
@@ -53,18 +66,20 @@ class WaveGeneratorSection(Section):
 
     profile: Literal["ellipse", "resal", "two_disk", "measured"] = "ellipse"
     structure: Literal["integral", "automatic", "one_way_major", "one_way_minor"] = "integral"
-    width_mm: Positive
-    semi_major_mm: Positive | None = None
+    width_mm: float = Field(ge=0.1, le=LARGEST_MM)
+    semi_major_mm: Size | None = None
     """If omitted, the flexspline's inner radius plus the module, which is the usual greatest deflection."""
-    semi_minor_mm: Positive | None = None
+    semi_minor_mm: Size | None = None
     """Of the ellipse only; if omitted, that of equal perimeter."""
     wrap_angle_deg: float | None = Field(default=None, ge=0, lt=90)
     """Of the two-disk profile only."""
     file: str | None = None
     """Of the measured profile only: CSV of angle_deg,radius_mm, relative to the study file."""
-    noise_um: NotNegative = 0.0
+    surface: Literal["cam", "bearing"] | None = None
+    """Of the measured profile only: whether the file gives the cam itself or the outside of the bearing on it."""
+    noise_um: float = Field(default=0.0, ge=0, le=1000)
     """Of the measured profile only: standard deviation of a measured radius; the curve is smoothed within it."""
-    bearing_thickness_mm: Positive | None = None
+    bearing_thickness_mm: Size | None = None
 
     def build(self, drive: DriveGeometry, folder: Path) -> WaveGenerator:
         return WaveGenerator(
@@ -86,23 +101,61 @@ class WaveGeneratorSection(Section):
             return TwoDisk(undeformed, semi_major - undeformed, math.radians(self.wrap_angle_deg))
         if self.file is None:
             raise MissingValue("the measured profile", "wave_generator.file")
-        return MeasuredProfile.from_csv(folder / self.file, self.noise_um / 1000)
+        return self._measured(folder / self.file)
+
+    def _measured(self, file: Path) -> WaveGeneratorProfile:
+        """The flexspline's inner wall: the measured table itself, or the bearing's thickness outside it."""
+        if self.surface is None:
+            raise HdoptError(
+                'wave_generator.surface is not given; say what the measured file shows: surface = "cam" for the cam '
+                'itself, "bearing" for the outside of the flexible bearing on it (the flexspline\'s inner wall)'
+            )
+        measured = MeasuredProfile.from_csv(file, self.noise_um / 1000)
+        if self.surface == "bearing":
+            return measured
+        if self.bearing_thickness_mm is None:
+            raise MissingValue("a measured cam", "wave_generator.bearing_thickness_mm")
+        return parallel_profile(measured, self.bearing_thickness_mm)
+
+
+class TeethSection(Section):
+    """[cs_teeth] and [fs_teeth]: teeth that were measured one by one."""
+
+    file: str
+    """CSV of tooth, flank, fp_um, relative to the study file."""
+    deviation: Literal["cumulative", "single"]
+    """What the file gives: the deviation from tooth 1's pitch, or from the tooth before."""
+    flank: str | None = None
+    """Which flank carries, where the file has both."""
+    first_tooth_deg: float = 0.0
+    """Where tooth 1 lies, clockwise from the major axis at input angle 0."""
+    recentre: bool = False
+    """Take the first harmonic out: the part was measured off-centre."""
+    sine: Literal["instead", "beside"] = "instead"
+    """Whether the table stands instead of the spline's tooth amplitude in [errors] and [tolerances], or beside it."""
+
+    def build(self, teeth: int, folder: Path) -> MeasuredTeeth:
+        """The record for a spline of so many `teeth`; the file lies in `folder`."""
+        path = folder / self.file
+        values = read_teeth(path, teeth, self.flank)
+        first = math.radians(self.first_tooth_deg)
+        return MeasuredTeeth.of(values, self.deviation, first, self.recentre, source=self.file)
 
 
 class ErrorsSection(Section):
     """[errors]: one drive's errors. An error that is not listed is zero; a listed size needs its direction or phase."""
 
-    axis_eccentricity_mm: NotNegative = 0.0
+    axis_eccentricity_mm: float = Field(default=0.0, ge=0, le=LARGEST_ERROR_MM)
     axis_eccentricity_direction_deg: float | None = None
-    axis_tilt_y_deg: float = Field(default=0.0, gt=-45, lt=45)
-    axis_tilt_x_deg: float = Field(default=0.0, gt=-45, lt=45)
-    wg_eccentricity_mm: NotNegative = 0.0
+    axis_tilt_y_deg: float = Field(default=0.0, ge=-STEEPEST_DEG, le=STEEPEST_DEG)
+    axis_tilt_x_deg: float = Field(default=0.0, ge=-STEEPEST_DEG, le=STEEPEST_DEG)
+    wg_eccentricity_mm: float = Field(default=0.0, ge=0, le=LARGEST_ERROR_MM)
     wg_eccentricity_direction_deg: float | None = None
-    wg_tilt_major_deg: float = Field(default=0.0, gt=-45, lt=45)
-    wg_tilt_minor_deg: float = Field(default=0.0, gt=-45, lt=45)
-    cs_tooth_amplitude_mm: NotNegative = 0.0
+    wg_tilt_major_deg: float = Field(default=0.0, ge=-STEEPEST_DEG, le=STEEPEST_DEG)
+    wg_tilt_minor_deg: float = Field(default=0.0, ge=-STEEPEST_DEG, le=STEEPEST_DEG)
+    cs_tooth_amplitude_mm: float = Field(default=0.0, ge=0, le=LARGEST_ERROR_MM)
     cs_tooth_phase_deg: float | None = None
-    fs_tooth_amplitude_mm: NotNegative = 0.0
+    fs_tooth_amplitude_mm: float = Field(default=0.0, ge=0, le=LARGEST_ERROR_MM)
     fs_tooth_phase_deg: float | None = None
 
     def build(self) -> DriveErrors:
@@ -119,11 +172,11 @@ class ErrorsSection(Section):
 class ClearancesSection(Section):
     """[clearances]"""
 
-    backlash_mm: NotNegative | None = None
-    cross_slide_clearance_mm: NotNegative | None = None
-    slot_1_width_mm: Positive | None = None
-    slot_2_width_mm: Positive | None = None
-    disc_radius_mm: Positive | None = None
+    backlash_mm: NotNegativeSize | None = None
+    cross_slide_clearance_mm: NotNegativeSize | None = None
+    slot_1_width_mm: Size | None = None
+    slot_2_width_mm: Size | None = None
+    disc_radius_mm: Size | None = None
 
     def build(self) -> Clearances:
         return Clearances(
@@ -138,9 +191,9 @@ class ClearancesSection(Section):
 class MaterialSection(Section):
     """[material]: of the flexspline"""
 
-    modulus_mpa: Positive
+    modulus_mpa: float = Field(gt=0, le=2e6)
     poisson: float = Field(ge=0, lt=0.5)
-    endurance_mpa: Positive | None = None
+    endurance_mpa: float | None = Field(default=None, gt=0, le=1e5)
 
     def build(self) -> Material:
         return Material(self.modulus_mpa, self.poisson, self.endurance_mpa)
@@ -149,9 +202,9 @@ class MaterialSection(Section):
 class LoadSection(Section):
     """[load]"""
 
-    torque_nm: NotNegative | None = None
-    input_speed_rpm: NotNegative | None = None
-    tooth_face_width_mm: Positive | None = None
+    torque_nm: float | None = Field(default=None, ge=0, le=1e6)
+    input_speed_rpm: float | None = Field(default=None, ge=0, le=1e6)
+    tooth_face_width_mm: Size | None = None
 
     def build(self) -> Load:
         return Load(

@@ -80,7 +80,7 @@ class LimitSection(Section):
 
 
 class TradeSection(Section):
-    """[search.trade]: constants of the trade's formulas; see `hdopt.trade.bearing` for their sources."""
+    """[search.trade]: constants of the trade's formulas; see `hdopt.mechanics.bearing_life` for their sources."""
 
     rated_torque_nm: Positive | None = None
     rated_speed_rpm: Positive | None = None

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, create_model
 
-from hdopt.deviations import PHASE_OF, STUDY_KEYS, study_key
+from hdopt.drive.errors import PHASE_OF, STUDY_KEYS, study_key
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.study.base import Positive, Section
 from hdopt.study.costs import Cost
@@ -17,6 +17,7 @@ from hdopt.tolerance.copula import CorrelationGroup
 from hdopt.tolerance.distributions import (
     Beta,
     Distribution,
+    Fixed,
     HalfNormal,
     LogNormal,
     MeasuredSample,
@@ -115,6 +116,17 @@ class MeasuredRow(Row):
         return MeasuredSample.from_csv(folder / self.file, **self.bounds)
 
 
+class FixedRow(Section):
+    """An input that does not vary, such as a direction that is known."""
+
+    distribution: Literal["fixed"]
+    value: float
+    cost: None = None
+
+    def build(self, folder: Path) -> Distribution:
+        return Fixed(value=self.value)
+
+
 class PositionZoneRow(Section):
     """A position tolerance zone: a plane normal deviation truncated at its edge, or one uniform over the zone."""
 
@@ -140,7 +152,8 @@ AnyRow = Annotated[
     | LogNormalRow
     | BetaRow
     | MeasuredRow
-    | PositionZoneRow,
+    | PositionZoneRow
+    | FixedRow,
     Field(discriminator="distribution"),
 ]
 

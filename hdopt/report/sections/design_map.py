@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +83,11 @@ def design_map(
     limits: Sequence[Limit] = (),
     height: int = 500,
 ) -> go.Figure:
-    """A filled map with labelled contour lines; `values` of shape (len(y), len(x)), `titles` of x, y and the scale."""
+    """A filled map with labelled contour lines over `x` (n,) and `y` (m,).
+
+    `values` has the shape (m, n), `titles` are those of x, y and the scale; `designs` are marked, `limits` drawn as
+    lines; `height` is in px.
+    """
     x_title, y_title, unit = titles
     made = figure(x_title, y_title, height=height)
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
@@ -99,14 +103,12 @@ def design_map(
         f"<b>%{{z:.4~g}} {unit}</b><extra></extra>",
     )
     step = _round_step((high - low) / 10)
+    silent: dict[str, Any] = {"x": x, "y": y, "showscale": False, "hoverinfo": "skip"}
     made.add_contour(
-        x=x,
-        y=y,
+        **silent,
         z=values,
-        showscale=False,
         showlegend=False,
         name=unit,
-        hoverinfo="skip",
         contours={
             "coloring": "none",
             "showlabels": True,
@@ -119,16 +121,20 @@ def design_map(
     )
     for colour, limit in zip(LIMIT_COLOURS, limits, strict=False):
         made.add_contour(
-            x=x,
-            y=y,
+            **silent,
             z=limit.values,
-            showscale=False,
             showlegend=True,
             name=limit.name,
-            hoverinfo="skip",
             contours={"coloring": "none", "start": limit.limit, "end": limit.limit, "size": 1},
             line={"width": 3, "color": colour},
         )
+    _mark(made, designs)
+    made.update_xaxes(showgrid=False, range=[float(np.min(x)), float(np.max(x))])
+    made.update_yaxes(showgrid=False, range=[float(np.min(y)), float(np.max(y))])
+    return made
+
+
+def _mark(made: go.Figure, designs: Sequence[Design]) -> None:
     for design in designs:
         made.add_scatter(
             x=[design.x],
@@ -142,9 +148,6 @@ def design_map(
             marker={"size": 13, "color": PAPER, "line": {"width": 3, "color": INK}},
             hovertemplate="%{x:.4~g}, %{y:.4~g}",
         )
-    made.update_xaxes(showgrid=False, range=[float(np.min(x)), float(np.max(x))])
-    made.update_yaxes(showgrid=False, range=[float(np.min(y)), float(np.max(y))])
-    return made
 
 
 def _round_step(step: float) -> float:

@@ -6,15 +6,14 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from hdopt.diagnosis.verdict import TIE
 from hdopt.report import Figure, KeyFigures, Report, Section, Table, Text
 from hdopt.report.sections.diagnosis_residual import extended_name, plain_numbers, residual_section
 from hdopt.report.sections.words import in_sentence, label, listed, short
 from hdopt.report.theme import BLUE, GREEN, GREY, figure
 
 if TYPE_CHECKING:
-    from hdopt.diagnosis.effect import Parameter
-    from hdopt.diagnosis.verdict import Diagnosis
+    from hdopt.diagnosis.verdict.diagnosis import Diagnosis
+    from hdopt.effects.estimate import Parameter
 
 WAVE = re.compile(r"(amplitude|phase)_(\d+)_(?:um|deg|arcmin)$")
 LISTED_WAVES = 6
@@ -115,6 +114,7 @@ def confounded_items(diagnosis: Diagnosis) -> list[Table | Text]:
     """What could be mistaken for the effects found on this recording, and what would part them."""
     import pandas as pd
 
+    tie = diagnosis.evidence.settings.verdict.tie
     table = Table(
         "diagnosis-confounded",
         "What could be mistaken for it",
@@ -128,7 +128,7 @@ def confounded_items(diagnosis: Diagnosis) -> list[Table | Text]:
             }
         ),
         "Imitates: share of the found effect's power that the other could take over. Angle: the smallest between their "
-        f"columns. Where the log evidence apart is below {TIE:g}, this recording does not tell them apart by their "
+        f"columns. Where the log evidence apart is below {tie:g}, this recording does not tell them apart by their "
         "shape: only how likely each is beforehand speaks for the one found.",
         {"imitates": ".1%", "angle [deg]": ".1f", "log evidence apart": ".0f"},
     )

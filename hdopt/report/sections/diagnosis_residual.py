@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hdopt.diagnosis.fit import Fit
-from hdopt.diagnosis.probe import FitProbe
-from hdopt.recording import TURN
-from hdopt.recording_sync import synchronous_average
+from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.recordings.passes import synchronous_average
+from hdopt.recordings.read import TURN
 from hdopt.report import Figure, Section, Table
 from hdopt.report.sections.words import listed, short
 from hdopt.report.theme import BLUE, GREY, VERMILLION, figure
@@ -18,8 +18,8 @@ from hdopt.report.theme import BLUE, GREY, VERMILLION, figure
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-    from hdopt.diagnosis.locate import Location
-    from hdopt.diagnosis.verdict import Diagnosis
+    from hdopt.diagnosis.checks.localization import Location
+    from hdopt.diagnosis.verdict.diagnosis import Diagnosis
 
 Array = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ def residual_section(diagnosis: Diagnosis) -> Section:
     items = [waveform_figure(fits, extended_name(diagnosis))]
     if len(diagnosis.located):
         items.append(located_table(diagnosis.located))
-    if not base.problem.samples.locked:
+    if not base.problem.rows.locked:
         items.append(spectrum_figure(fits))
     if diagnosis.evidence.high is not None and diagnosis.evidence.high.best.fit.terms:
         items.append(ripple_figure(diagnosis.evidence.high.base, diagnosis.evidence.high.best.fit))
@@ -100,7 +100,7 @@ def located_table(located: tuple[Location, ...]) -> Table:
 
 def domain_figure(domain: str, fits: list[tuple[str, Fit, str]]) -> Figure | None:
     """The picture that shows one domain, or None where the figure by order shows it already."""
-    samples = fits[0][1].problem.samples
+    samples = fits[0][1].problem.rows
     if domain == "time":
         return channel_figure(domain, continued(samples.time, samples.record), fits)
     if domain in CHANNELS:
@@ -119,7 +119,7 @@ def waveform_figure(fits: list[tuple[str, Fit, str]], extended: str) -> Figure:
     import plotly.graph_objects as go
 
     (_, base, _), (_, best, _) = fits[0], fits[-1]
-    samples = base.problem.samples
+    samples = base.problem.rows
     change = (base.prediction - best.prediction - np.mean(base.prediction - best.prediction)) ** 2
     if samples.locked:
         rows, travel = np.arange(len(samples)), np.arange(len(samples), dtype=float)
@@ -153,7 +153,7 @@ def turn_figure(fits: list[tuple[str, Fit, str]]) -> Figure:
 
 def output_turn_figure(fits: list[tuple[str, Fit, str]]) -> Figure:
     """Output-synchronous average of the residual."""
-    ratio = fits[0][1].problem.samples.ratio
+    ratio = fits[0][1].problem.rows.ratio
     return _synchronous_figure(
         "diagnosis-output-turn",
         "Residual over one output turn",
@@ -169,7 +169,7 @@ def _synchronous_figure(key: str, title: str, axis: str, period: float, scale: f
 
     chart = figure(axis, "mean residual [arcmin]")
     for name, fit, colour in fits:
-        angle, mean, error = synchronous_average(fit.problem.samples.theta, fit.residual, period, bins=90)
+        angle, mean, error = synchronous_average(fit.problem.rows.theta, fit.residual, period, bins=90)
         chart.add_trace(go.Scatter(x=angle * scale, y=mean, name=name, line={"color": colour}))
     noise = float(np.nanmedian(error))
     caption = f"Means over all turns; noise alone moves a point of the last curve by about {noise:.2g} arcmin."
@@ -178,7 +178,7 @@ def _synchronous_figure(key: str, title: str, axis: str, period: float, scale: f
 
 def spectrum_figure(fits: list[tuple[str, Fit, str]]) -> Figure:
     """Residual by order, from the lowest that the record resolves."""
-    samples = fits[0][1].problem.samples
+    samples = fits[0][1].problem.rows
     span = max(samples.span_turns, 1.0)
     lowest, highest = min(1.0 / span, 0.5), 0.4 * samples.rows_per_turn
     chart = _envelopes([(name, FitProbe(fit), colour) for name, fit, colour in fits], lowest, highest, span)
@@ -194,7 +194,7 @@ def spectrum_figure(fits: list[tuple[str, Fit, str]]) -> Figure:
 
 def ripple_figure(before: Fit, after: Fit) -> Figure:
     """Orders above what the averaged rows hold, on the rows as recorded."""
-    samples = before.problem.samples
+    samples = before.problem.rows
     span = max(samples.span_turns, 1.0)
     probes = [("before", FitProbe(before), VERMILLION), ("after", FitProbe(after), BLUE)]
     chart = _envelopes(probes, 0.05 * samples.rows_per_turn, 0.49 * samples.rows_per_turn, span)
@@ -221,7 +221,7 @@ def reversal_figure(fits: list[tuple[str, Fit, str]]) -> Figure:
     """Residual along each direction's passes, from the reversal on."""
     import plotly.graph_objects as go
 
-    samples = fits[0][1].problem.samples
+    samples = fits[0][1].problem.rows
     chart = figure("travel since the last reversal, or since the start [deg of output]", "mean residual [arcmin]")
     if samples.locked:
         chart.update_xaxes(title_text="torque since the last reversal [Nm]")

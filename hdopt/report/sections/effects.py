@@ -13,6 +13,7 @@ from hdopt.report.sections.words import listed
 from hdopt.report.theme import BLUE, GREY, VERMILLION, faded, figure
 
 if TYPE_CHECKING:
+    import pandas as pd
     import plotly.graph_objects as go
 
 Array = NDArray[np.float64]
@@ -35,20 +36,6 @@ def effects_section(
     `rows` as in `KinematicErrorResult.effects`; `theta` input angle over one full relative turn, rad, shape (n,);
     `base_arcmin` the base model's error there, `passes_arcmin` the extended model's by direction (+1, -1), each (n,).
     """
-    import pandas as pd
-
-    table = pd.DataFrame(
-        [
-            {
-                "effect": row["id"].replace("_", " "),
-                "belongs to": f"the {row['origin']}",
-                "counted": "yes" if row["counted"] else "no",
-                "adds_arcmin": row["adds_arcmin"],
-                "numbers": ", ".join(f"{name} {_short(value)}" for name, value in row["parameters"].items()),
-            }
-            for row in rows
-        ]
-    )
     counted = [row["id"].replace("_", " ") for row in rows if row["counted"]]
     items: list[Any] = [
         KeyFigures(
@@ -60,7 +47,7 @@ def effects_section(
         Table(
             f"{key}-table",
             "Effects and what each adds to the peak-to-peak of the others",
-            table,
+            _table(rows),
             "The effects do not add up: in the meshing zones the larger deviation drives, and extremes need not meet.",
             {"adds_arcmin": ".4f"},
         ),
@@ -88,6 +75,23 @@ def effects_section(
         else "No effect counts here."
     )
     return Section(key, "What the base model leaves out", tuple(items), says)
+
+
+def _table(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    import pandas as pd
+
+    return pd.DataFrame(
+        [
+            {
+                "effect": row["id"].replace("_", " "),
+                "belongs to": f"the {row['origin']}",
+                "counted": "yes" if row["counted"] else "no",
+                "adds_arcmin": row["adds_arcmin"],
+                "numbers": ", ".join(f"{name} {_short(value)}" for name, value in row["parameters"].items()),
+            }
+            for row in rows
+        ]
+    )
 
 
 def _short(value: Any) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +79,44 @@ def _stems(
     near = np.abs(orders[:, None] - orders) < 0.06 * span
     outshone = (near & (amplitude_arcmin[None, :] > amplitude_arcmin[:, None])).any(axis=1)
     top = float(amplitude_arcmin.max()) * 1.18
+    made = _two_panels(span, top, ratio)
+    for colour, kind in zip(PALETTE * 3, dict.fromkeys(kinds), strict=False):
+        mine = np.array([name == kind for name in kinds])
+        panels = [("x", "y", mine, True, ~outshone), ("x2", "y2", mine & around_two, False, around_two)]
+        for xaxis, yaxis, chosen, legend, named in panels:
+            if not chosen.any():
+                continue
+            x, y = orders[chosen], amplitude_arcmin[chosen]
+            gap = np.full_like(x, np.nan)
+            place: dict[str, Any] = {"xaxis": xaxis, "yaxis": yaxis, "name": kind, "legendgroup": kind}
+            made.add_scatter(
+                **place,
+                x=np.stack([x, x, gap], axis=1).ravel(),
+                y=np.stack([0 * y, y, gap], axis=1).ravel(),
+                mode="lines",
+                line={"color": colour, "width": 2.5},
+                showlegend=False,
+                hoverinfo="skip",
+            )
+            made.add_scatter(
+                **place,
+                x=x,
+                y=y,
+                mode="markers+text",
+                marker={"color": colour, "size": 9},
+                text=[expressions[i] if named[i] else "" for i in np.flatnonzero(chosen)],
+                textposition="top center",
+                textfont={"color": colour, "size": 12},
+                showlegend=legend,
+                customdata=[(expressions[i], origins[i]) for i in np.flatnonzero(chosen)],
+                cliponaxis=False,
+                hovertemplate="order %{customdata[0]} = %{x:.4f}<br>%{y:.4f} arcmin<br>%{customdata[1]}<extra></extra>",
+            )
+    return made
+
+
+def _two_panels(span: float, top: float, ratio: float) -> go.Figure:
+    """All orders up to `span` above, the neighbourhood of order 2 below, both up to the amplitude `top`."""
     made = figure("", "", height=560)
     made.update_layout(
         xaxis={"domain": [0, 1], "anchor": "y", "range": [-0.03 * span, span], "dtick": 1},
@@ -93,41 +131,4 @@ def _stems(
         },
         yaxis2={"domain": [0, 0.42], "anchor": "x2", "range": [0, top], "title": {"text": "Amplitude [arcmin]"}},
     )
-    for colour, kind in zip(PALETTE * 3, dict.fromkeys(kinds), strict=False):
-        mine = np.array([name == kind for name in kinds])
-        panels = [("x", "y", mine, True, ~outshone), ("x2", "y2", mine & around_two, False, around_two)]
-        for xaxis, yaxis, chosen, legend, named in panels:
-            if not chosen.any():
-                continue
-            x, y = orders[chosen], amplitude_arcmin[chosen]
-            gap = np.full_like(x, np.nan)
-            made.add_scatter(
-                x=np.stack([x, x, gap], axis=1).ravel(),
-                y=np.stack([0 * y, y, gap], axis=1).ravel(),
-                mode="lines",
-                line={"color": colour, "width": 2.5},
-                xaxis=xaxis,
-                yaxis=yaxis,
-                name=kind,
-                legendgroup=kind,
-                showlegend=False,
-                hoverinfo="skip",
-            )
-            made.add_scatter(
-                x=x,
-                y=y,
-                mode="markers+text",
-                marker={"color": colour, "size": 9},
-                xaxis=xaxis,
-                yaxis=yaxis,
-                text=[expressions[i] if named[i] else "" for i in np.flatnonzero(chosen)],
-                textposition="top center",
-                textfont={"color": colour, "size": 12},
-                name=kind,
-                legendgroup=kind,
-                showlegend=legend,
-                customdata=[(expressions[i], origins[i]) for i in np.flatnonzero(chosen)],
-                cliponaxis=False,
-                hovertemplate="order %{customdata[0]} = %{x:.4f}<br>%{y:.4f} arcmin<br>%{customdata[1]}<extra></extra>",
-            )
     return made

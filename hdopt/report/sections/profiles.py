@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,32 +101,13 @@ def _rings(phi: NDArray[np.float64], deflection_mm: Curves, change: Curves, radi
     circle = np.linspace(0, 2 * np.pi, 181)
     for i, (name, w) in enumerate(deflection_mm.items()):
         tag = str(i + 1) if i else ""
-        hidden = {"visible": False, "fixedrange": True}
-        made.update_layout(
-            {
-                f"xaxis{tag}": {
-                    "domain": [i / count, (i + 1) / count],
-                    "range": [-extent, extent],
-                    "anchor": f"y{tag}",
-                    "constrain": "domain",
-                    **hidden,
-                },
-                f"yaxis{tag}": {
-                    "range": [-extent, extent],
-                    "domain": [0.2, 1],
-                    "anchor": f"x{tag}",
-                    "scaleanchor": f"x{tag}",
-                    "constrain": "domain",
-                    **hidden,
-                },
-            }
-        )
+        place: dict[str, Any] = {"xaxis": f"x{tag}", "yaxis": f"y{tag}"}
+        made.update_layout(_panel(tag, (i / count, (i + 1) / count), extent))
         made.add_scatter(
+            **place,
             x=radius * np.sin(circle),
             y=radius * np.cos(circle),
             mode="lines",
-            xaxis=f"x{tag}",
-            yaxis=f"y{tag}",
             line={"color": GREY, "width": 1, "dash": "dot"},
             hoverinfo="skip",
             showlegend=False,
@@ -134,28 +115,12 @@ def _rings(phi: NDArray[np.float64], deflection_mm: Curves, change: Curves, radi
         )
         r = radius + times * w
         made.add_scatter(
+            **place,
             x=r * np.sin(phi),
             y=r * np.cos(phi),
             mode="markers",
-            xaxis=f"x{tag}",
-            yaxis=f"y{tag}",
             name=label(name),
-            marker={
-                "size": 7,
-                "color": change[name],
-                "cmin": -reach,
-                "cmax": reach,
-                "colorscale": [list(stop) for stop in DIVERGING],
-                "showscale": i == count - 1,
-                "colorbar": {
-                    "title": {"text": "Curvature change [10⁻³/mm]", "side": "top"},
-                    "orientation": "h",
-                    "x": 0.5,
-                    "y": 0.02,
-                    "yanchor": "bottom",
-                    "len": 0.6,
-                },
-            },
+            marker={"size": 7, "color": change[name], **_colours(reach, shown=i == count - 1)},
             customdata=np.stack([np.degrees(phi), 1000 * w, change[name]], axis=1),
             hovertemplate="%{customdata[0]:.0f} deg: deflection %{customdata[1]:.0f} µm<br>"
             "curvature change %{customdata[2]:.3f} × 10⁻³/mm",
@@ -171,6 +136,33 @@ def _rings(phi: NDArray[np.float64], deflection_mm: Curves, change: Curves, radi
             font={"size": 13, "color": INK},
         )
     return made
+
+
+def _panel(tag: str, domain: tuple[float, float], extent: float) -> dict[str, Any]:
+    """Axes of one ring, of equal scale and without ticks, in its part of the figure."""
+    hidden = {"visible": False, "fixedrange": True, "range": [-extent, extent], "constrain": "domain"}
+    return {
+        f"xaxis{tag}": {"domain": list(domain), "anchor": f"y{tag}", **hidden},
+        f"yaxis{tag}": {"domain": [0.2, 1], "anchor": f"x{tag}", "scaleanchor": f"x{tag}", **hidden},
+    }
+
+
+def _colours(reach: float, shown: bool) -> dict[str, Any]:
+    """Colours from -reach to reach, and their bar below the rings."""
+    return {
+        "cmin": -reach,
+        "cmax": reach,
+        "colorscale": [list(stop) for stop in DIVERGING],
+        "showscale": shown,
+        "colorbar": {
+            "title": {"text": "Curvature change [10⁻³/mm]", "side": "top"},
+            "orientation": "h",
+            "x": 0.5,
+            "y": 0.02,
+            "yanchor": "bottom",
+            "len": 0.6,
+        },
+    }
 
 
 def _along(phi: NDArray[np.float64], curves: Curves, title: str, number: str, first_colour: int = 0) -> go.Figure:

@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from hdopt.optimize.design_space import VARIABLES
+from hdopt.optimize.objectives import NOMINAL, QUANTITIES, ROBUST, Quantity, find_quantity
+from hdopt.optimize.records import DesignRecord, Front, Perturbation, SearchResult, Verification
+from hdopt.optimize.summary import NOT_MODELLED, number
+from hdopt.optimize.views import DesignMap, Rings, TradeViews
 from hdopt.report import Figure, KeyFigures, Section, Table, Text
 from hdopt.report.sections.design_map import Design, design_map
 from hdopt.report.sections.design_map import Limit as MapLimit
 from hdopt.report.sections.profiles import profiles_section
 from hdopt.report.sections.words import in_sentence, label, listed
 from hdopt.report.theme import GREY, INK, PALETTE, PAPER, VERMILLION, faded, figure
-from hdopt.trade.quantities import NOMINAL, QUANTITIES, ROBUST, find_quantity
-from hdopt.trade.space import VARIABLES
-from hdopt.trade.words import NOT_MODELLED, number
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-    from hdopt.trade.confidence import Perturbation, Verification
-    from hdopt.trade.run import DesignRecord, Front, SearchResult
-    from hdopt.trade.views import DesignMap, Rings, TradeViews
 
 DASHES = {"integral": "solid", "automatic": "solid", "one_way_major": "dash", "one_way_minor": "dot"}
 SYMBOLS = {"integral": "square", "automatic": "circle", "one_way_major": "triangle-up", "one_way_minor": "diamond"}
@@ -36,6 +35,9 @@ PARALLEL = (
     "bearing_life_h",
     "lag_arcmin",
 )
+Axis = tuple[str, str, str, Callable[[DesignRecord], float | None]]
+"""Of parallel coordinates: key, title, unit, and how to read it from a design."""
+
 CHANGED = 5e-4
 """A quantity that differs by less than this share is called unchanged."""
 
@@ -139,7 +141,7 @@ def _against_baseline(result: SearchResult) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["what", "baseline", "chosen", "change", "verdict"])
 
 
-def _price_row(price: dict) -> dict[str, str]:
+def _price_row(price: Mapping[str, Any]) -> dict[str, str]:
     return {
         "what": price["title"],
         "kind": price["kind"],
@@ -217,7 +219,7 @@ def front_section(result: SearchResult, front: Front) -> Section:
     )
 
 
-def _axis(quantity) -> str:
+def _axis(quantity: Quantity) -> str:
     return f"{quantity.title} [{quantity.unit}]"
 
 
@@ -249,7 +251,7 @@ def designs_section(result: SearchResult, key: str = "trade-designs") -> Section
     )
 
 
-def _parallel(axes, shown: list[DesignRecord], result: SearchResult) -> go.Figure:
+def _parallel(axes: Sequence[Axis], shown: list[DesignRecord], result: SearchResult) -> go.Figure:
     every = [*shown, result.baseline, result.best]
     ranges = []
     for _, _, _, read in axes:
@@ -367,7 +369,36 @@ def confidence_section(
 ) -> Section:
     """The choice checked by other means, and each constant of the trade changed."""
     objective = find_quantity(result.objective)
-    share = round(100 * result.setup.section.perturbation)
+    share = round(100 * result.setup.settings.perturbation)
+    return Section(
+        key,
+        "How sure the choice is",
+        (
+            KeyFigures(_checked_figures(checked)),
+            Figure(
+                f"{key}-figure",
+                f"The best {in_sentence(objective.title)} with each constant changed by {share} %",
+                _bars(result, perturbed, objective),
+                "A bar ends at the best value that can be had with the constant changed; vermillion where another "
+                "profile or structure is then the best. Searched anew are combinations within 10 % of the best, and "
+                "all where a constant bears on the lag.",
+            ),
+            Table(
+                f"{key}-perturbed",
+                "Every constant of the trade, its source, and what changing it does",
+                _perturbed(objective, perturbed),
+            ),
+            Text(
+                f"First-order optimality holds to {result.optimality_residual:.1e} of the objective's slope. "
+                f"Algorithms: {result.algorithm}; {result.evaluations} designs evaluated, {result.impossible} of them "
+                f"impossible; stopped because: {result.stopped_because}."
+            ),
+        ),
+        _what_changes(share, perturbed),
+    )
+
+
+def _what_changes(share: int, perturbed: Sequence[Perturbation]) -> str:
     other = [item for item in perturbed if item.feasible and not item.same_choice]
     none = [item for item in perturbed if not item.feasible]
     names = list(dict.fromkeys(item.constant for item in other))
@@ -379,6 +410,10 @@ def confidence_section(
     if none:
         missing = list(dict.fromkeys(f"{in_sentence(i.constant)} times {i.factor:g}" for i in none))
         verdict += f" No design keeps all limits with {listed(missing)}."
+    return verdict
+
+
+def _checked_figures(checked: Verification) -> dict[str, str]:
     values = {
         "Exact geometry": f"{checked.exact_arcmin:.4f} arcmin",
         "Compiled kernel": f"{checked.kernel_arcmin:.4f} arcmin",
@@ -390,7 +425,11 @@ def confidence_section(
         }
     if checked.searched_arcmin is not None:
         values["in the search"] = f"{checked.searched_arcmin:.4f} arcmin"
-    frame = pd.DataFrame(
+    return values
+
+
+def _perturbed(objective: Quantity, perturbed: Sequence[Perturbation]) -> pd.DataFrame:
+    return pd.DataFrame(
         [
             {
                 "constant": item.constant,
@@ -406,28 +445,6 @@ def confidence_section(
             for item in perturbed
         ]
     )
-    return Section(
-        key,
-        "How sure the choice is",
-        (
-            KeyFigures(values),
-            Figure(
-                f"{key}-figure",
-                f"The best {in_sentence(objective.title)} with each constant changed by {share} %",
-                _bars(result, perturbed, objective),
-                "A bar ends at the best value that can be had with the constant changed; vermillion where another "
-                "profile or structure is then the best. Searched anew are combinations within 10 % of the best, and "
-                "all where a constant bears on the lag.",
-            ),
-            Table(f"{key}-perturbed", "Every constant of the trade, its source, and what changing it does", frame),
-            Text(
-                f"First-order optimality holds to {result.optimality_residual:.1e} of the objective's slope. "
-                f"Algorithms: {result.algorithm}; {result.evaluations} designs evaluated, {result.impossible} of them "
-                f"impossible; stopped because: {result.stopped_because}."
-            ),
-        ),
-        verdict,
-    )
 
 
 def _regret(item: Perturbation) -> str:
@@ -436,7 +453,7 @@ def _regret(item: Perturbation) -> str:
     return "breaks a limit" if item.regret is None else f"{100 * item.regret:.2g} % above the best"
 
 
-def _bars(result: SearchResult, perturbed: Sequence[Perturbation], objective) -> go.Figure:
+def _bars(result: SearchResult, perturbed: Sequence[Perturbation], objective: Quantity) -> go.Figure:
     base = result.chosen.objective
     names = list(dict.fromkeys(item.constant for item in perturbed))
     made = figure(_axis(objective), "", height=110 + 22 * len(names), barmode="overlay", showlegend=True)

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hdopt.report import Figure, KeyFigures, Section, Table, Text
+from hdopt.report import Figure, Item, KeyFigures, Section, Table, Text
 from hdopt.report.sections.words import in_sentence, listed
 from hdopt.report.theme import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, faded, figure
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import pandas as pd
     import plotly.graph_objects as go
 
-    from hdopt.allocation import AllocateResult
-    from hdopt.sensitivity import Sobol
+    from hdopt.allocation.results import AllocateResult
+    from hdopt.tolerance.intervals import IntervalEstimate
+    from hdopt.tolerance.results import SobolResult, StackResult
+    from hdopt.tolerance.sensitivity import Shapley, Sobol
     from hdopt.tolerance.stack import Stack
-    from hdopt.tolerancing import SobolResult, StackResult
 
 SMALLEST_SHARE = 0.0005
 """Contributions below this are left out of the figure, not of the table."""
@@ -31,44 +35,18 @@ def readable(name: str) -> str:
 
 
 def stack_section(result: StackResult, key: str = "stack") -> Section:
-    """Distribution of the response against its limit, yield and capability, and what contributes."""
-    import pandas as pd
-
-    stack, unit = result.stack, result.stack.unit
+    """Distribution of the response in `result` against its limit, yield and capability, and what contributes; `key`
+    names the section."""
+    stack, unit, line = result.stack, result.stack.unit, result.stack.linearisation
     conforming, quantile = stack.conforming, stack.required_quantile
-    figures = {
-        "Yield": f"{100 * conforming.value:.3f} % ({100 * conforming.low:.3f} to {100 * conforming.high:.3f})",
-        "Required": f"{100 * stack.required_yield:.2f} % within {stack.limit:g} {unit}",
-        f"Quantile {stack.required_yield:g}": (
-            f"{quantile.value:.4g} {unit} ({quantile.low:.4g} to {quantile.high:.4g})"
-        ),
-        "Beyond the limit": f"{stack.ppm.value:.0f} ppm ({stack.ppm.low:.0f} to {stack.ppm.high:.0f})",
-    }
-    if stack.ppk is not None:
-        figures["Ppk"] = f"{stack.ppk.value:.3f} ({stack.ppk.low:.3f} to {stack.ppk.high:.3f})"
-    if result.worst_case is not None:
-        worst = result.worst_case
-        bound = "" if worst.bound is None else f", proven below {worst.bound:.4g}"
-        figures["Worst case found"] = f"{worst.value:.4g} {unit}{bound}"
-    if result.tail is not None:
-        tail = result.tail
-        figures[f"P(above {tail.limit:g} {unit})"] = f"{tail.probability:.3g} ({tail.low:.3g} to {tail.high:.3g})"
-    line = stack.linearisation
-    shares = pd.DataFrame(
-        {
-            "input": list(line.shares),
-            "share": list(line.shares.values()),
-            "operating point": [line.point.get(name) for name in line.shares],
-            f"slope, {unit} per unit": [line.slopes.get(name) for name in line.shares],
-        }
-    ).sort_values("share", ascending=False, ignore_index=True)
+    shares = _shares(stack)
     verdict = "keep" if conforming.low >= stack.required_yield else "do not keep"
     most = [in_sentence(readable(name)) for name in shares["input"][:2]]
     return Section(
         key,
         "What the tolerances give",
         (
-            KeyFigures(figures),
+            KeyFigures(_stack_figures(result)),
             Figure(
                 f"{key}-distribution",
                 "Distribution under the tolerances",
@@ -96,6 +74,45 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
         f"As toleranced the drives {verdict} the requirement: {100 * conforming.value:.2f} % stay within "
         f"{stack.limit:g} {unit}, {100 * stack.required_yield:.2f} % must. Most comes from {listed(most)}.",
     )
+
+
+def _stack_figures(result: StackResult) -> dict[str, str]:
+    """The few numbers to see first."""
+    stack, unit = result.stack, result.stack.unit
+    conforming, quantile = stack.conforming, stack.required_quantile
+    figures = {
+        "Yield": f"{100 * conforming.value:.3f} % ({100 * conforming.low:.3f} to {100 * conforming.high:.3f})",
+        "Required": f"{100 * stack.required_yield:.2f} % within {stack.limit:g} {unit}",
+        f"Quantile {stack.required_yield:g}": (
+            f"{quantile.value:.4g} {unit} ({quantile.low:.4g} to {quantile.high:.4g})"
+        ),
+        "Beyond the limit": f"{stack.ppm.value:.0f} ppm ({stack.ppm.low:.0f} to {stack.ppm.high:.0f})",
+    }
+    if stack.ppk is not None:
+        figures["Ppk"] = f"{stack.ppk.value:.3f} ({stack.ppk.low:.3f} to {stack.ppk.high:.3f})"
+    if result.worst_case is not None:
+        worst = result.worst_case
+        bound = "" if worst.bound is None else f", proven below {worst.bound:.4g}"
+        figures["Worst case found"] = f"{worst.value:.4g} {unit}{bound}"
+    if result.tail is not None:
+        tail = result.tail
+        figures[f"P(above {tail.limit:g} {unit})"] = f"{tail.probability:.3g} ({tail.low:.3g} to {tail.high:.3g})"
+    return figures
+
+
+def _shares(stack: Stack) -> pd.DataFrame:
+    """Contributions to the variance, the largest first."""
+    import pandas as pd
+
+    line, unit = stack.linearisation, stack.unit
+    return pd.DataFrame(
+        {
+            "input": list(line.shares),
+            "share": list(line.shares.values()),
+            "operating point": [line.point.get(name) for name in line.shares],
+            f"slope, {unit} per unit": [line.slopes.get(name) for name in line.shares],
+        }
+    ).sort_values("share", ascending=False, ignore_index=True)
 
 
 def _distribution(stack: Stack) -> go.Figure:
@@ -126,7 +143,7 @@ def _distribution(stack: Stack) -> go.Figure:
     return made
 
 
-def _contributions(shares) -> go.Figure:
+def _contributions(shares: pd.DataFrame) -> go.Figure:
     shown = shares[shares["share"] > SMALLEST_SHARE].iloc[::-1]
     made = figure("Share of the variance [%]", "", height=90 + 30 * len(shown))
     made.add_bar(
@@ -146,7 +163,7 @@ def _contributions(shares) -> go.Figure:
 
 def sobol_section(result: SobolResult, key: str = "sobol") -> Section:
     """Sobol' indices with intervals, how they settle, and the strongest pairs; Shapley effects where there are some."""
-    items: list = []
+    items: list[Item] = []
     most: list[str] = []
     if result.sobol is not None:
         sobol = result.sobol
@@ -205,7 +222,7 @@ def _index_formats() -> dict[str, str]:
     return {f"{index}{end}": ".4f" for index in ("S1", "ST") for end in ("", " low", " high")}
 
 
-def _whiskers(estimates) -> dict:
+def _whiskers(estimates: Iterable[IntervalEstimate]) -> dict[str, Any]:
     values = np.array([[e.value, e.low, e.high] for e in estimates])
     return {
         "array": values[:, 2] - values[:, 0],
@@ -288,7 +305,7 @@ def _pairs(sobol: Sobol) -> go.Figure:
     return made
 
 
-def _shapley(shapley) -> go.Figure:
+def _shapley(shapley: Shapley) -> go.Figure:
     effects = dict(sorted(shapley.effects.items(), key=lambda item: item[1].value))
     made = figure("Shapley effect", "", height=100 + 34 * len(effects))
     made.add_bar(
@@ -305,22 +322,12 @@ def _shapley(shapley) -> go.Figure:
 
 
 def allocate_section(result: AllocateResult, key: str = "allocate") -> Section:
-    """Allocated tolerances, the rules side by side, and what tightening the requirement costs."""
-    import pandas as pd
-
-    check = result.verified_yield
-    figures = {
-        "Cost": f"{result.total_cost:.4g} (as toleranced now: {result.present_cost:.4g})",
-        "Verified yield": f"{100 * check.value:.3f} % ({100 * check.low:.3f} to {100 * check.high:.3f})",
-        "Status": result.status,
-        "Optimality gap": "not known" if result.optimality_gap is None else f"{100 * result.optimality_gap:.2g} %",
-    }
-    if result.marginal_cost is not None:
-        figures["Marginal cost"] = f"{result.marginal_cost:.4g} per {result.unit}"
+    """Allocated tolerances in `result`, the rules side by side, and what tightening the requirement costs; `key` names
+    the section."""
     sources = sorted({row.source for row in result.errors.values()})
     flags = sorted({row.extrapolated for row in result.errors.values() if row.extrapolated})
-    items: list = [
-        KeyFigures(figures),
+    items: list[Item] = [
+        KeyFigures(_allocate_figures(result)),
         Table(
             f"{key}-tolerances",
             "Allocated tolerances",
@@ -330,38 +337,21 @@ def allocate_section(result: AllocateResult, key: str = "allocate") -> Section:
         ),
     ]
     if result.comparison:
-        table = pd.DataFrame(
-            [
-                {
-                    "rule": outcome.rule,
-                    "cost": outcome.total_cost,
-                    "yield": outcome.conforming.value,
-                    "low": outcome.conforming.low,
-                    "high": outcome.conforming.high,
-                    f"quantile at the required yield, {result.unit}": outcome.required_quantile,
-                    f"response as the rule sees it, {result.unit}": outcome.modelled,
-                    "note": outcome.note,
-                }
-                for outcome in result.comparison
-            ]
-        )
-        items.append(
+        items += [
             Table(
                 f"{key}-rules",
                 "The rules side by side",
-                table,
+                _rules(result),
                 "Every rule's tolerances, judged by the same stack of the real response.",
                 {"cost": ".4f", "yield": ".5f", "low": ".5f", "high": ".5f"},
-            )
-        )
-        items.append(
+            ),
             Figure(
                 f"{key}-comparison",
                 "Tolerances by rule",
                 _comparison(result),
                 "Each tolerance as a multiple of the present one.",
-            )
-        )
+            ),
+        ]
     if len(result.cost_curve) > 1:
         items.append(
             Figure(
@@ -380,6 +370,39 @@ def allocate_section(result: AllocateResult, key: str = "allocate") -> Section:
         tuple(items),
         f"The {result.rule.replace('_', ' ')} rule meets the requirement at a cost of {result.total_cost:.4g}"
         + (f", {abs(change):.3g} {'more' if change > 0 else 'less'} than now." if np.isfinite(change) else "."),
+    )
+
+
+def _allocate_figures(result: AllocateResult) -> dict[str, str]:
+    check = result.verified_yield
+    figures = {
+        "Cost": f"{result.total_cost:.4g} (as toleranced now: {result.present_cost:.4g})",
+        "Verified yield": f"{100 * check.value:.3f} % ({100 * check.low:.3f} to {100 * check.high:.3f})",
+        "Status": result.status,
+        "Optimality gap": "not known" if result.optimality_gap is None else f"{100 * result.optimality_gap:.2g} %",
+    }
+    if result.marginal_cost is not None:
+        figures["Marginal cost"] = f"{result.marginal_cost:.4g} per {result.unit}"
+    return figures
+
+
+def _rules(result: AllocateResult) -> pd.DataFrame:
+    import pandas as pd
+
+    return pd.DataFrame(
+        [
+            {
+                "rule": outcome.rule,
+                "cost": outcome.total_cost,
+                "yield": outcome.conforming.value,
+                "low": outcome.conforming.low,
+                "high": outcome.conforming.high,
+                f"quantile at the required yield, {result.unit}": outcome.required_quantile,
+                f"response as the rule sees it, {result.unit}": outcome.modelled,
+                "note": outcome.note,
+            }
+            for outcome in result.comparison
+        ]
     )
 
 

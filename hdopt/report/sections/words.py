@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from hdopt.effects import EFFECTS
+
 
 def label(name: str) -> str:
     """A name from the code as a heading: 'one_way_major' reads 'One-way, major axis'."""
@@ -12,9 +14,9 @@ def label(name: str) -> str:
         "one_way_minor": "One-way, minor axis",
         "automatic": "Automatic alignment",
         "two_disk": "Two-disk",
-        "cs_tooth_harmonics": "CS tooth harmonics",
-        "fs_tooth_harmonics": "FS tooth harmonics",
     }
+    if name in EFFECTS:
+        return EFFECTS[name].heading
     return known.get(name, name.replace("_", " ")[:1].upper() + name.replace("_", " ")[1:])
 
 

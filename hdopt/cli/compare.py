@@ -1,0 +1,80 @@
+"""`hdopt compare`: a measured cam against the study's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hdopt.cli.common import OutputFile, drive_option, emit, json_option, seed_option, set_option
+from hdopt.files import to_csv, write_text
+
+if TYPE_CHECKING:
+    from hdopt.workflow.compare import CompareResult
+
+
+@click.command()
+@click.argument("cam", metavar="CAM.csv")
+@click.option("--study", metavar="STUDY", help="A study file or a shipped study; the shipped drive if omitted.")
+@drive_option
+@set_option
+@click.option(
+    "--probe-radius-mm", type=float, default=0.0, show_default=True, help="Of the ball whose centre is given."
+)
+@click.option(
+    "--surface",
+    type=click.Choice(["cam", "bearing"]),
+    default="cam",
+    show_default=True,
+    help="What was measured: the cam itself, or the outside of the bearing on it.",
+)
+@click.option("--part", metavar="NAME", help="disc_1 or disc_2 of a two-disk wave generator.")
+@click.option("--csv", "csv_file", metavar="FILE", type=OutputFile(), help="Deviation of every point.")
+@click.option("--plot", metavar="FILE", type=OutputFile(), help="Deviations over the angle, with the zone (SVG).")
+@click.option("--write-study", metavar="FILE", type=OutputFile(), help="The study with the measured cam (TOML).")
+@json_option
+@seed_option
+def command(cam: str, study: str | None, drive: str | None, overrides: tuple[str, ...], **options: Any) -> int:
+    """A measured cam against the one that the study designs: best fit, deviations, verdict.
+
+    CAM.csv has the columns angle_deg,radius_mm (clockwise from the major axis) or x_mm,y_mm: the cam's surface, or the
+    centre of a ball with --probe-radius-mm. Exit status 1 says that a point lies outside the profile's tolerance zone.
+    The study that --write-study writes goes to `hdopt ke` and `hdopt stack`.
+    """
+    from hdopt.study import load_study
+    from hdopt.workflow.compare import compare, write_measured_study
+
+    loaded = load_study(study, overrides, drive)
+    result = compare(
+        loaded, cam, probe_radius_mm=options["probe_radius_mm"], surface=options["surface"], part=options["part"]
+    )
+    if options["csv_file"]:
+        write_text(options["csv_file"], to_csv(result.to_frame()))
+    if options["plot"]:
+        from hdopt.geometry.deviation_plot import deviation_plot
+
+        title = f"{result.part} of {result.study}, measured"
+        write_text(options["plot"], deviation_plot(result.fit, result.zone, title, str(cam)))
+    table = write_measured_study(loaded, result, options["write_study"]) if options["write_study"] else None
+    emit(result.to_dict(), options["json_file"], _lines(result, options["write_study"], table))
+    return 0 if result.met else 1
+
+
+def _lines(result: CompareResult, study: Path | None, table: Path | None) -> Iterator[str]:
+    values = result.to_dict()
+    fit, deviation = values["fit"], values["deviation_um"]
+    yield f"{result.study}: {values['points']} points of the {result.part.replace('_', ' ')} ({result.surface})"
+    x, y = fit["shift_um"]
+    yield f"  best fit: turned by {fit['rotation_deg']:.4f} deg, moved by ({x:.3f}, {y:.3f}) um"
+    yield f"  deviation: {deviation['largest']:.3f} um at most, {deviation['rms']:.3f} um rms"
+    yield f"  scatter of a single point: {values['noise_um']:.3f} um"
+    word = "within" if result.met else "OUTSIDE"
+    yield f"  {word} the profile's zone of {values['zone_um']:.4g} um (half of it to either side)"
+    if values["eccentricity_allowed_um"] is not None:
+        word = "within" if values["eccentricity_met"] else "BEYOND"
+        allowed = values["eccentricity_allowed_um"]
+        yield f"  off the axis by {values['eccentricity_um']:.3f} um, {word} the {allowed:.4g} um of the tolerances"
+    if study is not None:
+        yield f"  wrote {study} and {table}: hdopt ke {study}"

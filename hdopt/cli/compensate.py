@@ -1,0 +1,72 @@
+"""`hdopt compensate`: what a controller can subtract, as CSV, JSON or C."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hdopt.cli.common import OutputFile, emit, json_option, seed_option
+from hdopt.cli.recorded import read_all, recording_options, source_of
+
+if TYPE_CHECKING:
+    from hdopt.workflow.compensate import Compensated
+
+
+@click.command()
+@recording_options
+@click.option("-o", "output", metavar="FILE", type=OutputFile(), required=True, help="Where the table goes.")
+@click.option("--as", "form", type=click.Choice(["csv", "json", "c"]), help="By default what FILE ends with, else CSV.")
+@click.option("--terms", type=int, default=64, show_default=True, help="Coefficients at most; 0 for a table.")
+@json_option
+@seed_option
+def command(**options: Any) -> int:
+    """What a controller can subtract from the output's position.
+
+    Indexed by input angle and output angle. Fitted to REC, chosen and judged on recordings, output turns or reversals
+    that the fit did not see. Exit status 1, and no file, where it would be no better than nothing beyond chance.
+    """
+    from hdopt.compensation.writers import FORMATS, written
+    from hdopt.files import write_text
+    from hdopt.workflow.compensate import compensate
+
+    source = source_of(options["drive"], options["ratio"], options["columns"], options["bench_file"])
+    found = compensate(read_all(source, options["recordings"]), source.drive, options["terms"], options["seed"])
+    output: Path = options["output"]
+    ending = output.suffix.lower().lstrip(".")
+    form = options["form"] or (ending if ending in FORMATS else "csv")
+    try:
+        if found.worth:
+            write_text(output, written(found.found, form, found.facts()))
+    finally:
+        emit(found.to_dict(str(output) if found.worth else None), options["json_file"], _lines(found, output))
+    return 0 if found.worth else 1
+
+
+def _lines(found: Compensated, output: Path) -> Iterator[str]:
+    yield f"held out: {found.held_out}; method: {found.method}"
+    yield (
+        f"peak-to-peak on what the fit did not see: {found.before:.4g} arcmin without, {found.after:.4g} with; expect "
+        f"{found.predicted:.4g} ({found.low:.4g} to {found.high:.4g}) of a fresh recording of this length"
+    )
+    for way, left in found.both.items():
+        yield f"  {way}: {left:.4g} arcmin left"
+    if len(found.recordings) > 1:
+        for part in found.recordings:
+            speed = "" if part.speed_rpm is None else f" at {part.speed_rpm:.4g} r/min"
+            yield f"  {part.name}{speed}: {part.before:.4g} -> {part.after:.4g} arcmin"
+    for warning in found.warnings:
+        yield f"note: {warning}"
+    if found.worth:
+        from hdopt.workflow.compensate import VOID, homing_words
+
+        yield homing_words(found.homing)
+        yield VOID
+        yield f"written: {output}"
+    else:
+        yield (
+            f"nothing written: no better than no compensation beyond chance ({found.evidence:.2g} standard errors on "
+            "held-out stretches); record more output turns or less noise"
+        )

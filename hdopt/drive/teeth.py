@@ -1,0 +1,117 @@
+"""Measured teeth of one spline: pitch deviations tooth by tooth."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.drive.values import DriveError, require
+
+Array = NDArray[np.float64]
+
+KINDS = ("cumulative", "single")
+
+
+@dataclass(frozen=True)
+class MeasuredTeeth:
+    """Cumulative pitch deviation of every tooth of a spline, mm of arc at the pitch line, mean zero.
+
+    Tooth 1 lies at `first_angle` (rad) clockwise from the major axis at input angle 0, the others follow clockwise. A
+    deviation is positive where it drives the output on, as the sines of `DriveErrors` are. `eccentricity` is the
+    amplitude (mm) of the first harmonic, which a part measured off-centre shows; `recentred` whether it was taken out.
+    """
+
+    deviations: tuple[float, ...]
+    first_angle: float = 0.0
+    eccentricity: float = 0.0
+    recentred: bool = False
+    source: str = "array"
+
+    @classmethod
+    def of(
+        cls, values: Array, kind: str = "cumulative", first_angle: float = 0.0, recentre: bool = False, source: str = ""
+    ) -> MeasuredTeeth:
+        """From the deviations `values` (mm, (n,)) of teeth 1 to n, of the `kind` "cumulative" or "single".
+
+        The sum of single deviations is spread over all teeth: a circle closes. `recentre` takes the first harmonic out;
+        `first_angle` (rad) and `source` as in the class.
+        """
+        require(kind in KINDS, f"the deviations are said to be {kind!r}; they must be one of {', '.join(KINDS)}")
+        values = np.asarray(values, float)
+        require(len(values) >= 8, f"{len(values)} teeth are given; at least 8 are needed")
+        require(bool(np.isfinite(values).all()), f"{source or 'the table'} holds a deviation that is not finite")
+        if kind == "single":
+            values = np.cumsum(values - values.mean())
+        values = values - values.mean()
+        angles = 2 * math.pi * np.arange(len(values)) / len(values)
+        wave = 2 / len(values) * np.sum(values * np.exp(-1j * angles))
+        if recentre:
+            values = values - np.real(wave * np.exp(1j * angles))
+        return cls(tuple(map(float, values)), first_angle, float(abs(wave)), recentre, source or "array")
+
+    @property
+    def total_cumulative(self) -> float:
+        """F_p, the range of the cumulative deviations, mm."""
+        return max(self.deviations) - min(self.deviations)
+
+    @property
+    def largest_single(self) -> float:
+        """f_p, the largest single pitch deviation by size, mm."""
+        values = np.array(self.deviations)
+        return float(np.abs(values - np.roll(values, 1)).max())
+
+
+def read_teeth(path: str | Path, teeth: int, flank: str | None = None) -> Array:
+    """Deviations (mm) of teeth 1 to `teeth` from the CSV file `path` of rows tooth, flank, fp_um.
+
+    A header line is optional, `#` starts a comment. `flank` picks one where the file has several. Raises `DriveError`
+    with file and line for a row that is none, a tooth that is missing, twice there, or beyond `teeth`.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DriveError(f"measured teeth {path}: cannot be read ({error}); give a CSV text file") from error
+    rows = _rows(text, path)
+    flanks = sorted({row[1] for row in rows})
+    named = ", ".join(flanks) or "none"
+    if flank is None:
+        require(len(flanks) <= 1, f"measured teeth {path} has the flanks {named}; say which one carries: flank = ...")
+    else:
+        require(flank in flanks, f"measured teeth {path} has no flank {flank!r}; it has {named}")
+    found: dict[int, float] = {}
+    for tooth, side, value in rows:
+        if flank is not None and side != flank:
+            continue
+        require(1 <= tooth <= teeth, f"measured teeth {path}: tooth {tooth}; this spline has teeth 1 to {teeth}")
+        require(tooth not in found, f"measured teeth {path} gives tooth {tooth} twice; keep one row a tooth and flank")
+        found[tooth] = value / 1000
+    missing = [tooth for tooth in range(1, teeth + 1) if tooth not in found]
+    some = ", ".join(map(str, missing[:5])) + (" ..." if len(missing) > 5 else "")
+    require(
+        not missing, f"measured teeth {path}: {len(missing)} of {teeth} teeth are missing ({some}); give every tooth"
+    )
+    return np.array([found[tooth] for tooth in range(1, teeth + 1)])
+
+
+def _rows(text: str, path: Path) -> list[tuple[int, str, float]]:
+    rows = []
+    header_allowed = True
+    for number, row in enumerate(csv.reader(text.splitlines()), 1):
+        if not row or row[0].lstrip().startswith("#"):
+            continue
+        try:
+            tooth, side, value = (cell.strip() for cell in row)
+            rows.append((int(tooth), side, float(value)))
+        except ValueError:
+            require(
+                header_allowed,
+                f"measured teeth {path}, line {number}: {','.join(row)!r}; each line must hold tooth, flank, fp_um",
+            )
+        header_allowed = False
+    return rows

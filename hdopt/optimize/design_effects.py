@@ -1,0 +1,79 @@
+"""Effects in a design search: what of them stays and what follows the design."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.drive.geometry import Drive
+from hdopt.simulation import EffectValues, Operation
+from hdopt.simulation.batch import AddedTable, local_extremes, matrix_peak_to_peak_arcmin, tabulate
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DesignEffects:
+    """Effects found on one drive, carried over to designs of the same ratio.
+
+    What is an arc in the meshing zones or an angle at the output stays as it is. A radial deviation of the circular
+    spline stays a radius: its arc follows the tangent of the pressure angle. `fixed` is the table of the former,
+    `radial` that of the latter for the pressure angle of tangent `tan_alpha`, None where there is none.
+    """
+
+    effects: tuple[EffectValues, ...]
+    operation: Operation
+    tan_alpha: float
+    fixed: AddedTable
+    radial: AddedTable | None
+
+    @classmethod
+    def of(cls, drive: Drive, effects: tuple[EffectValues, ...], operation: Operation) -> DesignEffects:
+        """The effects of a study's own drive."""
+        whole = tabulate(drive, effects, operation)
+        radial = None
+        if any(effect.effect.radial for effect in effects):
+            # On the places of the whole: the others at zero.
+            silent = [
+                e if e.effect.radial else replace(e, coefficients=tuple(0.0 * c for c in e.coefficients))
+                for e in effects
+            ]
+            radial = tabulate(drive, silent, operation)
+        fixed = whole if radial is None else replace(whole, zones=whole.zones - radial.zones)
+        return cls(effects, operation, math.tan(drive.geometry.pressure_angle), fixed, radial)
+
+    def at(self, drive: Drive) -> tuple[EffectValues, ...]:
+        """The effects of a design."""
+        factor = self._factor(drive)
+        return tuple(
+            replace(e, coefficients=tuple(factor * c for c in e.coefficients)) if e.effect.radial else e
+            for e in self.effects
+        )
+
+    def table(self, drive: Drive) -> AddedTable:
+        """Their table."""
+        if self.radial is None:
+            return self.fixed
+        return replace(self.fixed, zones=self.fixed.zones + self._factor(drive) * self.radial.zones)
+
+    def peak_to_peak_arcmin(self, drive: Drive, row: Array, homogenization: float = 1.0) -> float:
+        """Converged peak-to-peak of a design with errors `row` (12) and the effects, arcmin."""
+        return float(matrix_peak_to_peak_arcmin(drive, row[None, :], self.table(drive), homogenization)[0])
+
+    def spans_near(self, drive: Drive, row: Array, most: int) -> Callable[[Drive], Array]:
+        """A function of designs near `drive`: every one of its highest maxima less every one of its lowest minima, as
+        they move with the design, arcmin, shape (k,)."""
+        lows, highs = local_extremes(drive, row, self.table(drive), most)
+
+        def spans(design: Drive) -> Array:
+            table = self.table(design)
+            return (highs.values(design, row, table)[:, None] - lows.values(design, row, table)[None, :]).ravel()
+
+        return spans
+
+    def _factor(self, drive: Drive) -> float:
+        return math.tan(drive.geometry.pressure_angle) / self.tan_alpha

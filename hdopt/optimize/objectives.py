@@ -1,0 +1,376 @@
+"""What a search can minimise or limit: each quantity of a design with its slopes over the design variables.
+
+A quantity is the largest of one or more smooth pieces. Peak-to-peak and lag bring exact slopes of the kinematic error;
+the rest are smooth scalars, cheap enough for central differences (right to 1e-8 of their size).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.drive.errors import DriveErrors
+from hdopt.drive.geometry import Drive
+from hdopt.errors import HdoptError, MissingValue, unknown_name
+from hdopt.kinematics.closed_form import tip_geometry
+from hdopt.kinematics.gradients import extremes_of
+from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin
+from hdopt.mechanics.bearing_life import (
+    BearingConstants,
+    axial_force,
+    bearing_life_h,
+    bearing_load,
+    radial_force,
+    ring_force,
+)
+from hdopt.mechanics.bending import bending_stress
+from hdopt.mechanics.contact import homogenization_coefficient
+from hdopt.mechanics.lag import cross_slide_lag_arcmin
+from hdopt.optimize.design_space import Combination, Design, DesignSpace
+
+if TYPE_CHECKING:
+    from hdopt.optimize.design_effects import DesignEffects
+
+Array = NDArray[np.float64]
+
+NOMINAL, ROBUST = "peak_to_peak_arcmin", "peak_to_peak_quantile_arcmin"
+
+STEP = 1e-5
+"""Step of central differences as a share of a variable's range."""
+LOWEST_USED = 4
+"""How many of the lowest local minima of the kinematic error count as pieces."""
+TURN = np.linspace(0.0, 2 * math.pi, 361)
+
+
+@dataclass(frozen=True)
+class DesignConditions:
+    """What a design is judged under: errors, load, life formula, and for quantiles a fixed sample of errors.
+
+    `torque` (N mm) and `speed` (rad/s) are those the drive works under; `reference` is the drive
+    that the makers' life formula rates.
+    """
+
+    errors: DriveErrors
+    reference: Drive
+    bearing: BearingConstants
+    torque: float | None
+    speed: float | None
+    face_width: float | None
+    backlash: float | None
+    notch_factor: float = 2.2
+    k_b: float = 1.0
+    sample: Array | None = None
+    quantile: float = 0.9973
+    added: DesignEffects | None = None
+    """Effects that count beside the errors."""
+
+    def needed(self, name: str, needed_by: str) -> float:
+        value = getattr(self, name)
+        if value is None:
+            raise MissingValue(needed_by, _KEYS[name])
+        return value
+
+    @cached_property
+    def rows(self) -> Array:
+        return self.errors.to_matrix()
+
+    @cached_property
+    def weights(self) -> Array:
+        """Weights of the sorted sample in the quantile (Harrell and Davis 1982): it moves smoothly with the design."""
+        from scipy.stats import beta
+
+        if self.sample is None:
+            raise MissingValue("a quantile of the peak-to-peak", "a [tolerances] section")
+
+        n = len(self.sample)
+        edges = beta.cdf(np.arange(n + 1) / n, (n + 1) * self.quantile, (n + 1) * (1 - self.quantile))
+        return np.diff(edges)
+
+
+_KEYS = {
+    "torque": "load.torque_nm",
+    "speed": "load.input_speed_rpm",
+    "face_width": "load.tooth_face_width_mm",
+    "backlash": "clearances.backlash_mm",
+}
+
+
+@dataclass(frozen=True)
+class Point:
+    """A design under a trade, and its neighbours for differences over the `free` variables (name, step)."""
+
+    space: DesignSpace
+    trade: DesignConditions
+    combination: Combination
+    values: dict[str, float]
+    free: tuple[tuple[str, float], ...] = ()
+    _pairs: dict = field(default_factory=dict, repr=False, compare=False)
+
+    @cached_property
+    def design(self) -> Design:
+        return self.space.design(self.combination, self.values)
+
+    def pair(self, index: int) -> tuple[Design, Design]:
+        """The designs a step below and above in one free variable."""
+        if index not in self._pairs:
+            name, step = self.free[index]
+            self._pairs[index] = tuple(
+                self.space.design(self.combination, {**self.values, name: self.values[name] + sign * step})
+                for sign in (-1, 1)
+            )
+        return self._pairs[index]
+
+    def slopes(self, function: Callable[[Design], Array | float]) -> Array:
+        """Central differences of `function` over the free variables: shape (n,) or, for vectors, (n, k)."""
+        if not self.free:
+            return np.empty((0, *np.shape(function(self.design))))
+        return np.array(
+            [
+                (np.asarray(function(above)) - np.asarray(function(below))) / (2 * step)
+                for (below, above), (_, step) in zip(map(self.pair, range(len(self.free))), self.free, strict=True)
+            ]
+        )
+
+
+class Quantity(Protocol):
+    """One figure of merit: title, unit, and whether small or large is good."""
+
+    title: str
+    unit: str
+    small_is_good: bool
+
+    def value(self, trade: DesignConditions, design: Design) -> float: ...
+
+    def pieces(self, point: Point) -> tuple[Array, Array]:
+        """Values (k,) whose largest is the quantity, and their slopes (k, n) over the point's free variables."""
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A smooth quantity from one function of trade and design."""
+
+    title: str
+    unit: str
+    function: Callable[[DesignConditions, Design], float]
+    small_is_good: bool = True
+
+    def value(self, trade: DesignConditions, design: Design) -> float:
+        return float(self.function(trade, design))
+
+    def pieces(self, point: Point) -> tuple[Array, Array]:
+        value = self.value(point.trade, point.design)
+        return np.array([value]), point.slopes(lambda design: self.value(point.trade, design))[None, :]
+
+
+def tip_features(design: Design) -> Array:
+    """L_W, rho0, b/2, tan(alpha) and arcmin per mm of arc: all that the kinematic error knows of a design."""
+    tip, gear = tip_geometry(design.drive), design.drive.geometry
+    tan_alpha = math.tan(gear.pressure_angle)
+    return np.array([tip.semi_major, tip.tip_radius, tip.half_width, tan_alpha, gear.arcmin_per_mm])
+
+
+def _envelope(design: Design, rows: Array):
+    return extremes_of(tip_geometry(design.drive), math.tan(design.drive.geometry.pressure_angle), rows)
+
+
+@dataclass(frozen=True)
+class PeakToPeak:
+    """Peak-to-peak of the errors in the study, k_e = 1: the envelope over all FS phases (see `envelope`).
+
+    With effects there is no such envelope: the relative turn is walked, and local extremes are the pieces.
+    """
+
+    title: str = "Peak-to-peak"
+    unit: str = "arcmin"
+    small_is_good: bool = True
+
+    def value(self, trade: DesignConditions, design: Design) -> float:
+        if trade.added is not None:
+            return trade.added.peak_to_peak_arcmin(design.drive, trade.rows[0])
+        found = _envelope(design, trade.rows)
+        return float((found.highs.max() - found.lows.min()) * design.drive.geometry.arcmin_per_mm)
+
+    def pieces(self, point: Point) -> tuple[Array, Array]:
+        if point.trade.added is not None:
+            spans = point.trade.added.spans_near(point.design.drive, point.trade.rows[0], LOWEST_USED)
+            return spans(point.design.drive), point.slopes(lambda design: spans(design.drive)).T
+        found, features = _envelope(point.design, point.trade.rows), point.slopes(tip_features)
+        lows, low_slopes = found.lows[0, :LOWEST_USED], found.low_slopes[0, :LOWEST_USED]
+        spans = (found.highs[0][:, None] - lows[None, :]).ravel()
+        slopes = (found.high_slopes[0][:, None, :] - low_slopes[None, :, :]).reshape(-1, 4)
+        scale = point.design.drive.geometry.arcmin_per_mm
+        return scale * spans, scale * slopes @ features[:, :4].T + np.outer(spans, features[:, 4])
+
+
+@dataclass(frozen=True)
+class PeakToPeakQuantile:
+    """Quantile of the converged peak-to-peak under the tolerances, from a fixed sample (common random numbers).
+
+    A weighted mean of the sample's upper order statistics, so that it moves smoothly; its slopes are the same mean of
+    the drives' own.
+    """
+
+    title: str = "Peak-to-peak quantile"
+    unit: str = "arcmin"
+    small_is_good: bool = True
+
+    def _sample(self, trade: DesignConditions, design: Design) -> Array:
+        if trade.sample is None:
+            raise MissingValue("a quantile of the peak-to-peak", "a [tolerances] section")
+        return matrix_peak_to_peak_arcmin(design.drive, trade.sample)
+
+    def value(self, trade: DesignConditions, design: Design) -> float:
+        weights = trade.weights
+        return float(weights @ np.sort(self._sample(trade, design)))
+
+    def pieces(self, point: Point) -> tuple[Array, Array]:
+        trade = point.trade
+        weights = trade.weights
+        values = self._sample(trade, point.design)
+        order = np.argsort(values)
+        if not point.free:
+            return np.array([float(weights @ values[order])]), np.empty((1, 0))
+        counts = weights > 2e-3 * weights.max()
+        chosen, share = order[counts], weights[counts]
+        found, features = _envelope(point.design, trade.sample[chosen]), point.slopes(tip_features)
+        n = np.arange(len(chosen))
+        slopes = found.high_slopes[n, found.highs.argmax(axis=1)] - found.low_slopes[:, 0]
+        scale = point.design.drive.geometry.arcmin_per_mm
+        each = scale * slopes @ features[:, :4].T + np.outer(values[chosen] / scale, features[:, 4])
+        value = float(weights @ values[order])
+        return np.array([value]), (share @ each / share.sum())[None, :]
+
+
+@dataclass(frozen=True)
+class LargestLag:
+    """Largest lag over the turn (Jia 2021, Eqs. (33)-(35)): backlash less the lowest deviation, and the cross-slide."""
+
+    title: str = "Largest lag"
+    unit: str = "arcmin"
+    small_is_good: bool = True
+
+    def _slide(self, trade: DesignConditions, drive: Drive) -> float:
+        return float(np.max(cross_slide_lag_arcmin(drive, trade.errors, TURN)))
+
+    def value(self, trade: DesignConditions, design: Design) -> float:
+        backlash = trade.needed("backlash", "the lag")
+        play = backlash - float(_envelope(design, trade.rows).lows.min())
+        return play * design.drive.geometry.arcmin_per_mm + self._slide(trade, design.drive)
+
+    def pieces(self, point: Point) -> tuple[Array, Array]:
+        trade, scale = point.trade, point.design.drive.geometry.arcmin_per_mm
+        found, features = _envelope(point.design, trade.rows), point.slopes(tip_features)
+        play = trade.needed("backlash", "the lag") - found.lows[0, :LOWEST_USED]
+        slide = point.slopes(lambda design: self._slide(trade, design.drive))
+        slopes = np.outer(play, features[:, 4]) - scale * found.low_slopes[0, :LOWEST_USED] @ features[:, :4].T
+        return scale * play + self._slide(trade, point.design.drive), slopes + slide
+
+
+def carrying_angle(trade: DesignConditions, design: Design) -> float:
+    """Half angle over which flanks carry, rad."""
+    backlash = trade.needed("backlash", "the carrying angle")
+    return design.mesh.carrying_angle(design.drive.geometry.pressure_angle, backlash)
+
+
+def flank_pressure(trade: DesignConditions, design: Design) -> float:
+    torque, face = trade.needed("torque", "the flank pressure"), trade.needed("face_width", "the flank pressure")
+    return design.mesh.flank_pressure(torque, face, carrying_angle(trade, design))
+
+
+def carrying_teeth(trade: DesignConditions, design: Design) -> float:
+    return design.drive.geometry.circular_spline_teeth * carrying_angle(trade, design) / (2 * math.pi)
+
+
+def largest_bending_stress(trade: DesignConditions, design: Design) -> float:
+    if design.drive.material is None:
+        raise MissingValue("bending stress", "material.modulus_mpa", "material.poisson")
+    change = design.mesh.largest_curvature_change
+    return float(bending_stress(design.drive.material, design.drive.geometry.flexspline_wall, change))
+
+
+def bending_safety(trade: DesignConditions, design: Design) -> float:
+    """Endurance limit over notch factor times bending stress, which alternates: n = sigma_-1/(K_sigma sigma_a)."""
+    if design.drive.material is None or design.drive.material.endurance is None:
+        raise MissingValue("the safety against bending fatigue", "material.endurance_mpa")
+    return design.drive.material.endurance / (trade.notch_factor * largest_bending_stress(trade, design))
+
+
+def trailing_flank_room(trade: DesignConditions, design: Design) -> float:
+    backlash = trade.needed("backlash", "the room of the trailing flank")
+    return design.mesh.trailing_flank_room(design.drive.geometry.pressure_angle, backlash)
+
+
+def largest_radial_force(trade: DesignConditions, design: Design) -> float:
+    return radial_force(design.drive.geometry, trade.needed("torque", "the radial force"))
+
+
+def largest_axial_force(trade: DesignConditions, design: Design) -> float:
+    torque = trade.needed("torque", "the axial force")
+    return axial_force(design.drive.geometry, torque, trade.bearing.friction)
+
+
+def life(trade: DesignConditions, design: Design) -> float:
+    torque, speed = trade.needed("torque", "the bearing's life"), trade.needed("speed", "the bearing's life")
+    constants, reference = trade.bearing, trade.reference
+    load = bearing_load(design.drive.geometry, torque, constants.friction, ring_load(trade, design.drive))
+    rated = bearing_load(reference.geometry, constants.rated_torque, constants.friction, ring_load(trade, reference))
+    width, rated_width = design.drive.wave_generator.width, reference.wave_generator.width
+    return bearing_life_h(load, width, rated, rated_width, speed, constants)
+
+
+def ring_load(trade: DesignConditions, drive: Drive) -> float:
+    """Force that bends the toothed ring; none where wall, face width or modulus is not given."""
+    gear = drive.geometry
+    if drive.material is None or gear.flexspline_wall is None or trade.face_width is None:
+        return 0.0
+    deflection = drive.wave_generator.profile.semi_major - gear.flexspline_inner_radius
+    return ring_force(gear, deflection, drive.material.modulus, trade.face_width)
+
+
+def evened_out(trade: DesignConditions, design: Design) -> float:
+    teeth = design.drive.geometry.circular_spline_teeth * design.mesh.contact_angle / (2 * math.pi)
+    k_e = homogenization_coefficient(teeth, trade.k_b)
+    if trade.added is not None:
+        return trade.added.peak_to_peak_arcmin(design.drive, trade.rows[0], k_e)
+    return PeakToPeak().value(trade, design) * k_e
+
+
+def _diameter(trade: DesignConditions, design: Design) -> float:
+    gear = design.drive.geometry
+    return gear.module * gear.circular_spline_teeth
+
+
+QUANTITIES: dict[str, Quantity] = {
+    NOMINAL: PeakToPeak(),
+    ROBUST: PeakToPeakQuantile(),
+    "evened_out_arcmin": Scalar("Peak-to-peak times k_e", "arcmin", evened_out),
+    "lag_arcmin": LargestLag(),
+    "flank_pressure_mpa": Scalar("Mean flank pressure", "MPa", flank_pressure),
+    "bending_stress_mpa": Scalar("Bending stress", "MPa", largest_bending_stress),
+    "curvature_change_per_mm": Scalar("Curvature change", "1/mm", lambda t, d: d.mesh.largest_curvature_change),
+    "bending_safety": Scalar("Safety against bending fatigue", "", bending_safety, False),
+    "contact_angle_deg": Scalar("Contact angle", "deg", lambda t, d: math.degrees(d.mesh.contact_angle), False),
+    "carrying_angle_deg": Scalar("Carrying angle", "deg", lambda t, d: math.degrees(carrying_angle(t, d)), False),
+    "carrying_teeth": Scalar("Carrying teeth of one zone", "", carrying_teeth, False),
+    "trailing_flank_room_mm": Scalar("Room of the trailing flank", "mm", trailing_flank_room, False),
+    "radial_force_n": Scalar("Radial force", "N", largest_radial_force),
+    "axial_force_n": Scalar("Axial force", "N", largest_axial_force),
+    "bearing_life_h": Scalar("WG bearing life L10", "h", life, False),
+    "width_mm": Scalar("WG width", "mm", lambda t, d: d.drive.wave_generator.width),
+    "pitch_diameter_mm": Scalar("Pitch diameter of the CS", "mm", _diameter),
+    "ratio": Scalar("Ratio", "", lambda t, d: d.drive.geometry.ratio),
+}
+"""Study-file key -> the quantity."""
+
+
+def find_quantity(key: str) -> Quantity:
+    """The quantity of this key; an unknown one is an error that names the nearest."""
+    if key not in QUANTITIES:
+        raise HdoptError(unknown_name("quantity", key, QUANTITIES))
+    return QUANTITIES[key]

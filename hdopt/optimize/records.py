@@ -1,0 +1,162 @@
+"""What a search leaves: designs in plain numbers, fronts, the choice, and how sure it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from hdopt.optimize.setup import Setup
+from hdopt.optimize.solve import Solution
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class DesignRecord:
+    """One design in plain numbers: its choices, the variables by their study key, and every quantity."""
+
+    profile: str
+    structure: str
+    variables: dict[str, float]
+    quantities: dict[str, float]
+    feasible: bool = True
+    broken_limits: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+    @property
+    def name(self) -> str:
+        return f"{self.profile}, {self.structure}"
+
+
+@dataclass(frozen=True)
+class Front:
+    """Non-dominated designs between two quantities, and each combination's own front."""
+
+    objective: str
+    second: str
+    designs: tuple[DesignRecord, ...]
+    by_combination: dict[str, tuple[DesignRecord, ...]]
+    hypervolume: float
+    reference: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """What a search found. `best` is feasible unless `feasible` says no; then it is the design nearest to the limits.
+
+    `active` lists limits and bounds that hold the best design, with the price of each; `optimality_residual` is how far
+    the first-order conditions are from holding there, as a share of the objective's slope.
+    """
+
+    study: str
+    objective: str
+    second: str | None
+    feasible: bool
+    best: DesignRecord
+    baseline: DesignRecord
+    combinations: tuple[DesignRecord, ...]
+    fronts: tuple[Front, ...]
+    limits: tuple[str, ...]
+    active: tuple[dict[str, Any], ...]
+    optimality_residual: float
+    evaluations: int
+    impossible: int
+    algorithm: str
+    stopped_because: str
+    interrupted: bool
+    setup: Setup
+    solutions: tuple[Solution, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def chosen(self) -> Solution:
+        """The solution behind `best`."""
+        return choose(self.solutions)
+
+    @property
+    def front(self) -> tuple[DesignRecord, ...]:
+        """The front of the study's own objective, the nominal one where both were made."""
+        return self.fronts[0].designs if self.fronts else ()
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "study": self.study,
+            "objective": self.objective,
+            "second_objective": self.second,
+            "feasible": self.feasible,
+            "best": self.best.to_dict(),
+            "baseline": self.baseline.to_dict(),
+            "front": [design.to_dict() for design in self.front],
+            "fronts": [
+                {
+                    "objective": found.objective,
+                    "second_objective": found.second,
+                    "hypervolume": found.hypervolume,
+                    "reference": list(found.reference),
+                    "designs": [design.to_dict() for design in found.designs],
+                }
+                for found in self.fronts
+            ],
+            "combinations": [design.to_dict() for design in self.combinations],
+            "limits": list(self.limits),
+            "active": list(self.active),
+            "optimality_residual": self.optimality_residual,
+            "evaluations": self.evaluations,
+            "impossible_designs": self.impossible,
+            "algorithm": self.algorithm,
+            "stopped_because": self.stopped_because,
+            "notes": list(self.notes),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """The front as a table."""
+        import pandas as pd
+
+        rows = [{"profile": d.profile, "structure": d.structure, **d.variables, **d.quantities} for d in self.front]
+        return pd.DataFrame(rows)
+
+
+@dataclass(frozen=True)
+class Perturbation:
+    """What becomes of the choice where one constant is changed: the design chosen then, and whether it is another."""
+
+    constant: str
+    value: float
+    unit: str
+    source: str
+    factor: float
+    chosen: DesignRecord
+    feasible: bool
+    objective: float
+    same_choice: bool
+    regret: float | None
+    """By how much the design chosen now would miss the new best, as a share; None where it breaks a limit then."""
+
+    def to_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Verification:
+    """The best design's peak-to-peak (arcmin) by the exact geometry, and its quantile over fresh drives."""
+
+    exact_arcmin: float
+    kernel_arcmin: float
+    quantile: float | None
+    quantile_arcmin: float | None
+    low: float | None
+    high: float | None
+    searched_arcmin: float | None
+    drives: int
+
+    def to_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def choose(solutions: Sequence[Solution]) -> Solution:
+    """The least objective of the feasible `solutions`; where none is, the one nearest to the limits."""
+    return min(solutions, key=lambda s: (0.0 if s.feasible else s.violation, s.objective))

@@ -1,0 +1,83 @@
+"""The best design of a search, the fronts it was chosen from, and what its limits cost."""
+
+from __future__ import annotations
+
+from hdopt.optimize.evaluation import record, record_of
+from hdopt.optimize.fronts import Progress, front_objectives, trace_front
+from hdopt.optimize.minimax import GLOBAL, LOCAL
+from hdopt.optimize.multipliers import prices
+from hdopt.optimize.nlopt_adapter import INTERRUPTED, Effort, find_algorithm
+from hdopt.optimize.records import Front, SearchResult, choose
+from hdopt.optimize.setup import Setup
+from hdopt.optimize.solve import Method, Solution, solve
+
+
+def search_designs(
+    setup: Setup,
+    seed: int = 1,
+    progress: Progress = lambda stage: None,
+    *,
+    fronts: bool = True,
+    study: str = "",
+    notes: tuple[str, ...] = (),
+) -> SearchResult:
+    """Search the designs of `setup` for the best, and for `fronts` between its two objectives.
+
+    Every combination of profile and structure gets a global start and a local search; the best of all is chosen. An
+    interrupt (Ctrl-C) ends the search with the best so far. `seed` is that of the algorithms, `progress` is told what
+    comes next, `study` and `notes` are passed on to the result.
+    """
+    method = method_of(setup, seed)
+    solved: list[Solution] = []
+    made: list[Front] = []
+    interrupted = False
+    evaluations = 0
+    try:
+        for combination in setup.space.combinations:
+            progress(str(combination))
+            solution = solve(setup.problem(combination), method)
+            evaluations += solution.evaluations
+            solved.append(solution)
+            if solution.outcome.interrupted:
+                raise KeyboardInterrupt
+        if fronts and setup.settings.second_objective:
+            for objective in front_objectives(setup):
+                found, spent = trace_front(setup, method, objective, solved, progress)
+                made.append(found)
+                evaluations += spent
+    except KeyboardInterrupt:
+        interrupted = True
+        if not solved:
+            raise
+    best = choose(solved)
+    held, residual = prices(best.problem, best.values)
+    return SearchResult(
+        study=study,
+        objective=setup.settings.objective,
+        second=setup.settings.second_objective,
+        feasible=best.feasible,
+        best=record_of(setup, best),
+        baseline=record(setup, setup.baseline),
+        combinations=tuple(record_of(setup, solution) for solution in solved),
+        fronts=tuple(made),
+        limits=tuple(map(str, setup.limits())),
+        active=tuple(price.to_dict() for price in held),
+        optimality_residual=residual,
+        evaluations=evaluations,
+        impossible=sum(solution.outcome.impossible for solution in solved),
+        algorithm=f"{method.global_algorithm}, then {method.local_algorithm}",
+        stopped_because=INTERRUPTED if interrupted else best.outcome.stopped_because,
+        interrupted=interrupted,
+        setup=setup,
+        solutions=tuple(solved),
+        notes=notes,
+    )
+
+
+def method_of(setup: Setup, seed: int) -> Method:
+    """The algorithms that `setup` names, or those chosen by comparison, with `seed` for what they do at random."""
+    settings = setup.settings
+    names = settings.global_algorithm or GLOBAL, settings.local_algorithm or LOCAL
+    for name in names:
+        find_algorithm(name)
+    return Method(*names, local=Effort(seed=seed))

@@ -1,0 +1,121 @@
+"""Solving one combination: a global start, a local search, then standard values for the variables that have steps."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.optimize.design_space import Combination, Variable
+from hdopt.optimize.minimax import GLOBAL, LOCAL, explore, minimise
+from hdopt.optimize.nlopt_adapter import Effort, Outcome
+from hdopt.optimize.objectives import NOMINAL, ROBUST
+from hdopt.optimize.problem import DesignProblem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A solved combination: its values of the variables, and how NLopt came to them."""
+
+    problem: DesignProblem
+    values: dict[str, float]
+    outcome: Outcome
+    evaluations: int
+
+    @property
+    def combination(self) -> Combination:
+        return self.problem.combination
+
+    @property
+    def feasible(self) -> bool:
+        return self.outcome.feasible
+
+    @property
+    def objective(self) -> float:
+        return self.outcome.evaluation.objective if self.outcome.evaluation else np.inf
+
+    @property
+    def violation(self) -> float:
+        return self.outcome.evaluation.violation if self.outcome.evaluation else np.inf
+
+
+@dataclass(frozen=True)
+class Method:
+    """Which algorithms, and how much each may do."""
+
+    global_algorithm: str = GLOBAL
+    local_algorithm: str = LOCAL
+    global_evaluations: int = 150
+    warm_evaluations: int = 40
+    """Of a local search that starts from a neighbour's optimum, which takes about 7."""
+    local: Effort = field(default_factory=Effort)
+
+
+def solve(problem: DesignProblem, method: Method, starts: Sequence[dict[str, float]] = ()) -> Solution:
+    """Best design of the combination of `problem` by `method`. Without `starts` (values by variable) a global search
+    finds one; the baseline is tried as well.
+
+    Variables with standard values are first free, then set to the values next to what they came to, every combination
+    of neighbours, and the rest searched again. A heuristic: `tests/unit/test_optimize_search.py` compares it with
+    trying all values.
+    """
+    spent, local = 0, method.local
+    if starts:
+        local = replace(local, evaluations=method.warm_evaluations)
+        places = [problem.place(values) for values in starts]
+    else:
+        effort = replace(method.local, evaluations=method.global_evaluations)
+        found = explore(_cheap(problem), method.global_algorithm, effort)
+        spent += found.evaluations
+        if found.interrupted:
+            return Solution(problem, problem.values(found.u), found, spent)
+        places = [found.u, problem.place(problem.space.baseline_values)]
+    best: Outcome | None = None
+    for place in places:
+        outcome = minimise(problem, place, method.local_algorithm, local)
+        spent += outcome.evaluations
+        best = outcome if outcome.better_than(best) else best
+        if outcome.interrupted:
+            break
+    stepped = [variable for variable in problem.variables if variable.values]
+    if not stepped or best.interrupted:
+        return Solution(problem, problem.values(best.u), best, spent)
+    return _on_steps(problem, method, problem.values(best.u), stepped, spent)
+
+
+def _cheap(problem: DesignProblem) -> DesignProblem:
+    """For a global start only: the nominal error stands in for its quantile, which a thousand drives make."""
+    return replace(problem, objective=NOMINAL) if problem.objective == ROBUST else problem
+
+
+def _on_steps(
+    problem: DesignProblem, method: Method, values: dict[str, float], stepped: list[Variable], spent: int
+) -> Solution:
+    for reach in (1, 2, 4):
+        best: Solution | None = None
+        for chosen in itertools.product(*(_neighbours(v, values[v.name], reach) for v in stepped)):
+            narrowed = problem.with_fixed(**{v.name: x for v, x in zip(stepped, chosen, strict=True)})
+            outcome = minimise(narrowed, narrowed.place(values), method.local_algorithm, method.local)
+            spent += outcome.evaluations
+            if best is None or outcome.better_than(best.outcome):
+                best = Solution(narrowed, narrowed.values(outcome.u), outcome, spent)
+            if outcome.interrupted:
+                return replace(best, evaluations=spent)
+        if best.feasible:
+            break
+    return replace(best, evaluations=spent)
+
+
+def _neighbours(variable: Variable, value: float, reach: int) -> tuple[float, ...]:
+    """Up to `reach` standard values on either side; a value that is standard stands alone."""
+    allowed = np.array(sorted(variable.values))
+    near = np.flatnonzero(np.isclose(allowed, value, rtol=1e-9))
+    if len(near) and reach == 1:
+        return (float(allowed[near[0]]),)
+    place = int(np.searchsorted(allowed, value))
+    return tuple(float(x) for x in allowed[max(place - reach, 0) : place + reach])

@@ -1,0 +1,82 @@
+"""A search result in words and lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from hdopt.optimize.design_space import VARIABLES
+from hdopt.optimize.objectives import QUANTITIES
+from hdopt.optimize.records import DesignRecord, SearchResult
+
+NOT_MODELLED = (
+    "tooth separation under load",
+    "the stiffness and efficiency that an automatic or one-way wave generator loses in its cross-slide",
+    "ratcheting and buckling torque and torsional stiffness K1 to K3, which are catalogue values without a formula",
+    "the stiffness of the flexspline's cup, which loads the wave generator's bearing more than the toothed ring alone",
+)
+"""What stands beside every choice, because no formula of the trade knows it."""
+
+
+def number(value: float, unit: str = "") -> str:
+    """A `value` to four digits with its `unit`."""
+    return f"{value:.4g} {unit}".strip()
+
+
+def price_line(price: Mapping[str, Any]) -> str:
+    """What the `price` of one active limit or bound says, in a sentence."""
+    what = f"{price['title']} {price['kind']} {number(price['at'], price['unit'])}"
+    return f"{what}: one {price['unit'] or 'unit'} of it is worth {price['per_unit']:.3g} arcmin"
+
+
+def result_lines(result: SearchResult) -> Iterator[str]:
+    """A search's `result` in lines for the terminal."""
+    best, baseline = result.best, result.baseline
+    yield f"{result.study}: {result.algorithm}; {result.evaluations} designs evaluated"
+    if not result.feasible:
+        yield "  no design meets all limits; the nearest is shown, which breaks:"
+        for limit in best.broken_limits:
+            yield f"    {limit}"
+    yield f"  {'best' if result.feasible else 'nearest'}: {best.name}  ({result.stopped_because})"
+    for name, value in best.variables.items():
+        title, unit = VARIABLES[name]
+        yield _row(title, unit, value, baseline.variables.get(name))
+    for key, value in best.quantities.items():
+        yield _row(QUANTITIES[key].title, QUANTITIES[key].unit, value, baseline.quantities.get(key))
+    if result.active:
+        yield "  held by"
+        for price in result.active:
+            yield f"    {price_line(price)}"
+    yield "  combinations"
+    for design in sorted(result.combinations, key=lambda d: (not d.feasible, d.quantities[result.objective])):
+        state = "" if design.feasible else "  breaks a limit"
+        yield f"    {design.name:28s} {design.quantities[result.objective]:9.4f}{state}"
+    for front in result.fronts:
+        yield (
+            f"  front of {front.objective} and {front.second}: {len(front.designs)} designs, "
+            f"hypervolume {front.hypervolume:.4g}"
+        )
+    for note in result.notes:
+        yield f"  note: {note}"
+    yield f"  not modelled: {'; '.join(NOT_MODELLED)}"
+
+
+def _row(title: str, unit: str, value: float, before: float | None) -> str:
+    was = "" if before is None else f"   was {before:9.4g}"
+    return f"    {title:32s} {value:9.4g} {unit:7s}{was}"
+
+
+def design_words(design: DesignRecord) -> str:
+    """One `design` in a phrase: 'ellipse, automatic: 10.2 deg, 8.1 mm ...'."""
+    parts = [
+        f"{VARIABLES[name][0].lower()} {number(value, VARIABLES[name][1])}" for name, value in design.variables.items()
+    ]
+    return f"{design.name}: {', '.join(parts)}"
+
+
+def chosen_words(result: SearchResult) -> str:
+    """The choice of `result` with what it gains: 'two-disk, automatic: pressure angle 7 deg, ...; 0.74 arcmin instead
+    of 1.1'."""
+    after, before = (d.quantities[result.objective] for d in (result.best, result.baseline))
+    unit = QUANTITIES[result.objective].unit
+    return f"{design_words(result.best)}; {number(after, unit)} instead of {number(before, unit)}"

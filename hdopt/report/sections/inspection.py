@@ -1,0 +1,229 @@
+"""The acceptance sheet on one page: figures, limits, waveform, beat carpet, both directions, orders, checks."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hdopt.report import Figure, Item, KeyFigures, Report, Section, Table, Text
+from hdopt.report.theme import BLUE, DIVERGING, GREY, INK, VERMILLION, figure
+
+if TYPE_CHECKING:
+    from hdopt.recordings.figures import Cells
+    from hdopt.recordings.sheet import Batch, Inspection
+
+TURN = 2 * math.pi
+LISTED_ORDERS = 12
+
+
+def inspection_report(found: Inspection) -> Report:
+    """The acceptance sheet of `found` as a report."""
+    sections = [_summary(found)]
+    if found.cells:
+        sections.append(_waveform(found))
+    if found.orders:
+        sections.append(_orders(found))
+    if found.torsion is not None:
+        sections.append(_torsion(found))
+    sections.append(_checks(found))
+    title = f"Acceptance sheet{f' of {found.serial}' if found.serial else ''}"
+    subtitle = ", ".join(found.names) + (f"; {found.conditions}" if found.conditions else "")
+    return Report(title, subtitle, tuple(sections))
+
+
+def _summary(found: Inspection) -> Section:
+    import pandas as pd
+
+    values: dict[str, str] = {}
+    if found.beat is not None:
+        b = found.beat
+        values[f"Peak-to-peak over the full beat, {b.source}"] = f"{b.value:.3f} arcmin"
+        values["Its 95 % interval"] = f"{b.low:.3f} to {b.high:.3f} arcmin"
+    if len(found.one_turn):
+        values["Largest in one input turn"] = f"{found.one_turn.max():.3f} arcmin"
+    if found.cells:
+        values["Over the recording, one direction"] = f"{found.recording_peak_to_peak:.3f} arcmin"
+    if found.returned is not None:
+        values["Return error, median"] = f"{found.returned.median:.3f} arcmin"
+    values["Standard uncertainty of a peak-to-peak"] = f"{found.uncertainty:.3f} arcmin"
+    items: list[Item] = [KeyFigures(values)]
+    if found.limits:
+        frame = pd.DataFrame(
+            [
+                {
+                    "figure": d.name,
+                    "value_arcmin": d.value,
+                    "limit_arcmin": d.limit,
+                    "guard_band_arcmin": 1.645 * d.uncertainty,
+                    "decision": d.verdict,
+                    "what": d.note,
+                }
+                for d in found.limits
+            ]
+        )
+        items.append(
+            Table("limits", "Limits", frame, "Decided with a guard band of 95 % conformity (ISO 14253-1).", {})
+        )
+    items.append(Text(f"{found.turns:.4g} input turns of a drive of ratio {found.ratio:g} were recorded."))
+    return Section(
+        "sheet",
+        "Acceptance",
+        tuple(items),
+        "Makers state the angular transmission accuracy over one turn of the output in one direction: the full beat.",
+    )
+
+
+def _waveform(found: Inspection) -> Section:
+    cells = max(found.cells, key=lambda c: len(c.error))
+    items: list[Item] = [
+        Figure(
+            "waveform",
+            "The error as recorded",
+            _line(cells),
+            "Means over cells of the input angle; forward and backward in their colours.",
+        )
+    ]
+    if (carpet := _carpet(cells)) is not None:
+        items.append(
+            Figure(
+                "carpet",
+                "The beat: every input turn, one above the other",
+                carpet,
+                "What stands upright is the input's and the circular spline's; what leans is the flexspline's.",
+            )
+        )
+    if found.returned is not None:
+        back = found.returned
+        made = figure("Input angle (turns)", "Return error (arcmin)", 300)
+        made.add_scatter(x=back.angle / TURN, y=back.curve, mode="lines", line={"color": INK, "width": 1})
+        made.add_hline(y=back.median, line={"color": VERMILLION, "dash": "dash"})
+        items.append(
+            Figure("return", "Both directions: error forward less error backward", made, "Dashed: the median.")
+        )
+    return Section("waveform-section", "Waveform", tuple(items))
+
+
+def _line(cells: Cells) -> Any:
+    made = figure("Input angle (turns)", "Error (arcmin)", 320)
+    middle = float(np.mean(cells.error))
+    for direction, colour, name in ((1.0, BLUE, "forward"), (-1.0, VERMILLION, "backward")):
+        x: list[float] = []
+        y: list[float] = []
+        for index in np.unique(cells.pass_index[cells.direction == direction]):
+            rows = cells.pass_index == index
+            x += [*(cells.angle[rows] / TURN).tolist(), math.nan]
+            y += [*(cells.error[rows] - middle).tolist(), math.nan]
+        if x:
+            made.add_scatter(x=x, y=y, mode="lines", name=name, line={"color": colour, "width": 1})
+    return made
+
+
+def _carpet(cells: Cells) -> Any:
+    """Error over angle within a turn and turn, of the longest pass; None for less than three turns."""
+    longest = max(np.unique(cells.pass_index), key=lambda k: float(np.ptp(cells.angle[cells.pass_index == k])))
+    rows = cells.pass_index == longest
+    per_turn = round(TURN / cells.width)
+    place = cells.place[rows] - int(np.floor(cells.place[rows].min() / per_turn)) * per_turn
+    turns = int(place.max()) // per_turn + 1
+    if turns < 3:
+        return None
+    grid = np.full((turns, per_turn), np.nan)
+    grid[place // per_turn, place % per_turn] = cells.error[rows] - float(np.mean(cells.error[rows]))
+    size = float(np.nanmax(np.abs(grid)))
+    made = figure("Input angle (deg)", "Input turn", 420)
+    made.add_heatmap(
+        z=grid,
+        x=(np.arange(per_turn) + 0.5) * 360 / per_turn,
+        y=np.arange(turns),
+        zmin=-size,
+        zmax=size,
+        colorscale=[list(stop) for stop in DIVERGING],
+        colorbar={"title": {"text": "arcmin"}},
+    )
+    return made
+
+
+def _orders(found: Inspection) -> Section:
+    import pandas as pd
+
+    lines = sorted(found.orders, key=lambda o: -o.amplitude_arcmin)[:LISTED_ORDERS]
+    frame = pd.DataFrame([vars(line) for line in lines])
+    made = figure("Order (cycles per input turn)", "Amplitude (arcmin)", 300)
+    for separable, colour, name in ((True, BLUE, "stands apart"), (False, GREY, "not separable in this record")):
+        part = [line for line in found.orders if line.separable == separable]
+        if part:
+            made.add_bar(
+                x=[line.order for line in part],
+                y=[line.amplitude_arcmin for line in part],
+                name=name,
+                width=0.03,
+                marker={"color": colour},
+            )
+    return Section(
+        "orders",
+        "Orders",
+        (
+            Figure("order-bars", "Amplitudes at the drive's orders", made, "Fitted together by least squares."),
+            Table("order-table", "The largest orders", frame, "", {"order": ".4f", "amplitude_arcmin": ".4f"}),
+        ),
+    )
+
+
+def _torsion(found: Inspection) -> Section:
+    torsion = found.torsion
+    assert torsion is not None
+    made = figure("Torque at the output (N m)", "Windup (arcmin)", 360)
+    made.add_scatter(x=torsion.torque, y=torsion.windup, mode="lines", line={"color": BLUE})
+    for knee in torsion.knees:
+        for side in (-knee, knee):
+            made.add_vline(x=side, line={"color": GREY, "dash": "dot"})
+    loss = torsion.hysteresis_loss_arcmin
+    values = {f"K{k + 1}": f"{value:.4g} Nm/rad" for k, value in enumerate(torsion.stiffness)}
+    values["Knees"] = f"{torsion.knees[0]:.3g} and {torsion.knees[1]:.3g} Nm"
+    if loss is not None:
+        values["Hysteresis loss"] = f"{loss:.3g} arcmin"
+    return Section(
+        "torsion",
+        "Stiffness",
+        (KeyFigures(values), Figure("torsion-curve", "Mean of both directions; knees dotted", made)),
+    )
+
+
+def _checks(found: Inspection) -> Section:
+    import pandas as pd
+
+    frame = pd.DataFrame([{"check": name, "finding": said} for name, said in found.checks.items()])
+    notes = [Text(text) for text in (*found.understood, *found.warnings)]
+    return Section("checks", "Checks, and how the files were read", (Table("check-table", "Checks", frame), *notes))
+
+
+def batch_report(batch: Batch) -> Report:
+    """Many drives: `batch` as one table and one plot."""
+    sound = [drive for drive in batch.drives if not drive.error]
+    made = figure("Drive", "Peak-to-peak (arcmin)", 380)
+    for outlier, colour, name in ((False, BLUE, "drive"), (True, VERMILLION, "outlier")):
+        part = [drive for drive in sound if drive.outlier == outlier]
+        if part:
+            made.add_scatter(
+                x=[drive.name for drive in part],
+                y=[drive.peak_to_peak for drive in part],
+                mode="markers",
+                name=name,
+                marker={"color": colour},
+            )
+    if batch.limit is not None:
+        made.add_hline(y=batch.limit, line={"color": INK, "dash": "dash"})
+    values = {"Drives": f"{len(sound)}"}
+    if batch.performance is not None:
+        p = batch.performance
+        values["Ppk"] = f"{p.ppk:.2f}"
+        values["Its 95 % interval"] = f"{p.low:.2f} to {p.high:.2f}"
+    items: tuple[Item, ...] = (
+        KeyFigures(values),
+        Figure("batch", "Peak-to-peak of every drive", made, "Dashed: the limit."),
+        Table("batch-table", "Every drive", batch.to_frame()),
+    )
+    section = Section("drives", "Drives", items, "Ppk by percentiles of a log-normal distribution (ISO 22514-2).")
+    return Report("Many drives of one type", f"{len(batch.drives)} recordings", (section,))

@@ -1,0 +1,136 @@
+"""`hdopt compare`: a measured cam against the one that a study designs."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from hdopt.errors import HdoptError, unknown_name
+from hdopt.files import write_text
+from hdopt.geometry.compare import CamFit, fit_cam, read_cam, table_of
+from hdopt.geometry.contour import Contour
+from hdopt.geometry.dimensions import tolerance_bounds
+from hdopt.geometry.job import Job, make_job
+from hdopt.study import Study
+from hdopt.workflow.export import export_options
+
+Surface = Literal["cam", "bearing"]
+
+
+@dataclass(frozen=True)
+class CompareResult:
+    """How a measured cam lies against its zone. `zone` is the full width of the profile's tolerance zone, mm.
+
+    `eccentricity_allowed` (mm) is what the study's tolerance of the wave generator's eccentricity lets the cam lie off
+    the axis that it was measured from; None where nothing bounds it.
+    """
+
+    study: str
+    part: str
+    surface: Surface
+    probe_radius: float
+    zone: float
+    fit: CamFit
+    eccentricity_allowed: float | None
+
+    @property
+    def met(self) -> bool:
+        """Whether every point lies within the zone about its best fit."""
+        return self.fit.largest <= self.zone / 2
+
+    @property
+    def eccentricity(self) -> float:
+        """How far the best fit lies off the axis that was measured from, mm."""
+        return math.hypot(*self.fit.shift)
+
+    def to_dict(self) -> dict[str, Any]:
+        allowed = self.eccentricity_allowed
+        return {
+            "study": self.study,
+            "part": self.part,
+            "surface": self.surface,
+            "probe_radius_mm": self.probe_radius,
+            "points": len(self.fit.angles),
+            "zone_um": 1e3 * self.zone,
+            "deviation_um": {"largest": 1e3 * self.fit.largest, "rms": 1e3 * self.fit.rms},
+            "fit": {
+                "rotation_deg": math.degrees(self.fit.rotation),
+                "shift_um": [1e3 * value for value in self.fit.shift],
+            },
+            "noise_um": 1e3 * self.fit.noise,
+            "eccentricity_um": 1e3 * self.eccentricity,
+            "eccentricity_allowed_um": None if allowed is None else 1e3 * allowed,
+            "eccentricity_met": None if allowed is None else self.eccentricity <= allowed,
+            "met": self.met,
+        }
+
+    def to_frame(self) -> Any:
+        """One row a point: angle in degrees, deviation in um."""
+        import pandas as pd
+
+        return pd.DataFrame(table_of(self.fit))
+
+
+def compare(
+    study: Study,
+    measured: str | Path,
+    *,
+    probe_radius_mm: float = 0.0,
+    surface: Surface = "cam",
+    part: str | None = None,
+) -> CompareResult:
+    """Lay the measured cam of a CSV file onto the cam that a study designs.
+
+    `measured` has angle_deg,radius_mm or x_mm,y_mm of the centre of a ball of `probe_radius_mm` mm; `surface` says
+    whether the cam itself was measured or the outside of the bearing on it; `part` is one of two discs. Raises
+    `HdoptError` for points that are not of this cam.
+    """
+    bounds = tolerance_bounds(study.data)
+    job = make_job(study.drive, export_options(study), study.name, bounds, study.data.get("contributors"))
+    name, contour = _nominal(job, surface, part)
+    fit = fit_cam(read_cam(Path(measured)), contour, probe_radius_mm)
+    allowed = bounds.get("wg_eccentricity_mm")
+    return CompareResult(study.name, name, surface, probe_radius_mm, job.model.profile_zone, fit, allowed)
+
+
+def _nominal(job: Job, surface: Surface, part: str | None) -> tuple[str, Contour]:
+    """The part that was measured and the contour that the points are to lie on."""
+    names = [item.name for item in job.model.profiled]
+    name = part or names[0]
+    if name not in names:
+        raise HdoptError(unknown_name("part with a profile", name, names))
+    contour = job.model.part(name).contour
+    assert contour is not None
+    if surface == "bearing":
+        contour = contour.inward(-(job.drive.wave_generator.bearing_thickness or 0.0))
+    return name, contour
+
+
+def write_measured_study(study: Study, result: CompareResult, path: Path) -> Path:
+    """Write the study with the measured cam in place of its profile, and the cam's table beside it.
+
+    The table's name is the study file's with `-cam.csv` for its ending; it keeps the cam's own eccentricity about the
+    axis that it was measured from. Returns the table's path.
+    """
+    import tomlkit
+
+    table = path.with_name(f"{path.stem}-cam.csv")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("angle_deg", "radius_mm"))
+    points = sorted((math.degrees(math.atan2(x, y)) % 360, math.hypot(x, y)) for x, y in result.fit.points.tolist())
+    writer.writerows((f"{angle:.9g}", f"{radius:.7f}") for angle, radius in points)
+    data = {name: dict(section) if isinstance(section, dict) else section for name, section in study.data.items()}
+    generator = dict(study.data["wave_generator"])
+    for key in ("semi_major_mm", "semi_minor_mm", "wrap_angle_deg"):
+        generator.pop(key, None)
+    noise = round(1e3 * result.fit.noise, 6)
+    generator |= {"profile": "measured", "file": table.name, "surface": result.surface, "noise_um": noise}
+    data["wave_generator"] = generator
+    write_text(table, text.getvalue())
+    write_text(path, tomlkit.dumps(data))
+    return table

@@ -1,0 +1,317 @@
+"""`hdopt compensate`: what a controller can subtract, chosen on parts of the recordings that the fit did not see."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.compensation.pursuit import dictionary, pursue
+from hdopt.compensation.surface import Harmonics, Surface, grid_angles, surface_of
+from hdopt.compensation.writers import homing_arcmin
+from hdopt.drive.geometry import Drive
+from hdopt.errors import HdoptError
+from hdopt.recordings.recording import TURN, Recording
+from hdopt.recordings.rows import Rows, gather, neighbours_for
+from hdopt.workflow.waveform_fit import WaveformFit, fit_rows
+
+Array = NDArray[np.float64]
+Found = Harmonics | Surface
+
+MOST_TERMS = 64
+FOLDS = 4
+SURE = 2.0
+"""Standard errors by which the held-out squares must fall for a compensation to be worth writing (one-sided 98 %)."""
+GROUPS_PER_BEAT = 8
+"""Stretches an output turn over which held-out squares are taken together: neighbouring turns hang together."""
+RESAMPLES = 400
+NONE = "none"
+STRETCHES = "stretches of the one output turn"
+
+
+@dataclass(frozen=True)
+class PerRecording:
+    """Held-out peak-to-peak (arcmin) of one recording at its usual input speed (r/min, None without a clock)."""
+
+    name: str
+    speed_rpm: float | None
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class Compensated:
+    """A compensation, and what it leaves on parts that the fit did not see; peak-to-peak in arcmin.
+
+    `before` and `after` of the held-out parts together, each part scored by a choice made without it; `predicted` for a
+    fresh recording of the same length, with its 95 % interval `low`, `high`; `both` the same for each direction.
+    `worth` says whether the fall is beyond chance (`evidence` standard errors).
+    """
+
+    found: Found
+    method: str
+    worth: bool
+    evidence: float
+    before: float
+    after: float
+    predicted: float
+    low: float
+    high: float
+    both: dict[str, float]
+    recordings: tuple[PerRecording, ...]
+    held_out: str
+    scores: dict[str, float]
+    homing: tuple[float, float]
+    ratio: float
+    warnings: tuple[str, ...] = field(default=())
+
+    def facts(self) -> dict[str, Any]:
+        """What the file says of itself: method, what it leaves, what it needs, what makes it void."""
+        return {
+            "ratio": self.ratio,
+            "method": self.method,
+            "peak_to_peak_before_arcmin": round(self.before, 4),
+            "peak_to_peak_expected_arcmin": round(self.predicted, 4),
+            "homing": homing_words(self.homing),
+            "void": VOID,
+        }
+
+    def to_dict(self, file: str | None) -> dict[str, Any]:
+        """The JSON of `hdopt compensate`; `file` is where the table went, None where none was written."""
+        return {
+            "schema": 1,
+            "file": file,
+            "worth": self.worth,
+            "method": self.method,
+            "terms": len(self.found) if isinstance(self.found, Harmonics) else self.found.values.size,
+            "heldout_peak_to_peak_arcmin": {
+                "before": self.before,
+                "after": self.after,
+                "predicted": self.predicted,
+                "low": self.low,
+                "high": self.high,
+            },
+            "directions": self.both,
+            "recordings": [vars(part) for part in self.recordings],
+            "held_out": self.held_out,
+            "evidence": self.evidence,
+            "heldout_rms_arcmin": self.scores,
+            "homing_rms_arcmin_per_deg": {"input": self.homing[0], "output": self.homing[1]},
+            "needs": homing_words(self.homing),
+            "void": VOID,
+            "warnings": list(self.warnings),
+        }
+
+
+VOID = (
+    "void after the wave generator, circular spline or flexspline was taken out or turned, after an encoder or its "
+    "zero was changed, and at a load or temperature far from the recording's"
+)
+
+
+def homing_words(homing: tuple[float, float]) -> str:
+    """What homing the table needs, in a sentence; `homing` is the rms (arcmin) a degree off at input and output."""
+    return (
+        "home both shafts: input_rad from the zero of the recording's input count, output_rad = input_rad/N counted on "
+        "from there, so the controller must know which input turn of the output's turn it is in; a degree off "
+        f"adds {homing[0]:.2g} arcmin rms at the input, {homing[1]:.2g} at the output"
+    )
+
+
+def compensate(
+    recordings: Sequence[Recording], drive: Drive | None = None, terms: int = MOST_TERMS, seed: int = 1
+) -> Compensated:
+    """What to subtract, from `recordings` of one drive.
+
+    `drive` None leaves the model out and takes harmonics alone. `terms` coefficients at most, 0 for a table over both
+    angles. `seed` for fits and resampling. Raises `HdoptError` where nothing moves or `terms` is out of range.
+    """
+    if not 0 <= terms <= MOST_TERMS:
+        raise HdoptError(f"--terms is {terms}; give 1 to {MOST_TERMS} coefficients, or 0 for a table")
+    moving = [r for r in recordings if not r.input_locked]
+    if not moving:
+        raise HdoptError("the input is locked in every recording; a compensation needs recordings that turn")
+    rows = gather(moving, neighbours_for(moving))
+    sign: tuple[float, ...] = (1.0, -1.0)
+    whole: WaveformFit | None = None
+    if drive is not None:
+        whole = fit_rows(rows, drive, seed, sign)
+        sign = (whole.sign,)
+    fold, held_out = _folds(rows)
+    trials = _trials(rows, fold, terms, lambda train: None if drive is None else fit_rows(train, drive, seed, sign))
+    before = _centred(rows.error, rows, fold)
+    nested, method = _choose(trials, fold)
+    found = _candidates(rows, whole, terms)[method]
+    worth, evidence = _worth(before, nested, rows)
+    # Parts of one recording are extrapolated in angle when held out; a fresh run over the same angles is not.
+    everywhere = np.ones(len(rows), bool)
+    again = _centred(rows.error - _at(found, rows, everywhere), rows, np.zeros_like(fold))
+    predicted, low, high = _predicted(again if rows.records == 1 else trials[method], rows, seed)
+    ways = {"forward": 1.0, "backward": -1.0} if rows.reverses else {}
+    return Compensated(
+        found,
+        method,
+        worth and bool(np.ptp(nested) < np.ptp(before)),
+        evidence,
+        float(np.ptp(before)),
+        float(np.ptp(nested)),
+        predicted,
+        low,
+        high,
+        {name: float(np.ptp(nested[rows.direction == way])) for name, way in ways.items()},
+        _per_recording(moving, rows, before, nested),
+        held_out,
+        {NONE: float(np.std(before))} | {name: float(np.std(left)) for name, left in trials.items()},
+        homing_arcmin(found, rows.ratio),
+        rows.ratio,
+        _warnings(rows, held_out, moving),
+    )
+
+
+def _trials(
+    rows: Rows, fold: NDArray[np.int64], terms: int, fit: Callable[[Rows], WaveformFit | None]
+) -> dict[str, Array]:
+    """What each way leaves (n,) on every part, fitted to the others."""
+    trials: dict[str, Array] = {}
+    for k in range(int(fold.max()) + 1):
+        train, test = _rows(rows, fold != k), fold == k
+        for name, found in _candidates(train, fit(train), terms).items():
+            left = trials.setdefault(name, np.full(len(rows), np.nan))
+            left[test] = rows.error[test] - _at(found, rows, test)
+    return {name: _centred(left, rows, fold) for name, left in trials.items()}
+
+
+def _folds(rows: Rows) -> tuple[NDArray[np.int64], str]:
+    """The part that each row belongs to, and what the parts are: recordings, output turns, passes, or stretches."""
+    if rows.records >= 2:
+        return np.asarray(rows.record % max(FOLDS, 2), np.int64), "recordings"
+    beat = np.floor((rows.theta - rows.theta.min()) / (TURN * rows.ratio)).astype(np.int64)
+    if beat.max() >= 1 and (beat == 1).sum() > 0.5 * (beat == 0).sum():
+        return np.asarray(beat % FOLDS, np.int64), "output turns"
+    passes = np.r_[0, np.cumsum(np.diff(rows.direction) != 0)]
+    if passes.max() >= 3:
+        return np.asarray(passes // 2 % FOLDS, np.int64), "reversals"
+    order = (rows.theta - rows.theta.min()) / max(float(np.ptp(rows.theta)), 1e-9)
+    return np.asarray(np.minimum((order * FOLDS).astype(int), FOLDS - 1), np.int64), STRETCHES
+
+
+def _rows(rows: Rows, mask: NDArray[np.bool_]) -> Rows:
+    """Some rows, their recordings numbered anew."""
+    part = rows.rows(mask)
+    return replace(part, record=np.unique(part.record, return_inverse=True)[1])
+
+
+def _candidates(rows: Rows, fit: WaveformFit | None, terms: int) -> dict[str, Found]:
+    """Every way to compensate, fitted to `rows`, in the form that will be written."""
+    outputs = rows.theta / rows.ratio
+    zeros = (rows.record[:, None] == np.arange(rows.records)).astype(float)
+    if rows.span_turns >= 0.5 * rows.ratio:
+        zeros = np.column_stack([zeros, (rows.theta - rows.theta.mean()) / TURN])
+    direction = rows.direction if rows.reverses else None
+    pairs = dictionary(rows.span_turns / rows.ratio)
+    most = terms or MOST_TERMS
+    alone = pursue((rows.theta, outputs), rows.error, zeros, direction, pairs, most)
+    made: dict[str, Found] = {"harmonics": alone if terms else surface_of([alone], back=alone.back)}
+    if fit is None:
+        return made
+    base = _model_surface(fit)
+    left = rows.error - base.at(rows.theta, outputs)
+    rest = pursue((rows.theta, outputs), left, zeros, direction, pairs, most // 2)
+    both = surface_of([rest], base.values, rest.back)
+    model = replace(base, back=fit.back_arcmin)
+    made["model"] = model.harmonics(terms) if terms else model
+    made["model and harmonics"] = both.harmonics(terms) if terms else both
+    return made
+
+
+def _model_surface(fit: WaveformFit) -> Surface:
+    """The fitted model's waveform over input and output angle."""
+    inputs, outputs = grid_angles()
+    a, b = inputs.ravel(), (inputs + outputs).ravel()
+    rotation = np.column_stack([np.cos(a), np.sin(a), np.cos(b), np.sin(b)])
+    values = fit.sign * fit.model.evaluate_at(rotation, fit.errors)[0].reshape(inputs.shape)
+    return Surface(values - values.mean())
+
+
+def _at(found: Found, rows: Rows, mask: NDArray[np.bool_]) -> Array:
+    theta = rows.theta[mask]
+    return found.at(theta, theta / rows.ratio, rows.direction[mask] if rows.reverses else 0.0)
+
+
+def _centred(values: Array, rows: Rows, fold: NDArray[np.int64]) -> Array:
+    """Values less the mean of their recording within their fold: a zero is nobody's error."""
+    key = rows.record * (int(fold.max()) + 1) + fold
+    _, inverse = np.unique(key, return_inverse=True)
+    return np.asarray(values - (np.bincount(inverse, values) / np.bincount(inverse))[inverse], float)
+
+
+def _choose(trials: dict[str, Array], fold: NDArray[np.int64]) -> tuple[Array, str]:
+    """What is left where each part is scored by the choice of the others, and the choice of all parts."""
+    names = list(trials)
+    squares = np.array([[float(np.sum(trials[n][fold == k] ** 2)) for k in range(int(fold.max()) + 1)] for n in names])
+    nested = np.empty(len(fold))
+    for k in range(squares.shape[1]):
+        others = np.delete(squares, k, axis=1).sum(axis=1)
+        nested[fold == k] = trials[names[int(np.argmin(others))]][fold == k]
+    return nested, names[int(np.argmin(squares.sum(axis=1)))]
+
+
+def _worth(before: Array, after: Array, rows: Rows) -> tuple[bool, float]:
+    """Whether the squares fall beyond chance, and by how many standard errors, over stretches of the record."""
+    size = max(1, round(rows.ratio / GROUPS_PER_BEAT))
+    _, group = np.unique(rows.block // size, return_inverse=True)
+    fall = np.bincount(group, before**2 - after**2) / np.bincount(group)
+    if len(fall) < 3:
+        return False, 0.0
+    error = float(fall.std(ddof=1)) / math.sqrt(len(fall))
+    evidence = float(fall.mean()) / max(error, 1e-300)
+    return evidence > SURE, min(evidence, 1e6)
+
+
+def _predicted(left: Array, rows: Rows, seed: int) -> tuple[float, float, float]:
+    """Peak-to-peak to expect of a fresh recording of this length, with a 95 % interval.
+
+    The mean over the recordings of what is `left` in each; the interval resamples whole input turns, each with its own
+    extremes.
+    """
+    rng = np.random.default_rng(seed)
+    values, variance = [], 0.0
+    for number in range(rows.records):
+        mask = rows.record == number
+        values.append(float(np.ptp(left[mask])))
+        _, block = np.unique(rows.block[mask], return_inverse=True)
+        high, low = np.full(block.max() + 1, -np.inf), np.full(block.max() + 1, np.inf)
+        np.maximum.at(high, block, left[mask])
+        np.minimum.at(low, block, left[mask])
+        draws = rng.integers(len(high), size=(RESAMPLES, len(high)))
+        # A resampled extreme never exceeds the sample's: its spread is right, its place is not.
+        variance += float(np.var(high[draws].max(axis=1) - low[draws].min(axis=1))) / rows.records
+    value, spread = float(np.mean(values)), math.sqrt(variance)
+    return value, max(value - 1.96 * spread, 0.0), value + 1.96 * spread
+
+
+def _per_recording(
+    recordings: Sequence[Recording], rows: Rows, before: Array, after: Array
+) -> tuple[PerRecording, ...]:
+    found = []
+    for number, recording in enumerate(recordings):
+        mask = rows.record == number
+        speed = None if rows.speed is None else float(np.median(np.abs(rows.speed[mask]))) * 60 / TURN
+        found.append(PerRecording(recording.name, speed, float(np.ptp(before[mask])), float(np.ptp(after[mask]))))
+    return tuple(found)
+
+
+def _warnings(rows: Rows, held_out: str, recordings: Sequence[Recording]) -> tuple[str, ...]:
+    said = [w for r in recordings for w in r.warnings]
+    if rows.span_turns < rows.ratio:
+        said.append(
+            f"{rows.span_turns:.3g} of the {rows.ratio:g} input turns of a beat were recorded: beyond them the table "
+            "is an extrapolation, and what it leaves there was not seen; record a whole output turn"
+        )
+    if held_out == STRETCHES:
+        said.append("one pass of at most one output turn: held out are stretches of it; record two output turns")
+    return tuple(said)

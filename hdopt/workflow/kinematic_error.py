@@ -1,0 +1,300 @@
+"""One drive, looked at from all sides: the results behind `hdopt ke` and `hdopt profile`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from hdopt.drive.errors import DriveErrors
+from hdopt.drive.geometry import Drive
+from hdopt.drive.profiles import perimeter_error, tip_radius_of_curvature
+from hdopt.errors import HdoptError, MissingValue
+from hdopt.kinematics.extremes import extremes_arcmin, walked_peak_to_peak_arcmin
+from hdopt.kinematics.load_sharing import LoadSharing
+from hdopt.kinematics.waveform import DEFAULT_METHOD, geometry_for
+from hdopt.mechanics.bending import max_bending_stress, max_curvature_change
+from hdopt.mechanics.contact import contact_angle, homogenization_coefficient, mean_flank_pressure, meshing_teeth
+from hdopt.mechanics.lag import lag
+from hdopt.recordings.orders import OrderSpectrum, order_spectrum
+from hdopt.simulation.extremes import peak_to_peak_arcmin as extended_peak_to_peak_arcmin
+from hdopt.study import AnyStudy, Study, as_study, study_of_drive
+from hdopt.workflow.effect_selection import inclusion
+from hdopt.workflow.effect_table import effect_table, remarks, walked_extended_arcmin
+from hdopt.workflow.waveform import WaveformResult, converged_extremes_arcmin, held_arcmin, model_of, waveform_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class KinematicErrorResult:
+    """Kinematic error of one drive. A value that needs a number nobody gave is None, and `notes` says which number.
+
+    `method` names the geometry: "exact" or "closed form". `peak_to_peak_arcmin` is converged, of a single tooth pair
+    (k_e = 1): essential supremum less essential infimum; `tooth_width_peak_to_peak_arcmin` is what holds over the width
+    of one FS tooth, which a recording can show; `nonuniform_arcmin` is it times k_e;
+    `sampled_peak_to_peak_arcmin` is taken only on the grid asked for. Where the study has effects, all of these are of
+    the extended model; `base_peak_to_peak_arcmin` is without effects. `effects` says of each whether it counts, where
+    it comes from ('drive' or 'bench') and what it adds to the peak-to-peak of the others.
+    """
+
+    study: str
+    method: str
+    profile: str
+    structure: str
+    peak_to_peak_arcmin: float
+    tooth_width_peak_to_peak_arcmin: float
+    minimum_arcmin: float
+    maximum_arcmin: float
+    sampled_peak_to_peak_arcmin: float | None
+    nonuniform_arcmin: float | None
+    contact_angle_deg: float | None
+    meshing_teeth: float | None
+    homogenization_coefficient: float | None
+    orders: tuple[dict[str, Any], ...]
+    lag_arcmin: dict[str, Any] | None
+    notes: tuple[str, ...]
+    base_peak_to_peak_arcmin: float
+    effects: tuple[dict[str, Any], ...] = ()
+    measured_teeth: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    """By spline, what is known of teeth measured one by one; their deviation is the mean over the teeth in contact."""
+
+    def to_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The order table."""
+        import pandas as pd
+
+        return pd.DataFrame(self.orders)
+
+
+@dataclass(frozen=True)
+class ProfileResult:
+    """What a wave generator's profile asks of the flexspline. None where a number is missing; `notes` says which."""
+
+    study: str
+    profile: str
+    semi_major_mm: float
+    semi_minor_mm: float
+    tip_radius_of_curvature_mm: float
+    perimeter_error_mm: float
+    contact_angle_deg: float | None
+    meshing_teeth: float | None
+    homogenization_coefficient: float | None
+    max_curvature_change_per_mm: float | None
+    max_bending_stress_mpa: float | None
+    max_bending_stress_plate_mpa: float | None
+    mean_flank_pressure_mpa: float | None
+    notes: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+class _Notes:
+    """Runs computations that may lack a number: the value, or None and a note of what is missing."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def value(self, function: Callable[..., T], *arguments: object) -> T | None:
+        try:
+            return function(*arguments)
+        except MissingValue as error:
+            if str(error) not in self.notes:
+                self.notes.append(str(error))
+            return None
+
+
+def kinematic_error(
+    study: AnyStudy | Drive = None,
+    errors: DriveErrors | None = None,
+    *,
+    sampling_deg: float | None = None,
+    turns: float | None = None,
+    method: str = DEFAULT_METHOD,
+) -> KinematicErrorResult:
+    """Kinematic error of the one drive of `study` ([errors], and [effects] where it has some): converged peak-to-peak,
+    orders, contact, lag.
+
+    `study` is a study, its name or its path; or the record of a drive, with its `errors`.
+
+    Jia 2021, Eqs. (16)-(32), by `method`: "exact", or "closed form" to second order in the errors. `sampling_deg` asks
+    for the peak-to-peak on a grid from 0 over `turns` input turns, end included; `turns` defaults to one full relative
+    turn. Raises `HdoptError` for a method that is none, or that the profile does not allow.
+    """
+    study = _study_of(study, errors)
+    drive, errors = study.drive, study.errors
+    gear = drive.geometry
+    _check_method(drive, method)
+    notes = _Notes()
+    angle = notes.value(contact_angle, gear, drive.wave_generator.profile)
+    teeth = None if angle is None else meshing_teeth(gear, angle)
+    k_e = None if teeth is None else homogenization_coefficient(teeth)
+    base_low, base_high = extremes_arcmin(drive, errors, method)
+    low, high, base = base_low, base_high, base_high - base_low
+    if study.effects:
+        low, high = converged_extremes_arcmin(study, method)
+    shown = waveform_of(study, method)
+    spectrum = order_spectrum(shown.theta, shown.waveform, [order.order for order in shown.orders])
+    lost = notes.value(lag, drive, errors, shown.theta, shown.driven)
+    effects, said = _effects(study, method, high - low, base)
+    return KinematicErrorResult(
+        study=study.name,
+        method=method,
+        profile=drive.wave_generator.profile.name,
+        structure=drive.wave_generator.structure.value,
+        peak_to_peak_arcmin=high - low,
+        tooth_width_peak_to_peak_arcmin=held_arcmin(study, method),
+        minimum_arcmin=low,
+        maximum_arcmin=high,
+        sampled_peak_to_peak_arcmin=_sampled(study, sampling_deg, turns, method),
+        nonuniform_arcmin=None if k_e is None else _nonuniform(study, method, k_e, high - low),
+        contact_angle_deg=None if angle is None else math.degrees(angle),
+        meshing_teeth=teeth,
+        homogenization_coefficient=k_e,
+        orders=_order_rows(shown, spectrum),
+        lag_arcmin=None if lost is None else lost.to_dict(),
+        notes=(*notes.notes, *said, *_words_on_teeth(drive)),
+        base_peak_to_peak_arcmin=base,
+        effects=effects,
+        measured_teeth=_measured(drive),
+    )
+
+
+def _check_method(drive: Drive, method: str) -> None:
+    try:
+        geometry_for(drive, method)
+    except ValueError as error:
+        raise HdoptError(str(error)) from None
+
+
+def _nonuniform(study: Study, method: str, k_e: float, single: float) -> float:
+    """Peak-to-peak with the driving deviation evened out by `k_e`; `single` is that of a single tooth pair, arcmin."""
+    if study.drive.has_measured_teeth:
+        return _shared(study, method, k_e)
+    if not study.effects:
+        return k_e * single
+    return extended_peak_to_peak_arcmin(replace(model_of(study, method), homogenization=k_e))
+
+
+def _shared(study: Study, method: str, k_e: float) -> float:
+    """Peak-to-peak (arcmin) where the teeth in contact share each term in its own way: misalignment, common to all, by
+    its mean; sines of teeth that were not measured by k_e; measured teeth by the mean that is in their table."""
+    if study.effects:
+        raise HdoptError("measured teeth and effects are not evened out together; leave [effects] out for that figure")
+    drive, e = study.drive, study.errors
+    mean = LoadSharing.of(drive).response(1, drive.geometry.circular_spline_teeth)
+    sines = e.with_(cs_tooth_amplitude=k_e * e.cs_tooth_amplitude, fs_tooth_amplitude=k_e * e.fs_tooth_amplitude)
+    low, high = extremes_arcmin(drive, sines, method, mean)
+    return high - low
+
+
+def _measured(drive: Drive) -> dict[str, dict[str, Any]]:
+    """What is known of measured teeth, by spline."""
+    parts = {"cs_teeth": drive.cs_teeth, "fs_teeth": drive.fs_teeth}
+    return {
+        name: {
+            "file": teeth.source,
+            "teeth": len(teeth.deviations),
+            "largest_single_pitch_um": 1000 * teeth.largest_single,
+            "total_cumulative_pitch_um": 1000 * teeth.total_cumulative,
+            "first_harmonic_um": 1000 * teeth.eccentricity,
+            "recentred": teeth.recentred,
+        }
+        for name, teeth in parts.items()
+        if teeth is not None
+    }
+
+
+def _words_on_teeth(drive: Drive) -> list[str]:
+    """That a table was re-centred, or shows what a part measured off-centre shows."""
+    found = []
+    for name, teeth in (("cs_teeth", drive.cs_teeth), ("fs_teeth", drive.fs_teeth)):
+        if teeth is None:
+            continue
+        as_offset = 1000 * teeth.eccentricity / math.tan(drive.geometry.pressure_angle)
+        size = f"{name}: a first harmonic of {1000 * teeth.eccentricity:.2f} um, as of {as_offset:.1f} um eccentricity,"
+        done = "was taken out" if teeth.recentred else "is kept; recentre = true takes it out, for a part off-centre"
+        found.append(f"{size} {done}")
+    return found
+
+
+def _effects(study: Study, method: str, whole: float, base: float) -> tuple[tuple[dict[str, Any], ...], list[str]]:
+    """A row an effect, and what is to be said of them."""
+    if not study.effects:
+        return (), []
+    model, chosen = model_of(study, method), inclusion(study, "all")
+    return effect_table(study, model, chosen, whole, base), [*chosen.says, *remarks(model)]
+
+
+def _order_rows(shown: WaveformResult, spectrum: OrderSpectrum) -> tuple[dict[str, Any], ...]:
+    return tuple(
+        {
+            "order": named.order,
+            "symbol": named.symbol,
+            "amplitude_arcmin": float(size),
+            "phase_deg": math.degrees(phase),
+            "origin": named.origin,
+        }
+        for named, size, phase in zip(shown.orders, spectrum.amplitudes, spectrum.phases, strict=True)
+    )
+
+
+def _sampled(study: Study, sampling_deg: float | None, turns: float | None, method: str) -> float | None:
+    if sampling_deg is None:
+        if turns is not None:
+            raise HdoptError("--turns goes with --sampling-deg; give the grid's spacing too")
+        return None
+    turns = study.drive.geometry.beat_phases if turns is None else turns
+    if not (math.isfinite(sampling_deg) and 0 < sampling_deg <= 360):
+        raise HdoptError(f"--sampling-deg is {sampling_deg!r}; it must lie above 0 and up to 360")
+    if not (math.isfinite(turns) and 0 < turns <= 10_000):
+        raise HdoptError(f"--turns is {turns!r}; it must lie above 0 and up to 10000")
+    if turns * 360 / sampling_deg > 1e7:
+        raise HdoptError(
+            f"{turns:g} turns every {sampling_deg:g} deg are more than 1e7 angles; take a coarser grid or fewer turns"
+        )
+    if study.effects:
+        return walked_extended_arcmin(model_of(study, method), math.radians(sampling_deg), turns)
+    return walked_peak_to_peak_arcmin(study.drive, study.errors, math.radians(sampling_deg), turns, method)
+
+
+def _study_of(study: AnyStudy | Drive, errors: DriveErrors | None) -> Study:
+    if isinstance(study, Drive):
+        return study_of_drive(study, DriveErrors() if errors is None else errors)
+    if errors is not None:
+        raise HdoptError("errors go with the record of a drive; a study has its own, change them with study.with_(...)")
+    return as_study(study)
+
+
+def profile(study: AnyStudy = None) -> ProfileResult:
+    """What the wave-generator profile of a `study` (or its name or path) asks of the flexspline: contact, curvature,
+    stress, stretch."""
+    study = as_study(study)
+    drive = study.drive
+    gear, curve = drive.geometry, drive.wave_generator.profile
+    notes = _Notes()
+    angle = notes.value(contact_angle, gear, curve)
+    teeth = None if angle is None else meshing_teeth(gear, angle)
+    return ProfileResult(
+        study=study.name,
+        profile=curve.name,
+        semi_major_mm=curve.semi_major,
+        semi_minor_mm=curve.semi_minor,
+        tip_radius_of_curvature_mm=tip_radius_of_curvature(curve),
+        perimeter_error_mm=perimeter_error(curve, gear.flexspline_inner_radius),
+        contact_angle_deg=None if angle is None else math.degrees(angle),
+        meshing_teeth=teeth,
+        homogenization_coefficient=None if teeth is None else homogenization_coefficient(teeth),
+        max_curvature_change_per_mm=notes.value(max_curvature_change, gear, curve),
+        max_bending_stress_mpa=notes.value(max_bending_stress, drive),
+        max_bending_stress_plate_mpa=notes.value(max_bending_stress, drive, True),
+        mean_flank_pressure_mpa=notes.value(mean_flank_pressure, drive),
+        notes=tuple(notes.notes),
+    )

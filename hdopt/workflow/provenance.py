@@ -1,0 +1,58 @@
+"""Where a result comes from: enough to repeat it, and to see why a repetition differs."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib import metadata
+from typing import TYPE_CHECKING, Any
+
+from hdopt.files import files_of_work
+
+if TYPE_CHECKING:
+    from hdopt.study import Study
+
+LIBRARIES = ("numpy", "scipy", "numba", "pandas", "cvxpy", "highspy", "nlopt", "SALib", "openturns", "cadquery")
+"""Libraries that numbers come from."""
+
+
+def provenance(study: Study | None = None, seed: int | None = None, command: str | None = None) -> dict[str, Any]:
+    """Version, command, study and hash, hashes of the files read, seed, library versions, machine, start, wall time.
+
+    Files are those that the piece of work in `hdopt.files.watching_files` has read so far; none outside of it. With
+    SOURCE_DATE_EPOCH set, start and wall time are left out: two runs then give the same bytes.
+    """
+    work = files_of_work()
+    known: dict[str, Any] = {"hdopt": metadata.version("hdopt")}
+    if command:
+        known["command"] = command
+    if study is not None:
+        known |= {"study": study.name, "study_sha256": study.sha256}
+    elif work is not None and work.facts.get("study_sha256"):
+        known |= {key: work.facts[key] for key in ("study", "study_sha256")}
+    known["inputs"] = {} if work is None else {path.name: digest for path, digest in sorted(work.inputs.items())}
+    if seed is not None:
+        known["seed"] = seed
+    known["libraries"] = _versions()
+    known["machine"] = {
+        "python": platform.python_version(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "cores": os.cpu_count(),
+    }
+    if work is not None and "SOURCE_DATE_EPOCH" not in os.environ:
+        known["started"] = datetime.fromtimestamp(work.began, UTC).isoformat(timespec="seconds")
+        known["wall_time_s"] = round(time.time() - work.began, 3)
+    return known
+
+
+def _versions() -> Mapping[str, str]:
+    found = {}
+    for name in LIBRARIES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found

@@ -1,0 +1,111 @@
+"""Whether a study's requirement is met, and by how much: one line in every command, one key in its JSON."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hdopt.allocation.results import AllocateResult
+    from hdopt.study import Study
+    from hdopt.tolerance.results import StackResult
+    from hdopt.workflow.kinematic_error import KinematicErrorResult
+    from hdopt.workflow.run import RunResult
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A number against its limit. `at_least`: it must not fall below the limit, as a yield; else not exceed it."""
+
+    quantity: str
+    """What is compared, in words: 'peak-to-peak', 'yield'."""
+    value: float
+    limit: float
+    unit: str = ""
+    at_least: bool = False
+
+    @property
+    def margin(self) -> float:
+        """How much is to spare, in the unit of the value; negative where the requirement is missed."""
+        return self.value - self.limit if self.at_least else self.limit - self.value
+
+    @property
+    def met(self) -> bool:
+        """Whether the requirement is met; a value that is not a number meets none."""
+        return self.margin >= 0
+
+    @property
+    def line(self) -> str:
+        """'requirement met: peak-to-peak 0.9 arcmin, at most 1 arcmin allowed, 0.1 arcmin to spare'."""
+        unit = f" {self.unit}" if self.unit else ""
+        allowed = (
+            f"at least {self.limit:.6g}{unit} needed" if self.at_least else f"at most {self.limit:.6g}{unit} allowed"
+        )
+        missing = "short" if self.at_least else "too much"
+        by = f"{abs(self.margin):.4g}{unit} {'to spare' if self.met else missing}"
+        return f"requirement {'met' if self.met else 'missed'}: {self.quantity} {self.value:.6g}{unit}, {allowed}, {by}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready: quantity, value, limit, unit, met, margin."""
+        return {
+            "quantity": self.quantity,
+            "value": self.value,
+            "limit": self.limit,
+            "unit": self.unit,
+            "met": self.met,
+            "margin": self.margin,
+        }
+
+
+SOBOL_CHECK_N = 2**16
+"""Drives that tell the yield beside Sobol' indices: known within about 0.001."""
+
+
+def of_kinematic_error(study: Study, result: KinematicErrorResult) -> Verdict | None:
+    """The peak-to-peak of one drive, the `result` of the `study`, against [requirement]; None where it has none.
+
+    Compared is what the requirement speaks of: a single tooth pair, or with homogenization = "contact" the value evened
+    out by the teeth in mesh.
+    """
+    section: Any = study.sections.get("requirement")
+    if section is None:
+        return None
+    evened = section.homogenization == "contact" and result.nonuniform_arcmin is not None
+    value = result.nonuniform_arcmin if evened and result.nonuniform_arcmin is not None else result.peak_to_peak_arcmin
+    return Verdict("peak-to-peak", value, section.peak_to_peak_arcmin, "arcmin")
+
+
+def of_tolerances(study: Study, seed: int = 1) -> Verdict | None:
+    """The yield of the tolerances of a `study`, from a stack of its own with `seed`; None where it has no
+    requirement."""
+    if "requirement" not in study.sections and "linear_stack" not in study.sections:
+        return None
+    from hdopt.workflow.stack import stack
+
+    found = stack(study, SOBOL_CHECK_N, seed=seed).stack
+    return Verdict(f"yield of {found.n} drives", found.conforming.value, found.required_yield, at_least=True)
+
+
+def of_stack(result: StackResult) -> Verdict:
+    """The yield that the stack `result` found against the one required."""
+    found = result.stack
+    return Verdict("yield", found.conforming.value, found.required_yield, at_least=True)
+
+
+def of_allocation(result: AllocateResult) -> Verdict:
+    """The verified yield in the `result` of an allocation against the one required."""
+    return Verdict("verified yield", result.verified_yield.value, result.required_yield, at_least=True)
+
+
+def of_run(study: Study, run: RunResult) -> Verdict | None:
+    """The requirement of `study` against what `run` found: the yield of its stack, else its drive's peak-to-peak."""
+    section: Any = study.sections.get("requirement")
+    found: Any = {name: step.results for name, step in run.steps.items()}
+    if "yield" in found.get("stack", {}):
+        needed = found["stack"]["required_yield"]
+        return Verdict("yield", found["stack"]["yield"]["value"], needed, at_least=True)
+    if section is not None and section.homogenization != "contact" and "waveform" in found:
+        value = found["waveform"].get("peak_to_peak_arcmin")
+        if isinstance(value, float):
+            return Verdict("peak-to-peak", value, section.peak_to_peak_arcmin, "arcmin")
+    return None

@@ -1,0 +1,184 @@
+"""Run a study: every step it asks for, one report, the numbers beside it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from importlib import metadata
+from pathlib import Path
+from typing import Any, cast
+
+from hdopt.errors import HdoptError, MissingLibrary, MissingValue
+from hdopt.files import make_folder, to_json, write_bytes, write_text
+from hdopt.parallel.engine import engine_from, engine_in_force
+from hdopt.parallel.kept import Kept
+from hdopt.report import REPORT_FILE, RESULTS_FILE, Report, Section, Text
+from hdopt.study import AnyStudy, Study, as_study
+from hdopt.workflow.provenance import provenance
+from hdopt.workflow.run_folder import RunFolder, finish, run_folder
+from hdopt.workflow.steps import STEPS, Context, Step, StepResult, find_step
+
+Progress = Callable[[Iterable[str]], Iterable[str]]
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What a run left: the page, and what each step found, by its name."""
+
+    study: str
+    report: Path
+    steps: Mapping[str, StepResult]
+
+    @property
+    def answer(self) -> bool:
+        """False where the answer of a step was "no"."""
+        return all(step.answer for step in self.steps.values())
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "study": self.study,
+            "report": str(self.report),
+            "files": [str(file) for step in self.steps.values() for file in step.files],
+            "steps": {name: dict(step.results) for name, step in self.steps.items()},
+        }
+
+
+def run_study(
+    study: AnyStudy, folder: Path, seed: int = 1, progress: Progress = iter, resume: bool = False
+) -> RunResult:
+    """Do the steps that a `study`, or its name or path, asks for and write report.html, results.json and the CSV
+    files into `folder`.
+
+    A study asks for the steps that [study] lists; where it lists none, for all that its sections ask for, and one
+    that then lacks a number or a library is left out, with a word in the report. `progress` is told of each step as
+    it begins. The folder is replaced as a whole at the end, or not at all; files in it that no run wrote stay. With
+    `resume`, steps and parts of steps that an interrupted run of the same study, seed and version finished are taken
+    from it. Raises `HdoptError` for a folder that cannot be written, or that another run is writing to.
+    """
+    study = as_study(study)
+    listed, names = steps_of(study)
+    try:
+        todo = {name: find_step(name) for name in names}
+    except HdoptError as error:
+        raise HdoptError(f"{study.document.where(('study', 'steps'))}: {error}") from error
+    with run_folder(folder, work_key(study, seed), resume) as run:
+        found = {}
+        for name in progress(names):
+            found[name] = _done_before(run, name) or _do(run, name, todo[name], study, seed, listed)
+        found = {name: _relocated(step, run.new, folder) for name, step in found.items()}
+        _write(study, found, run, seed)
+        finish(run, files_of_run(run.target))
+    return RunResult(study.name, folder / REPORT_FILE, found)
+
+
+def work_key(study: Study, seed: int) -> str:
+    """What two runs must share for one to go on with the parts of the other: `study`, `seed` and versions."""
+    return f"{study.sha256} {seed} {metadata.version('hdopt')} {platform.python_version()}"
+
+
+def _do(run: RunFolder, name: str, step: Step, study: Study, seed: int, listed: bool) -> StepResult:
+    """Do one step and keep it. What it spreads over the engine is kept part by part meanwhile."""
+    try:
+        with engine_in_force(Kept(engine_from(None), run.parts, name)):
+            result = step(study, Context(run.new, seed))
+    except (MissingLibrary, MissingValue) as error:
+        if listed:
+            raise
+        result = _left_out(name, error)
+    files = {str(file.relative_to(run.new)): file.read_bytes() for file in result.files}
+    run.parts.keep(f"{name}.step", (result, files))
+    # Taken from disk even now, so that a run and one that goes on later cannot but give the same bytes.
+    return cast(StepResult, run.parts.load(f"{name}.step")[0])
+
+
+def _done_before(run: RunFolder, name: str) -> StepResult | None:
+    """The result of a step that an earlier run finished, its files written again."""
+    if not run.parts.has(f"{name}.step"):
+        return None
+    result, files = run.parts.load(f"{name}.step")
+    for file, content in files.items():
+        make_folder((run.new / file).parent)
+        write_bytes(run.new / file, content)
+    return cast(StepResult, result)
+
+
+def _write(study: Study, found: Mapping[str, StepResult], run: RunFolder, seed: int) -> None:
+    """The page, the tables and the numbers, the latter with their provenance and the hash of every file beside them."""
+    from hdopt.report.html import date_of_page, write_report
+
+    sections = tuple(section for step in found.values() for section in step.sections)
+    write_report(Report(study.title, description_of(study), sections, {"study": study.name}), run.new)
+    files = sorted(path for path in run.new.rglob("*") if path.is_file() and path.name != RESULTS_FILE)
+    hashes = {str(path.relative_to(run.new)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+    known = {"source": dict(study.recipe), "date": date_of_page(), "files": hashes}
+    results = {
+        "study": study.name,
+        "steps": {name: dict(step.results) for name, step in found.items()},
+        "provenance": provenance(study, seed, "run") | known,
+    }
+    write_text(run.new / RESULTS_FILE, to_json(results) + "\n")
+
+
+def files_of_run(folder: Path) -> tuple[str, ...]:
+    """Names of the files that the run in `folder` wrote, as far as it says; () where there was none."""
+    try:
+        known = json.loads((folder / RESULTS_FILE).read_bytes())["provenance"]["files"]
+        return (RESULTS_FILE, *known)
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return ()
+
+
+def _relocated(step: StepResult, old: Path, new: Path) -> StepResult:
+    """A step's result with the names that its files will have."""
+
+    def moved(value: Any) -> Any:
+        if isinstance(value, str):
+            return value.replace(str(old), str(new))
+        if isinstance(value, Mapping):
+            return {key: moved(item) for key, item in value.items()}
+        if isinstance(value, list | tuple):
+            return [moved(item) for item in value]
+        return value
+
+    files = tuple(new / file.relative_to(old) for file in step.files)
+    return replace(step, results=moved(step.results), says=tuple(moved(step.says)), files=files)
+
+
+def steps_of(study: Study) -> tuple[bool, tuple[str, ...]]:
+    """Whether the study lists its steps, and the names of those it asks for."""
+    section = study.sections.get("study")
+    asked = section.steps if section else None
+    if asked == []:
+        raise HdoptError(
+            f"{study.document.where(('study', 'steps'))}: is empty; name at least one of {', '.join(STEPS)}"
+        )
+    if asked:
+        return True, tuple(asked)
+    names = tuple(name for name, place in STEPS.items() if place.asked(study.sections))
+    if not names:
+        raise HdoptError(f"{study.source} asks for nothing; give it [drive] and [errors], or list steps in [study]")
+    return False, names
+
+
+def description_of(study: Study) -> str:
+    """What the study says of itself, or failing that what drive it is about."""
+    section = study.sections.get("study")
+    if section and section.description:
+        return section.description
+    if "drive" not in study.sections:
+        return ""
+    gear, generator = study.drive.geometry, study.drive.wave_generator
+    return (
+        f"Ratio {gear.ratio:g}, {gear.flexspline_teeth} and {gear.circular_spline_teeth} teeth, "
+        f"{generator.profile.name.replace('_', '-')} wave generator, {generator.structure.value.replace('_', '-')}."
+    )
+
+
+def _left_out(name: str, error: HdoptError) -> StepResult:
+    title = name.replace("_", " ").capitalize()
+    return StepResult(
+        (Section(name.replace("_", "-"), title, (Text(f"Left out: {error}."),)),), {"left_out": str(error)}
+    )

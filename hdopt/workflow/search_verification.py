@@ -1,0 +1,74 @@
+"""The best design checked by other means: the exact geometry, and its quantile over fresh drives."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdopt.drive.geometry import Drive
+from hdopt.kinematics.extremes import extremes_arcmin
+from hdopt.optimize.records import SearchResult, Verification
+from hdopt.study import Study
+from hdopt.workflow.search_setup import tolerance_problem
+
+if TYPE_CHECKING:
+    from hdopt.optimize.design_effects import DesignEffects
+
+Array = NDArray[np.float64]
+
+VERIFICATION = 1 << 16
+"""Fresh drives that verify a quantile; none of them was seen by the search."""
+BLOCKS = 16
+
+
+def verify(study: Study, result: SearchResult, seed: int) -> Verification:
+    """The best design of a `result` against the exact geometry, and its quantile over drives of the `study` that are
+    drawn with a seed next to `seed`."""
+    setup = result.setup
+    drive = setup.space.design(result.chosen.combination, result.chosen.values).drive
+    added = setup.trade.added
+    if added is None:
+        low, high = extremes_arcmin(drive, study.errors, "exact")
+    else:
+        from hdopt.simulation import ExtendedModel
+        from hdopt.simulation.extremes import extremes_arcmin as extended_extremes_arcmin
+
+        low, high = extended_extremes_arcmin(ExtendedModel(drive, study.errors, added.at(drive), added.operation))
+    kernel = result.best.quantities.get("peak_to_peak_arcmin", float("nan"))
+    if "tolerances" not in study.sections:
+        return Verification(high - low, kernel, None, None, None, None, None, 0)
+    blocks = quantile_blocks(study, drive, setup.settings.quantile, seed + 1, added)
+    from scipy.stats import t
+
+    middle = float(blocks.mean())
+    half = float(t.ppf(0.975, BLOCKS - 1) * blocks.std(ddof=1) / np.sqrt(BLOCKS))
+    searched = result.best.quantities.get("peak_to_peak_quantile_arcmin")
+    return Verification(
+        high - low, kernel, setup.settings.quantile, middle, middle - half, middle + half, searched, VERIFICATION
+    )
+
+
+def quantile_blocks(
+    study: Study, drive: Drive, quantile: float, seed: int, added: DesignEffects | None = None
+) -> Array:
+    """The `quantile` of the converged peak-to-peak of `drive` under the tolerances of `study`, in each of 16
+    independent scramblings of `seed`: shape (16,). `added` are the effects that count, if any."""
+    from hdopt.kinematics import peak_to_peak_arcmin
+    from hdopt.tolerance.sampling import ScrambledSobol
+
+    response, space = tolerance_problem(study)
+    sampling = ScrambledSobol(BLOCKS)
+    values = []
+    for replicate in range(BLOCKS):
+        points = np.concatenate(list(sampling.blocks(seed, replicate, VERIFICATION // BLOCKS, space.dimension)))
+        errors = response.errors(space.sample(points))
+        if added is None:
+            spans = peak_to_peak_arcmin(drive, errors)
+        else:
+            from hdopt.simulation.batch import matrix_peak_to_peak_arcmin
+
+            spans = matrix_peak_to_peak_arcmin(drive, errors.to_matrix(), added.table(drive))
+        values.append(np.quantile(spans, quantile))
+    return np.array(values)

@@ -1,0 +1,238 @@
+"""Stacks and sensitivities of a study: the results behind `hdopt stack` and `hdopt sobol`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from hdopt.drive.errors import PHASE_OF, study_key
+from hdopt.errors import HdoptError, unknown_name
+from hdopt.kinematics.model_error import ModelError, model_error
+from hdopt.kinematics.waveform import CLOSED_FORM, EXACT
+from hdopt.parallel.engine import Engine
+from hdopt.study import AnyStudy, Study, as_study
+from hdopt.tolerance.distributions import Distribution
+from hdopt.tolerance.drive_inputs import DriveResponse, drive_problem
+from hdopt.tolerance.linear_stack import LinearResponse
+from hdopt.tolerance.response import Response
+from hdopt.tolerance.results import SobolResult, StackResult
+from hdopt.tolerance.sampling import SAMPLINGS
+from hdopt.tolerance.screening import Screening, run_screening
+from hdopt.tolerance.space import InputSpace
+from hdopt.tolerance.stack import StackRequest, run_stack
+
+STACK_N = 2**18
+SOBOL_N = 2**14
+PILOT_N, PILOT_MEASURED = 512, 32
+"""Drives of which the pilot for the model error takes the largest and some others; with measured teeth, which take
+long."""
+SHAPLEY_INPUTS = 8
+"""Up to here every input is a Shapley player of its own; beyond, their groups are."""
+
+
+@dataclass(frozen=True)
+class StudyProblem:
+    """What a study asks of its tolerances: response, inputs, limit and yield."""
+
+    study: str
+    response: Response
+    space: InputSpace
+    limit: float
+    required_yield: float
+    unit: str
+    notes: tuple[str, ...] = ()
+
+
+def study_problem(study: AnyStudy) -> StudyProblem:
+    """Response, inputs and requirement of a study: its drive's, or those of its linear stack."""
+    study = as_study(study)
+    if "linear_stack" in study.sections:
+        return _linear(study)
+    tolerances, requirement = study.section("tolerances", "a stack"), study.section("requirement", "a stack")
+    contributors = study.sections.get("contributors")
+    problem = drive_problem(
+        study.drive,
+        _not_measured(study, tolerances.distributions(study.folder)),
+        held=study.errors if "errors" in study.sections else None,
+        contributors=contributors.build() if contributors else None,
+        correlations=[row.build() for row in tolerances.correlation],
+        homogenization=_homogenization(study, requirement.homogenization),
+    )
+    notes = []
+    if problem.replaced:
+        notes.append(f"callouts take the place of the tolerances of {', '.join(problem.replaced)}")
+    if problem.freed:
+        notes.append(f"[tolerances] does not give {', '.join(problem.freed)}: free over the full turn")
+    limit, required = requirement.peak_to_peak_arcmin, getattr(requirement, "yield")
+    response, said = with_effects(study, problem.response)
+    return StudyProblem(study.name, response, problem.space, limit, required, "arcmin", (*notes, *said))
+
+
+def _not_measured(study: Study, distributions: dict[str, Distribution]) -> dict[str, Distribution]:
+    """Without those of tooth sines that measured teeth stand instead of."""
+    left_out = {key for name in study.measured_instead for key in (study_key(name), study_key(PHASE_OF[name]))}
+    return {key: distribution for key, distribution in distributions.items() if key not in left_out}
+
+
+def with_effects(study: Study, response: DriveResponse) -> tuple[Response, tuple[str, ...]]:
+    """`response` with the effects of the study that count, if any, and what is to be said of them.
+
+    Where [operation] does not say which count, those of the drive do: a tolerance does not answer for the bench.
+    """
+    if not study.effects:
+        return response, ()
+    from hdopt.workflow.effect_selection import inclusion
+
+    chosen = inclusion(study, "drive")
+    if not chosen.counted:
+        return response, chosen.says
+    from hdopt.simulation.batch import tabulate
+    from hdopt.tolerance.drive_effects import ExtendedResponse
+
+    extended = ExtendedResponse(response, tabulate(study.drive, chosen.counted, study.operation))
+    return extended, (*chosen.says, "the effects are the same in every drive: they have no tolerance")
+
+
+def _linear(study: Study) -> StudyProblem:
+    from hdopt.tolerance.linear_stack import Dimension, linear_problem
+
+    section = study.section("linear_stack")
+    response, space = linear_problem(
+        {name: Dimension(d.sensitivity, d.tolerance, d.sigmas) for name, d in section.dimensions.items()}
+    )
+    return StudyProblem(study.name, response, space, section.gap_tolerance, section.required_yield, section.unit)
+
+
+def _homogenization(study: Study, kind: str) -> float:
+    if kind == "single_tooth":
+        return 1.0
+    if study.drive.has_measured_teeth:
+        raise HdoptError(
+            'measured teeth are shared by those in contact already; take requirement.homogenization = "single_tooth"'
+        )
+    from hdopt.mechanics.contact import contact_angle, homogenization_coefficient, meshing_teeth
+
+    geometry = study.drive.geometry
+    angle = contact_angle(geometry, study.drive.wave_generator.profile)
+    return homogenization_coefficient(meshing_teeth(geometry, angle))
+
+
+def stack(
+    study: AnyStudy = None,
+    n: int = STACK_N,
+    *,
+    tail: float | None = None,
+    worst_case: bool = False,
+    sampling: str = "sobol",
+    quantiles: Sequence[float] = (),
+    seed: int = 1,
+    engine: Engine | str | None = None,
+) -> StackResult:
+    """Monte Carlo stack of a study's tolerances against its requirement, with `n` samples in all.
+
+    `study` is a study, its name or its path. `tail` adds the probability beyond that limit, `worst_case` the worst
+    case. `sampling` is 'sobol' or 'monte-carlo', `seed` its seed; `quantiles` are reported beside the usual ones;
+    `engine` computes the sample (threads, processes or a cluster). Raises `HdoptError` where the study has
+    no tolerances, or `n` is too small.
+    """
+    problem = study_problem(study)
+    if sampling not in SAMPLINGS:
+        raise HdoptError(unknown_name("sampling", sampling, SAMPLINGS))
+    result = run_stack(
+        problem.response,
+        problem.space,
+        StackRequest(
+            limit=problem.limit,
+            required_yield=problem.required_yield,
+            n=n,
+            sampling=SAMPLINGS[sampling](),
+            seed=seed,
+            engine=engine,
+            quantiles=quantiles,
+            unit=problem.unit,
+        ),
+    )
+    worst = rare = None
+    notes = [*problem.notes]
+    if worst_case:
+        from hdopt.tolerance.worst_case import Unbounded, find_worst_case
+
+        try:
+            worst = find_worst_case(problem.response, problem.space, seed)
+        except Unbounded as error:
+            notes.append(f"the worst case is left out: {error}")
+    if tail is not None:
+        from hdopt.tolerance.tail import tail_probability
+
+        rare = tail_probability(problem.response, problem.space, tail, seed=seed)
+    method, error = _method(problem, seed)
+    if error is not None and error.says is not None:
+        notes.append(error.says)
+    return StackResult(problem.study, result, worst, rare, tuple(notes), method, error)
+
+
+def _method(problem: StudyProblem, seed: int) -> tuple[str | None, ModelError | None]:
+    """The method of the drives' kinematic error, and how far it is from the exact geometry, for a pilot of drives."""
+    response = problem.response
+    if not isinstance(response, DriveResponse):
+        return (None if isinstance(response, LinearResponse) else CLOSED_FORM), None
+    if not response.drive.wave_generator.profile.tip_is_smooth:
+        return EXACT, None
+    points = next(SAMPLINGS["sobol"]().blocks(seed, 0, PILOT_N, problem.space.dimension))
+    if response.drive.has_measured_teeth:
+        points = points[:PILOT_MEASURED]
+    return CLOSED_FORM, model_error(response.drive, response.matrix(problem.space.sample(points)))
+
+
+def sobol(
+    study: AnyStudy = None,
+    n: int = SOBOL_N,
+    *,
+    second_order: bool = True,
+    shapley: str | None = None,
+    seed: int = 1,
+    engine: Engine | str | None = None,
+) -> SobolResult:
+    """Sobol' indices of a study's inputs and groups with `n` base points in all; Shapley effects where inputs are
+    correlated, or where `shapley` asks for them: 'inputs' or 'groups'.
+
+    `study` is a study, its name or its path; `second_order` adds the indices of pairs; `seed` is that of the samples,
+    `engine` computes them (threads, processes or a cluster).
+    """
+    from hdopt.tolerance.sensitivity import run_shapley, run_sobol
+
+    problem = study_problem(study)
+    if shapley not in (None, "inputs", "groups"):
+        raise HdoptError(unknown_name("set of Shapley players", shapley, ("inputs", "groups")))
+    options = {"n": n, "seed": seed, "engine": engine, "unit": problem.unit}
+    space, notes, indices = problem.space, list(problem.notes), None
+    if space.copula.is_independent:
+        indices = run_sobol(problem.response, space, second_order=second_order, **options)
+    elif shapley is None:
+        shapley = "inputs" if space.dimension <= SHAPLEY_INPUTS or not space.groups else "groups"
+        notes.append("inputs are correlated: Shapley effects share the variance, Sobol' indices would not sum up")
+    if shapley is None:
+        return SobolResult(problem.study, indices, None, tuple(notes))
+    players = None if shapley == "inputs" else space.groups
+    effects = run_shapley(problem.response, space, players=players, **options)
+    return SobolResult(problem.study, indices, effects, tuple(notes))
+
+
+def screen(
+    study: AnyStudy = None,
+    method: str = "morris",
+    n: int | None = None,
+    *,
+    seed: int = 1,
+    engine: Engine | str | None = None,
+) -> Screening:
+    """Which inputs of a study matter, by SALib's `method`: 'morris', 'delta', 'pawn', 'rbd_fast' or 'dgsm'.
+
+    `study` is a study, its name or its path; `n` the base points, the method's own number where None; `seed` that of
+    the samples, `engine` computes them. `to_salib()` of the result is SALib's own.
+    """
+    problem = study_problem(study)
+    found = run_screening(
+        problem.response, problem.space, method.replace("-", "_"), n=n, seed=seed, engine=engine, unit=problem.unit
+    )
+    return replace(found, study=problem.study, notes=(*problem.notes, *found.notes))

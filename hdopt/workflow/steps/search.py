@@ -1,0 +1,55 @@
+"""The step that searches designs, says how sure the choice is, and writes the chosen design's study file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hdopt.files import write_text
+from hdopt.optimize.records import SearchResult
+from hdopt.optimize.robustness import perturb
+from hdopt.optimize.summary import chosen_words, design_words
+from hdopt.optimize.views import trade_views
+from hdopt.report import Section, Text
+from hdopt.report.sections.search import trade_sections
+from hdopt.study import Study
+from hdopt.workflow.search import search as search_designs
+from hdopt.workflow.search_verification import verify
+from hdopt.workflow.steps import Context, StepResult
+from hdopt.workflow.write_design import chosen_study_toml
+
+
+def search(study: Study, context: Context) -> StepResult:
+    """Best design of the `study`, fronts, its price, its verification and every constant perturbed; names the choice
+    and writes its study file to the folder of the `context`."""
+    result = search_designs(study, context.seed)
+    if not result.feasible:
+        return _no_design(study, result)
+    share = result.setup.settings.perturbation
+    checked = verify(study, result, context.seed)
+    perturbed = perturb(result.setup, result, (1 - share, 1 + share), context.seed)
+    file = context.folder / f"{study.name}-chosen.toml"
+    write_text(file, chosen_study_toml(study, result))
+    results = result.to_dict() | {
+        "verification": checked.to_dict(),
+        "perturbations": [item.to_dict() for item in perturbed],
+        "chosen_study": file.name,
+    }
+    sections = trade_sections(result, trade_views(result), checked, perturbed, file.name)
+    if result.notes:
+        notes = tuple(Text(f"{note[:1].upper()}{note[1:]}.") for note in result.notes)
+        sections = [replace(sections[0], items=(*notes, *sections[0].items)), *sections[1:]]
+    says = (
+        f"chosen wave generator: {chosen_words(result)}",
+        f"study file: {file}  (hdopt export {file} --step wg.step)",
+    )
+    return StepResult(tuple(sections), results, (file,), says)
+
+
+def _no_design(study: Study, result: SearchResult) -> StepResult:
+    """What is said where no design keeps every limit."""
+    text = (
+        f"No design keeps all limits. The nearest, {design_words(result.best)}, breaks: "
+        f"{'; '.join(result.best.broken_limits)}. Ease a limit or widen a variable."
+    )
+    section = Section("trade-chosen", "No wave generator keeps all limits", (Text(text),), text)
+    return StepResult((section,), result.to_dict(), says=(text,), answer=False)

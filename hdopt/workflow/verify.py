@@ -1,0 +1,134 @@
+"""Repeat a run and compare: whether the same study, seed and version still give the same files."""
+
+from __future__ import annotations
+
+import json
+import math
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hdopt.errors import HdoptError
+from hdopt.files import read_json
+from hdopt.report import REPORT_FILE, RESULTS_FILE
+from hdopt.study import load_study
+from hdopt.workflow.provenance import provenance
+from hdopt.workflow.run import Progress, run_study
+
+MOST_TOLD = 5
+"""Numbers that differ, of which the answer tells."""
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What a repetition gave. `same` and `differing` are file names; `numbers` those of results.json that differ, as
+    (place, then, now); `changes` what has changed since: study, inputs, libraries, machine."""
+
+    folder: Path
+    same: tuple[str, ...]
+    differing: tuple[str, ...]
+    numbers: tuple[tuple[str, Any, Any], ...]
+    changes: tuple[str, ...]
+
+    @property
+    def repeated(self) -> bool:
+        """Whether every file came out with the same bytes (the page's date and the provenance apart)."""
+        return not self.differing
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "folder": str(self.folder),
+            "repeated": self.repeated,
+            "same": list(self.same),
+            "differing": list(self.differing),
+            "numbers": [{"place": place, "then": then, "now": now} for place, then, now in self.numbers],
+            "changes": list(self.changes),
+        }
+
+
+def verify_run(folder: Path, progress: Progress = iter) -> Verification:
+    """Do the run in `folder` again, in a temporary folder, and compare every file; `progress` is told of
+    each step.
+
+    Raises `HdoptError` where the folder holds no run, or its study is no longer where it was.
+    """
+    old = read_json(folder / RESULTS_FILE, "a folder that `hdopt run` wrote")
+    known = old.get("provenance") if isinstance(old, dict) else None
+    if not isinstance(known, dict) or not isinstance(known.get("source"), dict) or not known["source"]:
+        raise HdoptError(f"{folder / RESULTS_FILE} does not say which study it is of; run the study again")
+    recipe = known["source"]
+    study = load_study(recipe.get("source"), tuple(recipe.get("overrides", ())), recipe.get("drive"))
+    with tempfile.TemporaryDirectory() as scratch:
+        new_folder = Path(scratch) / "run"
+        run_study(study, new_folder, int(known.get("seed", 1)), progress)
+        new = json.loads((new_folder / RESULTS_FILE).read_bytes())
+        same: list[str] = []
+        differing: list[str] = []
+        for name in sorted({*known["files"], *new["provenance"]["files"]}):
+            (same if _alike(folder / name, new_folder / name, known, new["provenance"]) else differing).append(name)
+        numbers = tuple(_differences(_moved(old["steps"], folder), _moved(new["steps"], new_folder)))
+    (differing if numbers else same).append(RESULTS_FILE)
+    changes = tuple(_changes(known, provenance(study, int(known.get("seed", 1)))))
+    return Verification(folder, tuple(same), tuple(differing), numbers, changes)
+
+
+def _alike(old: Path, new: Path, then: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
+    """Whether two files have the same bytes; of the page, but for its date."""
+    try:
+        one, two = old.read_bytes(), new.read_bytes()
+    except OSError:
+        return False
+    if old.name == REPORT_FILE:
+        one, two = (b.replace(p.get("date", "").encode(), b"") for b, p in ((one, then), (two, now)))
+    return one == two
+
+
+def _moved(value: Any, folder: Path) -> Any:
+    """JSON without the place of its folder."""
+    return json.loads(json.dumps(value).replace(json.dumps(str(folder))[1:-1], ""))
+
+
+def _differences(old: Any, new: Any, place: str = "") -> Iterator[tuple[str, Any, Any]]:
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in sorted({*old, *new}):
+            yield from _differences(old.get(key), new.get(key), f"{place}.{key}" if place else key)
+    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        for number, pair in enumerate(zip(old, new, strict=True)):
+            yield from _differences(*pair, f"{place}[{number}]")
+    elif old != new:
+        yield place, old, new
+
+
+def _changes(then: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+    """What is not as it was: said whether or not the results differ."""
+    if then.get("study_sha256") != now.get("study_sha256"):
+        yield "the study has changed"
+    for name, digest in then.get("inputs", {}).items():
+        if now["inputs"].get(name, digest) != digest:
+            yield f"the input {name} has changed"
+    for kind in ("libraries", "machine"):
+        before, after = then.get(kind, {}), now.get(kind, {})
+        for name in sorted({*before, *after}):
+            if before.get(name) != after.get(name):
+                yield f"{name} was {before.get(name, 'absent')}, is {after.get(name, 'absent')}"
+    if then.get("hdopt") != now.get("hdopt"):
+        yield f"hdopt was {then.get('hdopt')}, is {now.get('hdopt')}"
+
+
+def lines(result: Verification) -> Iterator[str]:
+    """The answer `result` in lines for a person."""
+    said = "repeated" if result.repeated else "not repeated"
+    yield f"{result.folder}: {said}; {len(result.same)} files the same, {len(result.differing)} differ"
+    for name in result.differing:
+        yield f"  differs: {name}"
+    for place, then, now in result.numbers[:MOST_TOLD]:
+        share = ""
+        if isinstance(then, float) and isinstance(now, float) and then and math.isfinite(then):
+            share = f" ({100 * (now / then - 1):+.3g} %)"
+        yield f"  {place}: was {then!r}, is {now!r}{share}"
+    if len(result.numbers) > MOST_TOLD:
+        yield f"  and {len(result.numbers) - MOST_TOLD} more numbers"
+    for change in result.changes:
+        yield f"  note: {change}"

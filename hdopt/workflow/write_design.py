@@ -1,0 +1,68 @@
+"""The chosen design as a study file of its own, ready for every other command."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from hdopt.errors import HdoptError
+from hdopt.optimize.design_space import OWN_VARIABLES
+from hdopt.optimize.records import SearchResult
+from hdopt.study import Study
+from hdopt.study.write import study_toml, with_moved_paths
+
+KEPT = (
+    "errors",
+    "effects",
+    "operation",
+    "tolerances",
+    "requirement",
+    "contributors",
+    "clearances",
+    "material",
+    "load",
+    "export",
+)
+"""Sections of the searched study that the chosen design keeps."""
+DECIMALS = 6
+"""Of lengths in mm and angles in deg: a nanometre."""
+
+
+def chosen_study_toml(study: Study, result: SearchResult) -> str:
+    """Text of a study file with the drive and wave generator that `result` chose; all else as in the searched
+    `study`."""
+    drive = result.setup.space.design(result.chosen.combination, result.chosen.values).drive
+    gear, generator = drive.geometry, drive.wave_generator
+    if not isinstance(gear.flexspline_teeth, int):
+        raise HdoptError(f"the chosen module gives {gear.flexspline_teeth:.3f} teeth; there is no such drive to write")
+    profile = {
+        "profile": generator.profile.name,
+        "structure": generator.structure.value,
+        "width_mm": generator.width,
+        "semi_major_mm": generator.profile.semi_major,
+        "bearing_thickness_mm": generator.bearing_thickness,
+    }
+    if generator.profile.name in OWN_VARIABLES:
+        profile["wrap_angle_deg"] = math.degrees(generator.profile.wrap_angle)
+    geometry = asdict(gear)
+    sizes = {f"{k}_mm": v for k, v in geometry.items() if not k.endswith("_teeth") and k != "pressure_angle"}
+    teeth = {key: value for key, value in geometry.items() if key.endswith("_teeth")}
+    sections: dict[str, Mapping[str, Any]] = {
+        "study": {"title": f"{study.title}: the chosen wave generator"},
+        "drive": {**teeth, "pressure_angle_deg": math.degrees(gear.pressure_angle), **sizes},
+        "wave_generator": profile,
+    }
+    sections = {name: _rounded(content) for name, content in sections.items()}
+    kept = {name: study.data[name] for name in KEPT if name in study.data}
+    head = (
+        f"Chosen by `hdopt run {study.name}` from {len(result.solutions)} combinations of profile and structure.",
+        f"{result.best.name}: {result.best.quantities[result.objective]:.4f} arcmin ({result.objective}).",
+    )
+    return study_toml(sections | with_moved_paths(kept, study.folder), head)
+
+
+def _rounded(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Lengths and angles to a nanometre and a millionth of a degree: what is beyond is rounding."""
+    return {key: round(value, DECIMALS) if isinstance(value, float) else value for key, value in content.items()}
