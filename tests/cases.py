@@ -6,9 +6,9 @@ from math import radians
 
 import numpy as np
 
-from hdopt.deviations import DriveErrors
-from hdopt.drive import Drive, DriveGeometry, Structure, WaveGenerator
-from hdopt.profiles import Ellipse, MeasuredProfile, Resal, TwoDisk, WaveGeneratorProfile
+from hdopt.drive.errors import DriveErrors
+from hdopt.drive.geometry import Drive, DriveGeometry, Structure, WaveGenerator
+from hdopt.drive.profiles import Ellipse, MeasuredProfile, Resal, TwoDisk, WaveGeneratorProfile
 
 CSF_25_80 = DriveGeometry(160, 162, 0.396, radians(12), 30.65, 0.277, 0.257, 0.74)
 """Jia 2021, Table 1."""

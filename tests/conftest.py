@@ -13,7 +13,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-ALLOWED_SKIPS = ("no recordings", "this machine has OSMesa")
+ALLOWED_SKIPS = ("no recordings", "this machine has OSMesa", "asammdf is an extra of its own")
 """What a skip's reason may start with in CI: the recordings belong to others and are not part of the project."""
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -38,3 +38,12 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         for test, reason in refused:
             print(f"\nskipped, which CI does not allow: {test}: {reason}")
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+@pytest.fixture(scope="session")
+def session_answers(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of this session's diagnoses of bench cases, shared by all workers: each case is answered once."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "answers"
+    folder.mkdir(exist_ok=True)
+    return folder

@@ -1,4 +1,4 @@
-"""The cam as a STEP file, written and checked: under 2 s beyond CadQuery's own import."""
+"""The cam as a STEP file, written and checked: no longer than CadQuery's own import takes."""
 
 from __future__ import annotations
 
@@ -8,19 +8,20 @@ import sys
 import cases
 import pytest
 
-LIMIT = 2.0
-"""Seconds, the promise: a first export in a fresh process, with everything it imports besides CadQuery.
-
-The export runs on one thread, so processor time is what an idle machine takes, whatever else runs beside the test.
+LIMIT = 1.0
+"""The promise: a first export in a fresh process, with everything it imports besides CadQuery, over the processor time
+that importing CadQuery takes in the same process. It took 0.71 to 0.85 of it where this was set.
 """
 
 FRESH = """
 import time
-import cadquery
 start = time.process_time()
-from hdopt.cli import cli
+import cadquery
+imported = time.process_time() - start
+start = time.process_time()
+from hdopt.cli.app import cli
 cli.main(["export", "csf-25-80", "--set", "hub=false", "--step", {path!r}, "--json", {json!r}], standalone_mode=False)
-print(time.process_time() - start)
+print((time.process_time() - start) / imported)
 """
 
 
@@ -33,8 +34,8 @@ def test_first_export_of_a_cam(tmp_path):
 @pytest.mark.benchmark(group="cam STEP, written and checked")
 def test_export_of_a_cam(benchmark, tmp_path):
     from hdopt.geometry.export import export_drive
-    from hdopt.study.export import ExportSection
+    from hdopt.geometry.options import ExportOptions
 
     target = tmp_path / "cam.step"
-    benchmark(export_drive, cases.drive(), {"step": target}, ExportSection(hub=False))
+    benchmark(export_drive, cases.drive(), {"step": target}, ExportOptions(hub=False))
     assert target.is_file()

@@ -10,12 +10,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hdopt.drive import Structure
+from hdopt.drive.geometry import Structure
+from hdopt.optimize.design_space import Combination
+from hdopt.optimize.minimax import GLOBAL, LOCAL, PENALTY, explore, minimise
+from hdopt.optimize.nlopt_adapter import Effort
 from hdopt.study import load_study
-from hdopt.trade.minimax import GLOBAL, LOCAL, PENALTY, explore, minimise
-from hdopt.trade.nlopt_guard import Effort
-from hdopt.trade.setup import setup_of
-from hdopt.trade.space import Combination
+from hdopt.workflow.search_setup import setup_of
 
 PROFILES = ("ellipse", "resal", "two_disk")
 LOCALS = ("LD_SLSQP", "LD_MMA", "LD_CCSAQ", "LN_COBYLA")

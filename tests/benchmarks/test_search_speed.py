@@ -10,12 +10,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hdopt.drive import Structure
+from hdopt.drive.geometry import Structure
 from hdopt.kinematics.extremes import extremes_arcmin
+from hdopt.optimize.design_space import Combination
+from hdopt.optimize.objectives import Point
 from hdopt.study import load_study
-from hdopt.trade.quantities import Point
-from hdopt.trade.setup import setup_of
-from hdopt.trade.space import Combination
+from hdopt.workflow.search_setup import setup_of
 
 TWO_DISK = Combination("two_disk", Structure.AUTOMATIC)
 

@@ -9,10 +9,10 @@ import time
 import numpy as np
 import pytest
 
-from hdopt.sensitivity import run_sobol
 from hdopt.tolerance.distributions import Uniform
+from hdopt.tolerance.sensitivity import run_sobol
 from hdopt.tolerance.space import InputSpace, Tolerance
-from hdopt.tolerancing import study_problem
+from hdopt.workflow.stack import study_problem
 
 STACK = "from hdopt.cli import main; main(['stack', 'csf-25-80', '-n', '1000000'])"
 YARDSTICK = "import numpy, scipy.stats, numba"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import hdopt
-from hdopt.deviations import DriveErrors
+from hdopt.bench.geometry import ARCMIN, BaseErrors, draw_errors, kinematic_error
+from hdopt.drive.errors import DriveErrors
 from hdopt.kinematics import kinematic_error_arcmin
-from tests.blind.geometry import ARCMIN, BaseErrors, draw_errors, kinematic_error
 
 
 def as_hdopt(errors: BaseErrors):

@@ -6,13 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.blind.cases import CATALOGUE, TROUBLES, Spec, generate
-from tests.blind.generate import write
-from tests.blind.geometry import RATIO
-from tests.blind.hidden_outside import KINDS
-from tests.blind.marking import IDS
-from tests.blind.score import read
-from tests.blind.suite import SEVERITIES, plan
+from hdopt.bench.cases import CATALOGUE, TROUBLES, Spec, generate
+from hdopt.bench.generate import write
+from hdopt.bench.geometry import RATIO
+from hdopt.bench.hidden_outside import KINDS
+from hdopt.bench.marking import IDS
+from hdopt.bench.score import read
+from hdopt.bench.suite import SEVERITIES, plan
 
 
 def centred(tables):
@@ -123,7 +123,7 @@ def test_the_proof_has_every_case_that_it_must_have():
 
 
 def test_written_cases_hint_at_nothing(tmp_path):
-    write(tmp_path, 7, share=0.01)
+    write(tmp_path, 7, ("nothing", "single", "pair", "decoy", "unknown", "scale"), share=0.01)
     answers, keys = read(tmp_path)
     assert answers == {} and len(keys) >= 5
     for key in keys:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.blind.geometry import ARCMIN, RATIO, BaseErrors, kinematic_error
+from hdopt.bench.geometry import ARCMIN, RATIO, BaseErrors, kinematic_error
 
 DEG = np.pi / 180
 PAPER = {

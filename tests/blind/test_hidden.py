@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.blind.bench import hidden_wave, joint_rms, read_error, set_up
-from tests.blind.cases import CATALOGUE
-from tests.blind.geometry import ARCMIN, RATIO, BaseErrors
-from tests.blind.hidden_drive import BearingPass, Lobing, LocalDefect
-from tests.blind.hidden_load import Hysteresis, LostMotion, Resonance, ThermalDrift, Windup
-from tests.blind.hidden_outside import KINDS, Outside
-from tests.blind.hidden_sensors import ChannelDelay, Coupling, Eccentricity, Interpolation
-from tests.blind.motion import TURN, Heat, Plan, Torque, run
+from hdopt.bench.cases import CATALOGUE
+from hdopt.bench.geometry import ARCMIN, RATIO, BaseErrors
+from hdopt.bench.hidden_drive import BearingPass, Lobing, LocalDefect
+from hdopt.bench.hidden_load import Hysteresis, LostMotion, Resonance, ThermalDrift, Windup
+from hdopt.bench.hidden_outside import KINDS, Outside
+from hdopt.bench.hidden_sensors import ChannelDelay, Coupling, Eccentricity, Interpolation
+from hdopt.bench.motion import TURN, Heat, Plan, Torque, run
+from hdopt.bench.signal_chain import hidden_wave, joint_rms, read_error, set_up
 
 # A drive with nothing but a sine on its circular spline: simple enough for closed forms.
 QUIET = BaseErrors(*[0.0] * 10, 0.002, 0.0)

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-HERE = Path(__file__).parent
+BENCH = Path(__file__).resolve().parents[2] / "hdopt" / "bench"
 BENCH_MAY_USE = {"numpy", "scipy", "pandas", "numba", "pyarrow"}
 SCORER_MAY_USE = {"numpy", "scipy", "pandas"}
-SOURCES = sorted(path for path in HERE.glob("*.py") if not path.name.startswith("test_"))
+SOURCES = sorted(BENCH.glob("*.py"))
 
 
 def imported(path):
@@ -26,7 +26,7 @@ def test_only_libraries_and_its_own_files_are_imported(path):
     allowed = SCORER_MAY_USE if path.name in ("marking.py", "score.py", "scores.py", "thresholds.py") else BENCH_MAY_USE
     for name in imported(path):
         top = name.split(".")[0]
-        own = name == "tests.blind" or name.startswith("tests.blind.")
+        own = name == "hdopt.bench" or name.startswith("hdopt.bench.")
         assert own or top in sys.stdlib_module_names or top in allowed, f"{path.name} imports {name}"
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tests.blind import loops
-from tests.blind.geometry import ARCMIN, RATIO
-from tests.blind.real_residuals import ON_REAL_MOTION, RealResidual, on_real_motion, on_simulated_drive, prolonged
+from hdopt.bench import loops
+from hdopt.bench.geometry import ARCMIN, RATIO
+from hdopt.bench.real_residuals import ON_REAL_MOTION, RealResidual, on_real_motion, on_simulated_drive, prolonged
 
 
 @pytest.fixture

@@ -6,10 +6,10 @@ import json
 import pytest
 from scipy.stats import binom
 
-from tests.blind import thresholds
-from tests.blind.marking import check_answer, covered, credit, improvement
-from tests.blind.score import main, read, score
-from tests.blind.scores import Rate
+from hdopt.bench import thresholds
+from hdopt.bench.marking import check_answer, covered, credit, improvement
+from hdopt.bench.score import main, read, score
+from hdopt.bench.scores import Rate
 
 
 def key(name="k", family="single", effects=("resonance",), severity=0.5, **more):

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pandas as pd
 
-from hdopt.profiles import Ellipse, Resal, TwoDisk, curvature
+from hdopt.drive.profiles import Ellipse, Resal, TwoDisk, curvature
 from hdopt.report import Report
 from hdopt.report.html import write_report
 from hdopt.report.sections.design_map import Design, Limit, pressure_angle_width_section

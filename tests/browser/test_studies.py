@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from effect_examples import toml
 
-from hdopt.run import run_study
 from hdopt.study import load_study
+from hdopt.workflow.run import run_study
 
 
 def test_the_report_of_the_csf_25_80(look_at, tmp_path):

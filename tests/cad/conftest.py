@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from wave_generators import drive
 
-from hdopt.drive import Structure
+from hdopt.drive.geometry import Structure
 from hdopt.geometry.export import ExportResult, export_drive
-from hdopt.study.export import ExportSection
+from hdopt.geometry.options import ExportOptions
 
 
 @pytest.fixture(scope="session")
@@ -19,7 +19,7 @@ def exported(tmp_path_factory):
         key = (profile, structure, *sorted(options.items()))
         if key not in done:
             folder = tmp_path_factory.mktemp("export")
-            section = ExportSection(**options)
+            section = ExportOptions(**options)
             done[key] = export_drive(drive(profile, structure), {"step": folder / "wave.step"}, section, "test study")
         return done[key]
 

@@ -62,6 +62,30 @@ CASES = {
         ("--set", "profile=two_disk", "--set", "journal_radius_mm=10"),
         "journals have a radius",
     ),
+    "narrower than a wall": (("--set", "width_mm=1.0"), "cam: its axial width is 1 mm; 2 mm are needed"),
+    "almost no width": (("--set", "width_mm=0.001"), r"width_mm: is 0\.001; it must be greater than or equal to 0\.1"),
+    "no seat for the bearing": (
+        ("--set", "lead_in_length_mm=5"),
+        r"leave the bearing less than half of a rim 9 mm wide; give a smaller export.chamfer_mm",
+    ),
+    "sliver between two holes": (
+        ("--set", "bolt_count=19"),
+        r"the web between two bolt holes is 1\.9[0-9]* mm; 2 mm are needed",
+    ),
+    "thin flange": (
+        ("--set", "hub_flange_thickness_mm=0.5"),
+        r"hub: its axial width is 0\.5 mm; 2 mm are needed .* change export.hub_flange_thickness_mm",
+    ),
+    "countersinks meet": (("--set", "bore_chamfer_mm=4.2"), "the bore that its countersinks leave|between counters"),
+    "countersunk flat": (
+        ("--set", "mount=d_bore", "--set", "bore_chamfer_mm=0.5", "--set", "hub=false"),
+        "a D-bore is not countersunk: its edges are broken by hand",
+    ),
+    "fit that nobody knows": (("--set", "shaft_fit=H7/g9"), "the fit 'H7/g9' is not known; give one of H7/h6"),
+    "bound that nothing keeps": (
+        ("--set", "tolerances.wg_eccentricity_mm.upper=2e-5", "--set", "tolerances.wg_eccentricity_mm.scale=1e-5"),
+        "leaves a zone below 0.5 um, which no shop holds",
+    ),
     "unknown mount": (("--set", "mount=glue"), "'glue'; it must be 'keyway', 'd_bore' or 'plain'"),
     "unknown key": (("--set", "export.bore=3"), "did you mean 'export.bore_mm'"),
     "negative chamfer": (("--set", "export.chamfer_mm=-1"), "greater than or equal to 0"),
@@ -93,8 +117,11 @@ def test_folder_that_cannot_be_written(tmp_path, capsys):
 
 def test_target_that_is_a_folder_or_named_twice(tmp_path, capsys):
     for arguments, message in (
+        (["--step", str(tmp_path / "w.txt")], "w.txt does not end in .step or .stp"),
+        (["--dxf", str(tmp_path / "w.step")], "w.step does not end in .dxf"),
+        (["--step", "/dev/null"], "null does not end in .step or .stp"),
         (["--step", str(tmp_path)], "it is a folder; give the name of a file"),
-        (["--step", str(tmp_path / "a"), "--dxf", str(tmp_path / "a")], "two files of the export have the same name"),
+        (["--step", str(tmp_path / "a"), "--dxf", str(tmp_path / "a")], "is given for two outputs"),
     ):
         with pytest.raises(SystemExit) as stopped:
             main(["export", *arguments])
@@ -105,7 +132,7 @@ def test_target_that_is_a_folder_or_named_twice(tmp_path, capsys):
 def test_missing_numbers_are_named():
     from dataclasses import replace
 
-    from hdopt.drive import Clearances, Structure
+    from hdopt.drive.geometry import Clearances, Structure
     from hdopt.errors import MissingValue
     from hdopt.geometry.export import export_drive
 

@@ -78,7 +78,7 @@ def test_parallel_of_an_ellipse_is_not_an_ellipse():
 
 @pytest.mark.parametrize("profile", cases.PROFILES.values(), ids=cases.PROFILES.keys())
 def test_refuses_the_distance_at_which_the_curve_folds(profile):
-    from hdopt.profiles import curvature
+    from hdopt.drive.profiles import curvature
 
     least = 1 / curvature(profile, np.linspace(0, 2 * math.pi, 7201)).max()
     ParallelCurve(profile, 0.999 * least)

@@ -35,7 +35,7 @@ def test_json_has_the_agreed_keys(tmp_path, capsys):
 def test_nothing_is_written_without_a_file(capsys):
     code, out = run(capsys)
     assert code == 0 and "nothing written: give --step" in out
-    assert "coaxiality diameter 0.015  [wg_eccentricity_mm]" in out
+    assert "axis within diameter 0.015  [wg_eccentricity_mm]" in out
     assert "parallelism 0.01571 over 9  [wg_tilt_major_deg]" in out
 
 
@@ -49,7 +49,11 @@ def test_tolerances_of_an_allocation(tmp_path, capsys):
     allocation = tmp_path / "allocation.json"
     allocation.write_text(json.dumps({"errors": {"wg_eccentricity_mm": {"tolerance": 0.002, "cost": 3.0}}}))
     _, out = run(capsys, "--allocation", str(allocation))
-    assert "coaxiality diameter 0.004  [wg_eccentricity_mm]" in out
+    assert "axis within diameter 0.004  [wg_eccentricity_mm]" in out
+    allocation.write_text(json.dumps({"study": "other", "errors": {"wg_eccentricity_mm": {"tolerance": 0.002}}}))
+    with pytest.raises(SystemExit) as stopped:
+        main(["export", "--allocation", str(allocation)])
+    assert stopped.value.code == 2 and "is of the study 'other', not of 'csf-25-80'" in capsys.readouterr().err
     allocation.write_text("{}")
     with pytest.raises(SystemExit) as stopped:
         main(["export", "--allocation", str(allocation)])
@@ -65,7 +69,7 @@ def test_contributors_take_the_place_of_the_errors_they_feed(tmp_path, capsys):
     )
     _, out = run(capsys, str(study))
     assert "total runout 0.008  [contributor seat_runout]" in out
-    assert "coaxiality diameter" not in out and "housing" not in out
+    assert "axis within" not in out and "housing" not in out
     assert "[wg_tilt_major_deg]" in out
 
 

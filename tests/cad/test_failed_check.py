@@ -13,7 +13,7 @@ from hdopt.geometry import solids, step
 from hdopt.geometry.arcs import _biarcs
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.export import export_drive
-from hdopt.study.export import ExportSection
+from hdopt.geometry.options import ExportOptions
 
 
 def coarse_splines(monkeypatch):
@@ -162,7 +162,7 @@ def test_hole_in_a_mesh(monkeypatch, tmp_path):
         return found[1:], vertices, indices[1:]
 
     monkeypatch.setattr(mesh, "triangles", torn)
-    plain = ExportSection(hub=False, mount="plain", chamfer_mm=0, lead_in_length_mm=0)
+    plain = ExportOptions(hub=False, mount="plain", chamfer_mm=0, lead_in_length_mm=0)
     for kind in ("stl", "3mf"):
         with pytest.raises(CheckFailed, match="is not closed: an edge lacks its neighbour"):
             export_drive(drive("two_disk"), {kind: tmp_path / f"wave.{kind}"}, plain)

@@ -12,20 +12,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from wave_generators import drive
 
-from hdopt.drive import Structure
+from hdopt.drive.geometry import Structure
+from hdopt.drive.profiles import Ellipse
 from hdopt.geometry.arcs import ARC_TOLERANCE, enclosed_area, outline_of, outline_of_bore, outline_of_slot, sample
 from hdopt.geometry.contour import Circle, ParallelCurve
 from hdopt.geometry.din6885 import key_for_bore
 from hdopt.geometry.export import export_drive
 from hdopt.geometry.features import DBore, KeywayBore, Slot
-from hdopt.profiles import Ellipse
-from hdopt.study.export import ExportSection
+from hdopt.geometry.options import ExportOptions
 
 
 @pytest.mark.parametrize("profile", ["ellipse", "resal", "two_disk", "measured"])
 def test_dxf_has_closed_outlines_on_layers_in_mm(profile, tmp_path):
     target = tmp_path / "wave.dxf"
-    result = export_drive(drive(profile), {"dxf": target}, ExportSection(hub=False, profile_tolerance_mm=0.02))
+    result = export_drive(drive(profile), {"dxf": target}, ExportOptions(hub=False, profile_tolerance_mm=0.02))
     document = ezdxf.readfile(target)
     assert document.header["$INSUNITS"] == 4 and not document.audit().errors
     suffix = "_DISC_1" if profile == "two_disk" else ""

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from wave_generators import drive
 
-from hdopt.drive import Structure
+from hdopt.drive.geometry import Structure
 from hdopt.geometry import drawing, picture
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.export import export_drive
+from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.views import section_at_minor_axis_zero, seen_from
 from hdopt.report.sections.geometry import geometry_section
-from hdopt.study.export import ExportSection
 
 BOUNDS = {"wg_eccentricity_mm": 0.0075, "wg_tilt_major_deg": 0.1, "wg_tilt_minor_deg": 0.1}
 
@@ -44,7 +44,7 @@ def test_drawing_names_sizes_tolerances_and_assumptions(profile, structure, tmp_
 
 
 def test_section_of_a_cam_is_its_cut_face():
-    result = export_drive(drive(), {}, ExportSection(hub=False, mount="plain", bore_mm=14, chamfer_mm=0.5))
+    result = export_drive(drive(), {}, ExportOptions(hub=False, mount="plain", bore_mm=14, chamfer_mm=0.5))
     (cam,) = result.model.parts
     regions = section_at_minor_axis_zero(cam.build())
     assert len(regions) == 2
@@ -59,7 +59,7 @@ def test_section_of_a_cam_is_its_cut_face():
 
 
 def test_view_shows_the_profile_to_scale():
-    cam = export_drive(drive(), {}, ExportSection(hub=False)).model.parts[0]
+    cam = export_drive(drive(), {}, ExportOptions(hub=False)).model.parts[0]
     low_x, low_y, high_x, high_y = seen_from([cam.build()], *drawing.FRONT).box
     assert (low_x, low_y, high_x, high_y) == pytest.approx(cam.contour.box, abs=drawing_tolerance())
 
@@ -79,7 +79,7 @@ def test_drawing_without_its_table_fails_the_check(monkeypatch, tmp_path):
 
 def render(tmp_path, **options):
     try:
-        return export_drive(drive(), {"png": tmp_path / "wave.png"}, ExportSection(hub=False, **options))
+        return export_drive(drive(), {"png": tmp_path / "wave.png"}, ExportOptions(hub=False, **options))
     except picture.NoPicture as reason:
         pytest.skip(str(reason))
 
@@ -103,7 +103,7 @@ def test_picture_shows_the_cam_in_its_colour_and_a_blank_one_fails(tmp_path, mon
     result.files["png"].unlink()
     monkeypatch.setattr(picture, "_scene", lambda job: {})
     with pytest.raises(CheckFailed, match="it is blank"):
-        export_drive(drive(), {"png": tmp_path / "wave.png"}, ExportSection(hub=False))
+        export_drive(drive(), {"png": tmp_path / "wave.png"}, ExportOptions(hub=False))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -111,7 +111,7 @@ def test_machine_without_opengl_is_told_what_to_install(monkeypatch, tmp_path):
     # VTK's renderer for machines with neither display nor EGL; its library is not part of the wheel.
     monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
     try:
-        export_drive(drive(), {"png": tmp_path / "wave.png"}, ExportSection(hub=False))
+        export_drive(drive(), {"png": tmp_path / "wave.png"}, ExportOptions(hub=False))
     except picture.NoPicture as error:
         assert "install libegl1" in str(error) and list(tmp_path.iterdir()) == []
     else:
@@ -132,13 +132,13 @@ def test_report_section_shows_drawing_parts_and_tolerances(tmp_path):
     assert "A – A" in said and "Key dimensions" not in said and "56.092  (major axis)" in said
     assert list(tables) == ["geometry-parts", "geometry-dimensions", "geometry-assumed"]
     assert list(tables["geometry-parts"]["part"]) == ["hub", "cam"]
-    assert "coaxiality diameter 0.015" in set(tables["geometry-dimensions"]["tolerance"])
+    assert "axis within diameter 0.015" in set(tables["geometry-dimensions"]["tolerance"])
 
 
 @pytest.mark.slow
 def test_step_of_a_run_writes_files_and_a_section(tmp_path):
-    from hdopt.steps import Context, find_step
     from hdopt.study import load_study
+    from hdopt.workflow.steps import Context, find_step
 
     result = find_step("geometry")(load_study("csf-25-80"), Context(tmp_path))
     assert {path.suffix for path in result.files} >= {".step", ".dxf", ".svg"}

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from wave_generators import drive
 
+from hdopt.drive.profiles import TwoDisk, tip_radius_of_curvature
 from hdopt.geometry.measure import measured_profile
 from hdopt.geometry.step import read_step
 from hdopt.kinematics.extremes import peak_to_peak_by_search_arcmin
-from hdopt.profiles import TwoDisk, tip_radius_of_curvature
 
 SAME = 1e-4
 """What the round trip may change in the peak-to-peak, arcmin; both sides take the exact geometry."""

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from wave_generators import drive
 
-from hdopt.drive import Clearances, Structure
+from hdopt.drive.geometry import Clearances, Structure
+from hdopt.drive.profiles import Ellipse, Resal, TwoDisk
 from hdopt.geometry.assembly import wave_generator_model
 from hdopt.geometry.check import PROFILE_TOLERANCE, interferences
 from hdopt.geometry.export import export_drive
+from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.step import read_step
-from hdopt.profiles import Ellipse, Resal, TwoDisk
-from hdopt.study.export import ExportSection
 
 QUICK = {
     *(("ellipse", structure) for structure in Structure),
@@ -127,7 +127,7 @@ def test_context_stands_around_without_touching(exported, profile):
     result = exported(profile, context=True)
     context = [part["name"] for part in result.to_dict()["parts"] if part["context"]]
     assert context == ["bearing_inner_race", "bearing_outer_race", "flexspline_ring", "circular_spline"]
-    model = wave_generator_model(drive(profile), ExportSection(context=True))
+    model = wave_generator_model(drive(profile), ExportOptions(context=True))
     file = read_step(result.files["step"])
     rings = [part for part in model.parts if part.context]
     assert interferences(file.parts, rings) == []
@@ -136,3 +136,14 @@ def test_context_stands_around_without_touching(exported, profile):
     body = rings[index].body[0]
     rings[index] = replace(rings[index], body=(replace(body, inner=body.inner.inward(0.01)),))
     assert any("bearing_outer_race and flexspline_ring" in line for line in interferences(file.parts, rings))
+
+
+def test_flat_of_a_d_bore_has_no_invalid_curve(exported, tmp_path):
+    """Judged at every point of every curve on its surfaces, which Open CASCADE's usual check is not."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+
+    from hdopt.geometry.step import read_step
+
+    result = exported("ellipse", hub=False, mount="d_bore")
+    (solid,) = read_step(result.files["step"]).parts[0].solids
+    assert BRepCheck_Analyzer(solid.wrapped, True, False, True).IsValid()

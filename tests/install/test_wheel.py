@@ -51,3 +51,11 @@ def test_the_wheel_brings_studies_templates_and_geometry(installed):
     assert (folder / "out" / "report.html").stat().st_size > 1_000_000
     python = hdopt.parent / "python"
     assert run(python, "-c", "import hdopt.geometry, hdopt.studies", cwd=folder).returncode == 0
+
+
+def test_a_blind_proof_runs_from_the_installed_wheel(installed):
+    folder, hdopt = installed
+    small = ("--set", 'concealed.families=["nothing"]', "--set", "concealed.share=0.001")
+    ran = run(hdopt, "run", "concealed-physics", "-o", "proof", *small, cwd=folder)
+    assert ran.returncode == 1 and "Traceback" not in ran.stderr, ran.stderr  # one case is no proof: the answer is "no"
+    assert "no answer" not in ran.stdout and (folder / "proof" / "report.html").exists()

@@ -9,8 +9,8 @@ import json
 from pathlib import Path
 
 from hdopt.tolerance.sampling import PlainMonteCarlo
-from hdopt.tolerance.stack import run_stack
-from hdopt.tolerancing import study_problem
+from hdopt.tolerance.stack import StackRequest, run_stack
+from hdopt.workflow.stack import study_problem
 
 FILE = Path(__file__).with_suffix(".json")
 LIMIT_ARCMIN = 1.32
@@ -21,7 +21,9 @@ SEED = 2026
 def main() -> None:
     problem = study_problem("csf-25-80")
     result = run_stack(
-        problem.response, problem.space, limit=LIMIT_ARCMIN, n=N, sampling=PlainMonteCarlo(), seed=SEED, quantiles=()
+        problem.response,
+        problem.space,
+        StackRequest(limit=LIMIT_ARCMIN, n=N, sampling=PlainMonteCarlo(), seed=SEED, quantiles=()),
     )
     beyond = round(result.n * (1 - result.conforming.value))
     FILE.write_text(json.dumps({"limit_arcmin": LIMIT_ARCMIN, "n": N, "seed": SEED, "beyond": beyond}, indent=2) + "\n")

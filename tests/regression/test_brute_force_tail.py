@@ -7,7 +7,7 @@ import pytest
 
 from hdopt.tolerance.intervals import clopper_pearson
 from hdopt.tolerance.tail import tail_probability
-from hdopt.tolerancing import study_problem
+from hdopt.workflow.stack import study_problem
 
 BRUTE_FORCE = json.loads((Path(__file__).parent / "brute_force_tail.json").read_text())
 

@@ -6,10 +6,10 @@ import json
 import numpy as np
 import pytest
 
-from hdopt.allocation import allocate
+from hdopt.allocation.convex import Infeasible, Item, cost_curve, rss_rule, solve, worst_case_rule
+from hdopt.allocation.cost import Exponential, Grade, GradeTable, Piecewise, Power, Reciprocal
 from hdopt.errors import HdoptError
-from hdopt.tolerance.allocate import Infeasible, Item, cost_curve, rss_rule, solve, worst_case_rule
-from hdopt.tolerance.cost import Exponential, Grade, GradeTable, Piecewise, Power, Reciprocal
+from hdopt.workflow.allocate import allocate
 
 TABLES = [
     GradeTable(tuple(Grade(f"IT{i}", base * 1.6**i, scale / 1.5**i) for i in range(6)))

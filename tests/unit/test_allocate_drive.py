@@ -4,25 +4,25 @@ import math
 
 import pytest
 
-from hdopt.allocation import allocate
-from hdopt.tolerance.allocate import Infeasible, Item
-from hdopt.tolerance.allocate_response import (
-    Problem,
+from hdopt.allocation.convex import Infeasible, Item
+from hdopt.allocation.cost import Power
+from hdopt.allocation.rules import (
+    AllocationProblem,
     allocate_by_equal_scaling,
     allocate_by_rss,
     allocate_by_yield,
     verify,
     yield_margin,
 )
-from hdopt.tolerance.cost import Power
-from hdopt.tolerancing import study_problem
+from hdopt.workflow.allocate import allocate
+from hdopt.workflow.stack import study_problem
 
 
 def problem(limit=1.0, reach=(0.1, 3.0)):
     stated = study_problem("csf-25-80")
     values = stated.space.values
     items = tuple(Item(n, Power(1.0, v**0.45, 0.45), v, reach[0] * v, reach[1] * v) for n, v in values.items())
-    return Problem(stated.response, stated.space, items, limit, stated.required_yield)
+    return AllocationProblem(stated.response, stated.space, items, limit, stated.required_yield)
 
 
 def test_margin_covers_both_samplings():

@@ -1,4 +1,4 @@
-"""Imports run one way, and heavy libraries stay inside functions."""
+"""Imports run one way, layer by layer and without a circle, and heavy libraries stay inside functions."""
 
 import ast
 from pathlib import Path
@@ -8,20 +8,35 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 LAYERS = [
-    {"errors", "files"},
-    {"drive", "deviations", "profiles"},
-    {"contact", "bending", "kinematics"},
-    {"spectrum"},
-    {"engine", "tolerance", "sensitivity", "recording", "recording_checks", "recording_sync", "diagnosis", "extended"},
-    {"study"},
-    {"included"},
-    {"analysis", "extended_look", "tolerancing", "allocation", "trade", "diagnosis.write_back"},
-    {"geometry", "report"},
-    {"steps", "studies"},
-    {"run"},
-    {"cli"},
+    {"bench", "errors", "files", "parallel"},
+    {"drive"},
+    {"effects", "recordings", "kinematics", "mechanics"},
+    {"tolerance", "simulation"},
+    {"optimize", "allocation", "diagnosis", "geometry", "compensation"},
+    {"report", "study"},
+    {"workflow"},
+    {"cli", "studies"},
 ]
-"""Lowest first: a module may import from its own layer and from those below."""
+"""Lowest first: a room may import from the layers below its own, and from no other room of its own layer."""
+
+BESIDE = {
+    ("parallel", "errors"): "the errors are the ground that every room stands on",
+    ("files", "errors"): "the errors are the ground that every room stands on",
+    ("parallel", "files"): "finished parts are kept on disk, whole or not at all",
+    ("geometry", "allocation"): "fits are made of the IT grades of ISO 286, which stand once",
+    ("tolerance", "simulation"): "a stack may respond with the extended model",
+    ("kinematics", "mechanics"): "measured teeth share the load over the contact angle",
+    ("recordings", "effects"): "rows are the conditions that effects see, with the error beside them",
+}
+"""Imports between rooms of one layer, with the reason."""
+
+NOT_YET: set[tuple[str, str]] = set()
+"""Imports that the plan does not allow and that still stand; this list only shrinks."""
+
+CIRCLES_NOT_YET: set[frozenset[str]] = set()
+"""Import circles that still stand; this list only shrinks."""
+
+TOP = {"__init__.py", "errors.py", "files.py"}
 
 HEAVY = {"cadquery", "plotly", "cvxpy", "SALib", "openturns", "distributed", "dask", "nlopt", "pymoo", "vtk", "OCP"}
 
@@ -36,26 +51,28 @@ def sources():
 
 
 SOURCES = dict(sources())
+TREES = {module: ast.parse(file.read_text(encoding="utf-8")) for module, file in SOURCES.items()}
 
 
-def layer_of(module: str) -> int | None:
-    """The layer of 'hdopt.X...', None for the package itself."""
+def room_of(module: str) -> str | None:
+    """'allocation' of 'hdopt.allocation.rules', None for the package itself."""
     parts = module.split(".")
-    if len(parts) < 2:
-        return None
-    for name in (".".join(parts[1:3]), parts[1]):
-        for number, names in enumerate(LAYERS):
-            if name in names:
-                return number
-    raise AssertionError(f"{module} is in no layer; add it to LAYERS where it belongs")
+    return parts[1] if len(parts) > 1 else None
+
+
+def layer_of(room: str) -> int:
+    for number, rooms in enumerate(LAYERS):
+        if room in rooms:
+            return number
+    raise AssertionError(f"{room} is in no layer; add it to LAYERS where it belongs")
 
 
 def imports(tree: ast.Module, *, at_import: bool) -> set[str]:
-    """Modules imported anywhere, or only those imported when the module is (type-checking blocks are neither)."""
+    """Modules imported anywhere, in functions and for type checking too, or only those imported with the module."""
     found: set[str] = set()
 
     def visit(node: ast.AST) -> None:
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+        if at_import and isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
             return
         if at_import and isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
             return
@@ -63,9 +80,10 @@ def imports(tree: ast.Module, *, at_import: bool) -> set[str]:
             found.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, "relative imports hide which layer is meant"
-            found.add(node.module)
-            if node.module == "hdopt":
-                found.update(f"hdopt.{alias.name}" for alias in node.names)
+            submodules = {f"{node.module}.{alias.name}" for alias in node.names} & SOURCES.keys()
+            found.update(submodules)
+            if len(submodules) < len(node.names):
+                found.add(node.module)
         for child in ast.iter_child_nodes(node):
             visit(child)
 
@@ -73,17 +91,91 @@ def imports(tree: ast.Module, *, at_import: bool) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("module", SOURCES)
-def test_imports_run_one_way(module):
-    own = layer_of(module)
-    if own is None:
-        return
-    for target in imports(ast.parse(SOURCES[module].read_text()), at_import=False):
-        if target.startswith("hdopt.") and (below := layer_of(target)) is not None:
-            assert below <= own, f"{module} imports {target}, which lies above it"
+IMPORTS = {module: imports(tree, at_import=False) for module, tree in TREES.items()}
+
+
+def room_edges(graph: dict[str, set[str]]) -> dict[tuple[str, str], list[str]]:
+    """(importing room, imported room) -> the modules that do it."""
+    edges: dict[tuple[str, str], list[str]] = {}
+    for module, targets in graph.items():
+        own = room_of(module)
+        for target in targets:
+            other = room_of(target) if target.startswith("hdopt.") else None
+            if own and other and own != other:
+                edges.setdefault((own, other), []).append(f"{module} imports {target}")
+    return edges
+
+
+def forbidden(edges: dict[tuple[str, str], list[str]]) -> set[tuple[str, str]]:
+    """Edges that do not lead from a layer to one below it, but for those listed with a reason."""
+    return {(own, other) for own, other in edges if layer_of(other) >= layer_of(own) and (own, other) not in BESIDE}
+
+
+def circles(graph: dict[str, set[str]]) -> set[frozenset[str]]:
+    """The groups of modules that reach each other (Tarjan's strongly connected components)."""
+    index: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    found: set[frozenset[str]] = set()
+
+    def visit(module: str) -> None:
+        index[module] = low[module] = len(index)
+        stack.append(module)
+        for other in graph[module] & graph.keys() - {module}:
+            if other not in index:
+                visit(other)
+                low[module] = min(low[module], low[other])
+            elif other in stack:
+                low[module] = min(low[module], index[other])
+        if low[module] == index[module]:
+            group = stack[stack.index(module) :]
+            del stack[stack.index(module) :]
+            if len(group) > 1:
+                found.add(frozenset(group))
+
+    for module in graph:
+        if module not in index:
+            visit(module)
+    return found
+
+
+def test_imports_run_one_way():
+    edges = room_edges(IMPORTS)
+    wrong = forbidden(edges)
+    assert wrong <= NOT_YET, [line for edge in wrong - NOT_YET for line in edges[edge]]
+    assert NOT_YET <= wrong, f"mended: take {NOT_YET - wrong} out of NOT_YET"
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    found = circles(IMPORTS)
+    new = [sorted(group) for group in found if not any(group <= known for known in CIRCLES_NOT_YET)]
+    assert not new, new
+    mended = [sorted(known) for known in CIRCLES_NOT_YET if not any(group <= known for group in found)]
+    assert not mended, f"mended: take {mended} out of CIRCLES_NOT_YET"
+
+
+def test_the_reasons_of_neighbours_are_still_needed():
+    assert BESIDE.keys() <= room_edges(IMPORTS).keys()
+
+
+def test_the_rules_of_this_page_bite():
+    graph = {"hdopt.drive.a": {"hdopt.drive.b"}, "hdopt.drive.b": {"hdopt.drive.a"}, "hdopt.drive.c": {"hdopt.drive.a"}}
+    assert circles(graph) == {frozenset({"hdopt.drive.a", "hdopt.drive.b"})}
+    assert forbidden(room_edges({"hdopt.report.x": {"hdopt.study.y"}})) == {("report", "study")}
+    assert forbidden(room_edges({"hdopt.drive.x": {"hdopt.kinematics.y"}})) == {("drive", "kinematics")}
+    assert not forbidden(room_edges({"hdopt.workflow.x": {"hdopt.report.y", "hdopt.workflow.z"}}))
+    lazy = ast.parse(
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import hdopt.cli\ndef f():\n    import x"
+    )
+    assert imports(lazy, at_import=False) == {"typing", "hdopt.cli", "x"}
+    assert imports(lazy, at_import=True) == {"typing"}
+
+
+def test_the_top_of_the_package_computes_nothing():
+    assert {file.name for file in (ROOT / "hdopt").glob("*.py")} == TOP
 
 
 @pytest.mark.parametrize("module", SOURCES)
 def test_heavy_libraries_are_imported_where_they_are_used(module):
-    roots = {target.split(".")[0] for target in imports(ast.parse(SOURCES[module].read_text()), at_import=True)}
+    roots = {target.split(".")[0] for target in imports(TREES[module], at_import=True)}
     assert not roots & HEAVY

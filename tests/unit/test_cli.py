@@ -62,7 +62,7 @@ def test_studies_are_listed():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["ke", "--set", "width_mm=-1"], "it must be greater than 0"),
+        (["ke", "--set", "width_mm=-1"], "it must be greater than or equal to 0.1"),
         (["ke", "none.toml"], "cannot read none.toml"),
         (["ke", "--sampling-deg", "0"], "--sampling-deg is 0.0; it must lie above 0"),
         (["ke", "--turns", "5"], "--turns goes with --sampling-deg"),

@@ -2,8 +2,10 @@
 
 import pytest
 
-from hdopt.steps import Context, find_step
+from hdopt.errors import HdoptError
 from hdopt.study import load_study
+from hdopt.study.schema import SECTIONS, step_sections
+from hdopt.workflow.steps import Context, find_step
 
 
 @pytest.mark.slow
@@ -16,3 +18,10 @@ def test_small_part_of_the_blind_proof(tmp_path):
     assert "schema" not in said and "no answer" not in said
     alarms = next(row for row in result.results["gate"] if row["name"].startswith("false-alarm"))
     assert alarms["detail"].startswith("0 of")
+
+
+def test_its_section_comes_with_the_step_and_not_with_the_general_schema():
+    assert "concealed" not in SECTIONS and step_sections()["concealed"]
+    assert load_study("concealed-physics", ("concealed.seed=7",)).section("concealed", "this").seed == 7
+    with pytest.raises(HdoptError, match=r"unknown key 'concealed.sede'; did you mean 'concealed.seed'"):
+        load_study("concealed-physics", ("concealed.sede=7",))

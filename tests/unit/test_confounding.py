@@ -3,23 +3,25 @@
 import numpy as np
 import pytest
 
-from hdopt.diagnosis.candidates import joint_fit
-from hdopt.diagnosis.confounding import confounded_with, remaining_span, share_in_span, smallest_angle_deg
-from hdopt.diagnosis.effects import EFFECTS
-from hdopt.diagnosis.fit import Fit, Problem, evaluate, refine
-from hdopt.diagnosis.noise import Noise
-from hdopt.diagnosis.nuisance import nuisances_for
-from hdopt.diagnosis.samples import gather
+from hdopt.diagnosis.checks.confounding import confounded_with, remaining_span, share_in_span, smallest_angle_deg
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.inference.nuisance import nuisances_for
+from hdopt.diagnosis.search.candidates import joint_fit
+from hdopt.effects import EFFECTS
+from hdopt.effects._friction_law import Law
+from hdopt.effects.declared import Shaft
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
+from hdopt.recordings.rows import gather
 from hdopt.study import load_study
 from tests.unit.test_diagnosis import HIDDEN, NOISE, bench
 
 SHAPES = {
-    "circular_spline_lobing": {"lobes": 6.0},
-    "output_coupling": {"variant": 0.0},
+    "circular_spline_lobing": {"lobes": 6},
+    "output_coupling": {"shaft": Shaft.OUTPUT, "orders": (2,)},
     "channel_delay": {},
     "lost_motion": {"ramp_arcmin": 0.3},
-    "hysteresis": {"transition_deg": 1.5, "law": 0.0},
+    "hysteresis": {"transition_deg": 1.5, "model": Law.DAHL},
     "thermal_drift": {"time_constant_s": 100.0},
     "torsional_windup": {},
 }
@@ -34,7 +36,7 @@ def fitted(study, names: list[str], shapes=SHAPES, hidden=HIDDEN, **record) -> F
     """The base, from the errors it was made with, and the effects `names` fitted to a record that has them."""
     samples = gather(bench(study, lambda state: sum(hidden[name](state) for name in names), turns=20, **record))
     base = CartesianModel.of(study.drive)
-    problem = Problem(samples, base, nuisances_for(samples, base).columns(samples), Noise.white(samples, NOISE))
+    problem = FitProblem(samples, base, nuisances_for(samples, base).columns(samples), Noise.white(samples, NOISE))
     errors = to_cartesian(study.errors, base.half_width)
     start = refine(evaluate(problem, errors, np.zeros(problem.nuisance.shape[1]), (), ()), iterations=3)
     return joint_fit(start, [EFFECTS[name].term(samples, shapes[name], start.base_value) for name in names])

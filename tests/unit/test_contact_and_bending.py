@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from cases import CSF_25_80, PROFILES, drive
 
-from hdopt.bending import bending_stress, curvature_change, max_bending_stress, max_curvature_change
-from hdopt.contact import (
+from hdopt.drive.geometry import Load, Material
+from hdopt.errors import HdoptError, MissingValue
+from hdopt.mechanics.bending import bending_stress, curvature_change, max_bending_stress, max_curvature_change
+from hdopt.mechanics.contact import (
     contact_angle,
     homogenization_coefficient,
     mean_flank_pressure,
     meshing_teeth,
     tip_overlap,
 )
-from hdopt.drive import Load, Material
-from hdopt.errors import HdoptError, MissingValue
 
 EVERY = pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES.keys())
 STEEL = Material(206_000.0, 0.3)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from hdopt.diagnosis import diagnose
-from hdopt.diagnosis.candidates import joint_fit
-from hdopt.diagnosis.conditions import across_conditions, find_conditions, levels
-from hdopt.diagnosis.effects import EFFECTS
-from hdopt.diagnosis.fit import Problem, evaluate, refine
-from hdopt.diagnosis.noise import Noise
-from hdopt.diagnosis.nuisance import nuisances_for
-from hdopt.diagnosis.samples import gather
+from hdopt.diagnosis.inference.conditions import across_conditions, find_conditions, levels
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.inference.nuisance import nuisances_for
+from hdopt.diagnosis.search.candidates import joint_fit
+from hdopt.effects import EFFECTS
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
+from hdopt.recordings.rows import gather
 from hdopt.study import load_study
 from tests.unit.test_diagnosis import HIDDEN, NOISE, bench
 
@@ -27,7 +27,7 @@ def fits(study, records, names, shapes):
     """The base alone, and the base with the effects `names`, on `records`."""
     samples = gather(records)
     base = CartesianModel.of(study.drive)
-    problem = Problem(samples, base, nuisances_for(samples, base).columns(samples), Noise.white(samples, NOISE))
+    problem = FitProblem(samples, base, nuisances_for(samples, base).columns(samples), Noise.white(samples, NOISE))
     errors = to_cartesian(study.errors, base.half_width)
     start = refine(evaluate(problem, errors, np.zeros(problem.nuisance.shape[1]), (), ()))
     terms = [EFFECTS[name].term(samples, shape, start.base_value) for name, shape in zip(names, shapes, strict=True)]
@@ -62,7 +62,7 @@ def test_a_delay_predicts_a_speed_it_never_saw(study):
     for record, ((alone, with_delay), size) in enumerate(zip(across.each.values(), step, strict=True)):
         assert alone == pytest.approx(np.hypot(size, NOISE), rel=0.05)
         # One number from 8000 rows: what it costs not to have seen a third of them is far below a percent.
-        seen = np.sqrt(np.mean(extended.residual[extended.problem.samples.record == record] ** 2))
+        seen = np.sqrt(np.mean(extended.residual[extended.problem.rows.record == record] ** 2))
         assert with_delay == pytest.approx(seen, rel=0.01)
 
 

@@ -5,20 +5,23 @@ import pandas as pd
 import pytest
 
 from hdopt.diagnosis import diagnose
-from hdopt.diagnosis.effect import Term
-from hdopt.diagnosis.effects import EFFECTS
-from hdopt.diagnosis.fit import Problem, evaluate, refine
-from hdopt.diagnosis.noise import STEADIEST, Noise, estimate, without_lines
-from hdopt.diagnosis.outside import OUTSIDE
-from hdopt.diagnosis.parallel import each
-from hdopt.diagnosis.price import DISCREPANCY, OTHER_KIND, Beside, discrepancy, price
-from hdopt.diagnosis.probe import FitProbe
-from hdopt.diagnosis.samples import gather
-from hdopt.diagnosis.zone_ripple import fit_in_zones
-from hdopt.drive import ARCMIN
+from hdopt.diagnosis.inference.catalogue import explanations
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.noise import Noise, estimate, without_lines
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.search.penalty import Scale, SubtractedTerms, discrepancy, penalty
+from hdopt.diagnosis.search.zone_high_order import fit_in_zones
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.drive.geometry import ARCMIN
+from hdopt.effects import EFFECTS
+from hdopt.effects.declared import Shaft
+from hdopt.effects.term import Term
+from hdopt.effects.tooth_mesh import SIDEBANDS
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.kinematics.waveform import kinematic_error_arcmin
-from hdopt.recording import recording_from_table
+from hdopt.parallel.shared_memory import each
+from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.rows import gather
 from hdopt.study import load_study
 
 TURN = 2 * np.pi
@@ -44,7 +47,7 @@ def record(theta, error):
 def bare(recording, sigma=0.02):
     """The recording's rows fitted by nothing but an offset."""
     samples = gather([recording])
-    problem = Problem(samples, None, np.ones((len(samples), 1)), Noise.white(samples, sigma))
+    problem = FitProblem(samples, None, np.ones((len(samples), 1)), Noise.white(samples, sigma))
     return refine(evaluate(problem, np.zeros(0), np.zeros(1), (), ()))
 
 
@@ -54,7 +57,7 @@ def test_noise_model_keeps_slow_wander_and_draws_lines_in():
     poles = np.roots(np.r_[1.0, -without_lines(ar)])
     assert max(poles.real) == pytest.approx(slow, abs=1e-9)
     oscillating = np.abs(poles[np.abs(poles.imag) > 1e-9])
-    np.testing.assert_allclose(oscillating, STEADIEST, rtol=1e-9)
+    np.testing.assert_allclose(oscillating, DEFAULT.noise.largest_oscillating_pole, rtol=1e-9)
     assert len(without_lines(np.zeros(0))) == 0
 
 
@@ -62,7 +65,7 @@ def test_a_line_stays_visible_beside_its_noise_model(study):
     theta = np.linspace(0, 60 * TURN, 6000)
     line = 0.3 * np.sin(13.37 * theta)
     fit = bare(record(theta, line + np.random.default_rng(1).normal(0, 0.02, len(theta))))
-    samples = fit.problem.samples
+    samples = fit.problem.rows
     noise = estimate(samples, fit.residual)
     left = noise.whiten(fit.residual)
     # White noise of the innovations' size would be all that an unbounded model left of a pure line.
@@ -76,7 +79,8 @@ def test_interpolation_follows_the_angle_that_its_encoder_read():
     drift = 3.0 * np.linspace(0, 1, len(theta)) ** 2
     ripple = 0.1 * np.sin(5000 * (theta / RATIO - drift * ARCMIN) + 0.4)
     samples = gather([record(theta, drift + ripple + rng.normal(0, 0.01, len(theta)))])
-    columns = EFFECTS["encoder_interpolation"].term(samples, {"lines": 5000.0, "output": 1.0, "harmonics": 1.0}).columns
+    shape = {"lines": 5000, "shaft": Shaft.OUTPUT, "cycles": (1,)}
+    columns = EFFECTS["encoder_interpolation"].term(samples, shape).columns
     plain = np.column_stack([np.sin(5000 * samples.theta / RATIO), np.cos(5000 * samples.theta / RATIO)])
     for design, most in ((columns, 0.02), (plain, None)):
         left = ripple - design @ np.linalg.lstsq(design, ripple, rcond=None)[0]
@@ -90,10 +94,10 @@ def test_events_are_described_where_they_happen():
     rows = np.arange(len(theta))
     noise = rng.normal(0, 0.02, len(theta))
     bump = 0.3 * np.exp(-0.5 * ((rows - 2500) / 40) ** 2)
-    found = OUTSIDE["_bump"].search(FitProbe(bare(record(theta, bump + noise))))[0]
+    found = explanations()["_bump"].search(FitProbe(bare(record(theta, bump + noise))))[0]
     assert abs(found.shape["row"] - 2500) < 20
     jumps = 0.2 * ((rows > 1000).astype(float) - (rows > 2200) + (rows > 4000) - (rows > 5100))
-    found = OUTSIDE["_jump"].search(FitProbe(bare(record(theta, jumps + noise))))[0]
+    found = explanations()["_jump"].search(FitProbe(bare(record(theta, jumps + noise))))[0]
     for row in (1001, 2201, 4001, 5101):
         assert min(abs(at - row) for at in found.shape.values()) <= 4
 
@@ -123,11 +127,11 @@ def test_mesh_inside_the_zones_comes_back(study):
     value, _, _ = base.evaluate(theta, errors, 1.5e-3 * np.stack([first, second]))
     recording = record(theta, value + rng.normal(0, 0.01, len(theta)))
     samples = gather([recording])
-    problem = Problem(samples, base, np.ones((len(samples), 1)), Noise.white(samples, 0.01))
+    problem = FitProblem(samples, base, np.ones((len(samples), 1)), Noise.white(samples, 0.01))
     low = evaluate(problem, errors, np.zeros(1), (), ())
-    sines = mesh.term(samples, {"sidebands": 6.0})
+    sines = mesh.term(samples, {"sidebands": SIDEBANDS[6]})
     start = np.linalg.lstsq(sines.columns, low.residual, rcond=None)[0]
-    without_base = Problem(samples, None, problem.nuisance, problem.noise)
+    without_base = FitProblem(samples, None, problem.nuisance, problem.noise)
     plain = evaluate(without_base, np.zeros(0), np.zeros(1), [sines], [start])
     inside = fit_in_zones(samples, low, _OneZero(), plain)
     assert inside is not None
@@ -151,16 +155,19 @@ def test_second_effects_pay_by_kind_and_flexible_ones_like_two():
     order, loop = term("output_coupling", 2), term("hysteresis", 2)
     exact, lobes = term("encoder_input_eccentricity", 2), term("circular_spline_lobing", 2)
     assert discrepancy([order]) == 0.0
-    assert discrepancy([order, loop]) == pytest.approx(OTHER_KIND)
-    assert discrepancy([order, lobes]) == pytest.approx(DISCREPANCY)
+    assert discrepancy([order, loop]) == pytest.approx(DEFAULT.penalty.other_kind)
+    assert discrepancy([order, lobes]) == pytest.approx(DEFAULT.penalty.discrepancy)
     # Two sines of known orders leave nothing for each other.
-    assert discrepancy([order, exact]) == pytest.approx(OTHER_KIND)
-    assert discrepancy([term("cs_tooth_harmonics", 46)]) == pytest.approx(DISCREPANCY)
+    assert discrepancy([order, exact]) == pytest.approx(DEFAULT.penalty.other_kind)
+    assert discrepancy([term("cs_tooth_harmonics", 46)]) == pytest.approx(DEFAULT.penalty.discrepancy)
     # A description without physics could be the misfit of anything.
-    assert discrepancy([loop, term("_sine_in_time", 2)]) == pytest.approx(DISCREPANCY)
-    for taken, share in (("encoder_output_eccentricity", OTHER_KIND), ("tooth_mesh", DISCREPANCY)):
-        beside = Beside((term(taken, 2),), gain=1000.0)
-        extra = price([order], 100.0, 0.0, 1.0, beside) - price([order], 100.0, 0.0, 1.0)
+    assert discrepancy([loop, term("_sine_in_time", 2)]) == pytest.approx(DEFAULT.penalty.discrepancy)
+    for taken, share in (
+        ("encoder_output_eccentricity", DEFAULT.penalty.other_kind),
+        ("tooth_mesh", DEFAULT.penalty.discrepancy),
+    ):
+        beside = SubtractedTerms((term(taken, 2),), gain=1000.0)
+        extra = penalty([order], 0.0, Scale(100.0, subtracted=beside)) - penalty([order], 0.0, Scale(100.0))
         assert extra == pytest.approx(0.5 * share * 1000.0)
 
 

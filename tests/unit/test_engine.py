@@ -1,35 +1,158 @@
-"""Engines: order kept, memory bounded, a real Dask scheduler gives the same numbers."""
+"""The one executor: order kept, memory bounded, the same bytes on every engine, a cluster's faults told in time."""
 
+import socket
 import subprocess
 import sys
+import threading
+import time
 
+import numpy as np
 import pytest
 
-from hdopt.engine import Dask, ThisProcess, Threads
+import hdopt.parallel.cluster
 from hdopt.errors import HdoptError
+from hdopt.parallel.cluster import Dask
+from hdopt.parallel.engine import engine_from, engine_in_force
+from hdopt.parallel.local import Processes, ThisProcess, Threads
+from hdopt.parallel.shared_memory import each, in_blocks, in_parts, threads_for
+from hdopt.parallel.workers import cores, in_a_worker
 from hdopt.tolerance.distributions import Normal
 from hdopt.tolerance.space import InputSpace, Tolerance
-from hdopt.tolerance.stack import run_stack
+from hdopt.tolerance.stack import StackRequest, run_stack
 
 
 def total(x):
     return x.sum(axis=1)
 
 
+def slowest_first(i):
+    time.sleep(0.02 if i % 4 == 0 else 0)
+    return i * i
+
+
+SPACE = InputSpace({name: Tolerance(Normal(std=1.0)) for name in ("x", "y")})
+
+
+def stacked(engine):
+    return run_stack(total, SPACE, StackRequest(limit=3.0, n=4096, seed=0, engine=engine)).to_dict()
+
+
+@pytest.fixture(scope="module")
+def two_processes():
+    return Processes(2)
+
+
 @pytest.mark.parametrize("engine", [ThisProcess(), Threads(1), Threads(4)])
 def test_results_come_in_order(engine):
-    assert list(engine.map(lambda i: i * i, range(50))) == [i * i for i in range(50)]
+    assert list(engine.map(slowest_first, range(50))) == [i * i for i in range(50)]
+
+
+def test_processes_keep_order_and_bytes():
+    assert list(Processes(2).map(lambda i: i * i, range(20))) == [i * i for i in range(20)]
+    assert stacked(Processes(2)) == stacked("process")
+
+
+def test_threads_give_the_bytes_of_one_process():
+    assert stacked("threads:3") == stacked("process")
+
+
+def test_no_more_than_a_few_items_are_under_way():
+    taken = []
+
+    def items():
+        for i in range(100):
+            taken.append(i)
+            yield i
+
+    first = Threads(2).map(lambda i: i, items())
+    assert next(first) == 0
+    assert len(taken) <= 4
+
+
+def test_what_a_worker_calls_runs_in_turn():
+    """Cores are shared out once: threads of threads would be four times as many as cores."""
+
+    def nested(i):
+        return in_a_worker(), threads_for(100), list(Threads(8).map(lambda j: threading.current_thread().name, [i, i]))
+
+    for inside, threads, names in Threads(2).map(nested, range(4)):
+        assert inside and threads == 1 and set(names) == {names[0]} and names[0].startswith("hdopt")
+    assert not in_a_worker()
+
+
+def test_one_process_means_one_thread():
+    with engine_in_force("process"):
+        assert threads_for(1000) == 1
+        assert each(lambda i: threading.current_thread() is threading.main_thread(), range(4)) == [True] * 4
+    assert threads_for(1000) == cores()
+
+
+@pytest.mark.parametrize("engine", ["process", "threads:2", "threads:5"])
+@pytest.mark.parametrize("rows", [0, 1, 7, 8, 100, 1001])
+def test_blocks_and_parts_cover_every_row_once(engine, rows):
+    counts = np.zeros((2, rows), int)
+
+    def fill(kind):
+        def work(part):
+            counts[kind, part] += 1
+
+        return work
+
+    with engine_in_force(engine):
+        in_blocks(rows, 8, fill(0))
+        in_parts(rows, fill(1))
+    assert (counts == 1).all()
+
+
+def test_linear_algebra_has_one_thread_where_pools_run():
+    threadpoolctl = pytest.importorskip("threadpoolctl")
+
+    def blas_threads(_):
+        return max(pool["num_threads"] for pool in threadpoolctl.threadpool_info() if pool["user_api"] == "blas")
+
+    with threadpoolctl.threadpool_limits(2, user_api="blas"):
+        for engine in (ThisProcess(), Threads(2)):
+            assert list(engine.map(blas_threads, range(3))) == [1, 1, 1]
+        assert blas_threads(None) == min(2, cores()) or blas_threads(None) == 2
+
+
+def test_the_error_of_an_item_comes_through_and_stops_the_rest():
+    started = []
+
+    def work(i):
+        started.append(i)
+        if i == 3:
+            raise HdoptError("item three")
+        time.sleep(0.005)
+
+    with pytest.raises(HdoptError, match="item three"):
+        list(Threads(2).map(work, range(1000)))
+    assert len(started) < 20
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("threads:0", "give 1 to 1024 workers"),
+        ("threads:", "give 1 to 1024 workers"),
+        ("processes:99999999999999999999", "give 1 to 1024 workers"),
+        ("dask://host", "names no scheduler; write dask://HOST:PORT"),
+        ("dask://host:99999999999", "names no scheduler"),
+        ("treads", "did you mean 'threads'"),
+    ],
+)
+def test_names_of_engines_that_are_none(name, message):
+    with pytest.raises(HdoptError, match=message):
+        engine_from(name)
 
 
 def test_dask_cluster_gives_the_same_numbers():
     distributed = pytest.importorskip("distributed")
-    space = InputSpace({name: Tolerance(Normal(std=1.0)) for name in ("x", "y")})
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, protocol="tcp://", dashboard_address=None
     ) as cluster:
         engine = Dask(cluster.scheduler_address.removeprefix("tcp://"))
-        there = run_stack(total, space, limit=3.0, n=4096, seed=0, engine=engine)
-    assert there.to_dict() == run_stack(total, space, limit=3.0, n=4096, seed=0, engine="process").to_dict()
+        assert stacked(engine) == stacked("process")
 
 
 def test_no_scheduler_is_one_sentence():
@@ -37,14 +160,23 @@ def test_no_scheduler_is_one_sentence():
         list(Dask("127.0.0.1:1", timeout_s=0.5).map(total, [1]))
 
 
+def test_a_mute_listener_is_told_within_the_time_out():
+    with socket.create_server(("127.0.0.1", 0)) as mute:
+        began = time.monotonic()
+        with pytest.raises(HdoptError, match="is no Dask scheduler of this version"):
+            list(Dask(f"127.0.0.1:{mute.getsockname()[1]}", timeout_s=0.5).map(total, [1]))
+        assert time.monotonic() - began < 5
+
+
 STREAMED = """
 from pathlib import Path
 from hdopt.tolerance.distributions import Uniform
 from hdopt.tolerance.space import InputSpace, Tolerance
 from hdopt.tolerance.sampling import PlainMonteCarlo
-from hdopt.tolerance.stack import run_stack
+from hdopt.tolerance.stack import StackRequest, run_stack
 space = InputSpace({"x": Tolerance(Uniform(lower=0.0, upper=1.0))})
-run_stack(lambda x: x[:, 0], space, limit=0.9, n=COUNT, seed=0, engine="process", sampling=PlainMonteCarlo())
+request = StackRequest(limit=0.9, n=COUNT, seed=0, engine="process", sampling=PlainMonteCarlo())
+run_stack(lambda x: x[:, 0], space, request)
 # Not getrusage: its peak is carried over from the process that started this one.
 status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
 print(status["VmHWM"].split()[0])
@@ -63,3 +195,76 @@ def test_memory_of_a_streamed_stack_does_not_grow_with_n():
     small, large = peak_kib(2 * 10**7), peak_kib(15 * 10**7)
     assert large < 1.1 * small
     assert large < 2**20  # 1 GiB
+
+
+def exits(i):
+    import os
+
+    os._exit(1)
+
+
+def slow_square(i):
+    time.sleep(0.15)
+    return i * i
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """A real scheduler and two workers, each a process, on this machine only."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None, silence_logs=50
+    ) as cluster:
+        yield cluster
+
+
+@pytest.mark.slow
+def test_a_killed_worker_changes_nothing(cluster):
+    engine = Dask(cluster.scheduler_address.removeprefix("tcp://"))
+    assert stacked(engine) == stacked("process")
+    found = iter(engine.map(slow_square, range(40)))
+    first = [next(found) for _ in range(3)]
+    next(iter(cluster.workers.values())).process.process.kill()
+    assert first + list(found) == [i * i for i in range(40)]
+
+
+@pytest.mark.slow
+def test_work_that_kills_every_worker_is_one_message(cluster):
+    engine = Dask(cluster.scheduler_address.removeprefix("tcp://"))
+    with pytest.raises(HdoptError, match="died over the same piece of work, for want of memory most likely"):
+        list(engine.map(exits, range(2)))
+
+
+@pytest.mark.slow
+def test_a_scheduler_without_workers_or_with_others_is_told_within_the_time_out(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address=None, silence_logs=50) as empty:
+        engine = Dask(empty.scheduler_address.removeprefix("tcp://"), timeout_s=2.0)
+        began = time.monotonic()
+        with pytest.raises(HdoptError, match="has had no workers for 2 s; start some with 'dask worker tcp://"):
+            list(engine.map(abs, [1]))
+        assert time.monotonic() - began < 8
+        empty.scale(1)
+        empty.wait_for_workers(1)
+        here = hdopt.parallel.cluster.versions()
+        monkeypatch.setattr("hdopt.parallel.cluster.versions", lambda: {**here, "hdopt": "9.9"})
+        monkeypatch.setattr("hdopt.parallel.cluster._versions_there", lambda client: {"tcp://w": here})
+        with pytest.raises(HdoptError, match=r"the worker tcp://w has hdopt .*, here it is 9\.9; install the same"):
+            list(engine.map(abs, [1]))
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_goes_away_is_told():
+    distributed = pytest.importorskip("distributed")
+    # One that is closed twice fails in Dask itself, so no `with`.
+    cluster = distributed.LocalCluster(n_workers=1, host="127.0.0.1", dashboard_address=None, silence_logs=50)
+    engine = Dask(cluster.scheduler_address.removeprefix("tcp://"), timeout_s=3.0)
+    found = iter(engine.map(slow_square, range(1000)))
+    next(found)
+    closing = threading.Thread(target=cluster.close, daemon=True)
+    closing.start()
+    began = time.monotonic()
+    with pytest.raises(HdoptError, match="was lost in the middle of the work|has had no workers"):
+        list(found)
+    assert time.monotonic() - began < 30
+    closing.join(30)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from hdopt.diagnosis.effects._friction_law import LAWS
+from hdopt.effects._friction_law import LAWS
 
 X = np.linspace(0, 6, 61)
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from hdopt.allocation.grades import iso_1328_pitch, it_grade, jis_1702_pitch
 from hdopt.errors import HdoptError
-from hdopt.tolerance.grades import iso_1328_pitch, it_grade, jis_1702_pitch
 
 
 @pytest.mark.parametrize(

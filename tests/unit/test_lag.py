@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from cases import BASE_ERRORS, drive
 
-from hdopt.deviations import DriveErrors
-from hdopt.drive import Clearances, DriveError, Structure
+from hdopt.drive.errors import DriveErrors
+from hdopt.drive.geometry import Clearances, Structure
+from hdopt.drive.values import DriveError
 from hdopt.errors import MissingValue
 from hdopt.kinematics import kinematic_error_arcmin
-from hdopt.kinematics.lag import lag
+from hdopt.mechanics.lag import lag
 
 THETA = np.radians(np.arange(360.0))
 CLEARANCES = Clearances(0.03, 0.02, 6.0, 8.0, 15.0)
@@ -65,3 +66,25 @@ def test_impossible_clearances_are_refused():
         Clearances(slot_1_width=25.0, disc_radius=10.0)
     with pytest.raises(DriveError, match="backlash is -0.1; a clearance must be a finite number, 0 or above"):
         Clearances(backlash=-0.1)
+
+
+def test_each_slot_runs_off_by_the_offset_along_it():
+    """Jia 2021, Eq. (33), from vectors: the input axis' eccentricity stands still, the wave generator's turns with it;
+    slot 1 lies along its major axis, slot 2 along the minor."""
+    e1, beta, e2, alpha = 0.4, 0.7, 0.25, 2.1
+    errors = DriveErrors(
+        axis_eccentricity=e1,
+        axis_eccentricity_direction=beta,
+        wg_eccentricity=e2,
+        wg_eccentricity_direction=alpha,
+    )
+    expected = np.empty((2, len(THETA)))
+    for i, theta in enumerate(THETA):  # angles count clockwise from +y
+        major, minor = (np.array([np.sin(theta + t), np.cos(theta + t)]) for t in (0, np.pi / 2))
+        offset = e1 * np.array([np.sin(beta), np.cos(beta)]) + e2 * (np.cos(alpha) * major + np.sin(alpha) * minor)
+        for slot, (axis, width) in enumerate(((major, 6.0), (minor, 8.0))):
+            reach = np.sqrt(15.0**2 - (width / 2) ** 2) + abs(offset @ axis)
+            expected[slot, i] = 0.02 / (80 * np.hypot(reach, width / 2)) * 10800 / np.pi
+    assert lag_of(Structure.ONE_WAY_MAJOR, errors).cross_slide_arcmin == pytest.approx(expected[0], rel=1e-12)
+    assert lag_of(Structure.ONE_WAY_MINOR, errors).cross_slide_arcmin == pytest.approx(expected[1], rel=1e-12)
+    assert lag_of(Structure.AUTOMATIC, errors).cross_slide_arcmin == pytest.approx(expected.sum(axis=0), rel=1e-12)

@@ -3,13 +3,13 @@
 import numpy as np
 import pandas as pd
 
-from hdopt.diagnosis.fit import Problem, evaluate, refine
-from hdopt.diagnosis.locate import locate
-from hdopt.diagnosis.noise import Noise
-from hdopt.diagnosis.nuisance import nuisances_for
-from hdopt.diagnosis.probe import FitProbe
-from hdopt.diagnosis.samples import gather
-from hdopt.recording import recording_from_table
+from hdopt.diagnosis.checks.localization import locate
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.inference.nuisance import nuisances_for
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.rows import gather
 
 
 def test_half_a_turn_holds_no_more_than_its_residual():
@@ -25,7 +25,7 @@ def test_half_a_turn_holds_no_more_than_its_residual():
         }
     )
     samples = gather([recording_from_table(table, 7.2)])
-    problem = Problem(samples, None, nuisances_for(samples, None).columns(samples), Noise.white(samples, 0.1))
+    problem = FitProblem(samples, None, nuisances_for(samples, None).columns(samples), Noise.white(samples, 0.1))
     start = evaluate(problem, np.zeros(0), np.zeros(problem.nuisance.shape[1]), (), ())
     fit = refine(start)
     for location in locate(FitProbe(fit), rng):

@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 
 from hdopt.diagnosis import diagnose
-from hdopt.diagnosis.effects._friction_torque import torque_behind_friction
 from hdopt.diagnosis.predict import predict
-from hdopt.diagnosis.samples import gather
+from hdopt.effects._friction_torque import torque_behind_friction
 from hdopt.errors import HdoptError
-from hdopt.recording import recording_from_table
+from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.rows import gather
 
 SWEEP = np.concatenate([np.linspace(a, b, 500) for a, b in ((-20, 20), (20, -15), (-15, 18), (18, -20))])
 

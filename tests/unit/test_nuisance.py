@@ -5,11 +5,11 @@ import pandas as pd
 import pytest
 
 from hdopt.diagnosis import diagnose
-from hdopt.diagnosis.base import beat_warning
-from hdopt.diagnosis.samples import gather
+from hdopt.diagnosis.inference.base_fit import beat_warning
 from hdopt.errors import HdoptError
 from hdopt.kinematics.waveform import kinematic_error_arcmin
-from hdopt.recording import recording_from_table
+from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.rows import gather
 from hdopt.report import Table
 from hdopt.report.sections.diagnosis import diagnosis_report
 from hdopt.study import load_study

@@ -6,11 +6,10 @@ from cases import PROFILES
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hdopt.drive import DriveError
-from hdopt.profiles import (
+from hdopt.drive.profiles import (
     PROFILES as REGISTERED,
 )
-from hdopt.profiles import (
+from hdopt.drive.profiles import (
     Ellipse,
     MeasuredProfile,
     Resal,
@@ -20,6 +19,7 @@ from hdopt.profiles import (
     perimeter_error,
     tip_radius_of_curvature,
 )
+from hdopt.drive.values import DriveError
 
 EVERY = pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES.keys())
 PHI = np.linspace(-1.0, 7.0, 2001)
@@ -172,3 +172,13 @@ def test_broken_profile_files_are_refused_with_the_line(text, message, tmp_path)
 def test_missing_profile_file_is_refused(tmp_path):
     with pytest.raises(DriveError, match="cannot be read"):
         MeasuredProfile.from_csv(tmp_path / "none.csv")
+
+
+def test_parallel_of_a_circle_is_a_circle_and_of_an_ellipse_is_at_its_distance():
+    from hdopt.drive.profiles import parallel_profile
+
+    ellipse = Ellipse(31.046, 30.318)
+    outside = parallel_profile(ellipse, 3.0)
+    assert outside.radius([0.0, np.pi / 2]) == pytest.approx([34.046, 33.318], abs=1e-9)
+    # Steiner: the parallel of a convex curve is longer by 2 pi times the distance.
+    assert outside.perimeter() == pytest.approx(ellipse.perimeter() + 6 * np.pi, abs=1e-7)

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import pytest
 
 from hdopt.errors import HdoptError
-from hdopt.steps import Context, find_step
 from hdopt.studies.real_residuals import judged, recordings_folder
 from hdopt.study import load_study
+from hdopt.workflow.steps import Context, find_step
 
 
 @pytest.mark.slow

@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from hdopt.errors import HdoptError
-from hdopt.recording import parse_columns, read_recording, recording_from_table
-from hdopt.recording_sync import conditions, find_passes, resample_in_angle, synchronous_average
+from hdopt.recordings.passes import conditions, find_passes, resample_in_angle, synchronous_average
+from hdopt.recordings.read import parse_columns, read_recording, recording_from_table
 
 RATIO = 80.0
 TURN = 2 * np.pi

@@ -8,7 +8,7 @@ import pytest
 
 from hdopt.cli import main
 from hdopt.errors import HdoptError
-from hdopt.recording import read_recording
+from hdopt.recordings.read import read_recording
 
 TURN = 2 * np.pi
 RATIO = 80.0

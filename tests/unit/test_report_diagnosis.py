@@ -1,10 +1,13 @@
 """Pieces of the diagnosis report that compute something of their own."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from hdopt.diagnosis.confounding import Confounding
-from hdopt.diagnosis.effect import Estimate, Parameter
+from hdopt.diagnosis.checks.confounding import Confounding
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.effects.estimate import FitEstimate, Parameter
 from hdopt.report.sections.diagnosis import LISTED_WAVES, confounded_items, parameter_row, waves_figure, waves_of
 from hdopt.report.sections.diagnosis_residual import FEWEST, POINTS, continued, means_along
 
@@ -42,6 +45,7 @@ def test_a_pure_number_shows_no_unit():
 
 def test_what_could_be_mistaken_is_said_once_for_each_effect():
     class Told:
+        evidence = SimpleNamespace(settings=DEFAULT)
         confounded = (
             Confounding("lost_motion", "hysteresis", 2.0, 0.99, 3.0, "reverse slowly"),
             Confounding("lost_motion", "channel_delay", 3.0, 0.9, 300.0, "reverse slowly"),
@@ -65,11 +69,11 @@ def test_many_waves_are_drawn_and_few_listed():
 
 
 def test_intervals_end_where_amplitudes_and_phases_do():
-    known = Estimate(np.array([3.0, 4.0]), np.diag([0.01, 0.01]))
+    known = FitEstimate(np.array([3.0, 4.0]), np.diag([0.01, 0.01]))
     assert known.amplitude(0, 1, "um", scale=1e3).value == pytest.approx(5e3)
     assert known.amplitude(0, 1).high - known.amplitude(0, 1).low == pytest.approx(2 * 1.96 * 0.1, rel=1e-3)
     phase = known.phase_deg(0, 1)
     assert phase.high - phase.value == pytest.approx(np.degrees(1.96 * 0.1 / 5), rel=1e-3)
-    open_ = Estimate(np.array([0.3, 0.4]), np.diag([100.0, 100.0]))
+    open_ = FitEstimate(np.array([0.3, 0.4]), np.diag([100.0, 100.0]))
     assert open_.amplitude(0, 1).low == 0.0
     assert open_.phase_deg(0, 1).high - open_.phase_deg(0, 1).low == 360.0

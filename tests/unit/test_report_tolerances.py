@@ -2,11 +2,11 @@
 
 import pytest
 
-from hdopt.allocation import allocate
 from hdopt.report import Figure, KeyFigures, Report, Table
 from hdopt.report.html import write_report
 from hdopt.report.sections.tolerances import allocate_section, readable, sobol_section, stack_section
-from hdopt.tolerancing import sobol, stack
+from hdopt.workflow.allocate import allocate
+from hdopt.workflow.stack import sobol, stack
 
 
 def of_kind(section, kind):

@@ -5,8 +5,8 @@ import json
 import pytest
 from effect_examples import toml
 
-from hdopt.run import run_study, steps_of
 from hdopt.study import load_study
+from hdopt.workflow.run import run_study, steps_of
 
 EFFECTS = {
     "lost_motion": {"lost_motion_arcmin": 0.3, "crossing_arcmin": 0.3},

@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from hdopt.engine import Dask, ThisProcess, Threads, engine_from
 from hdopt.errors import HdoptError
+from hdopt.parallel.cluster import Dask
+from hdopt.parallel.engine import engine_from
+from hdopt.parallel.local import ThisProcess, Threads
 from hdopt.tolerance import stack as stack_module
 from hdopt.tolerance.distributions import Normal, Uniform
 from hdopt.tolerance.intervals import clopper_pearson, order_statistic_ranks, smallest_n
-from hdopt.tolerance.sampling import SAMPLINGS, PlainMonteCarlo, ScrambledSobol
+from hdopt.tolerance.sampling import BLOCK, SAMPLINGS, PlainMonteCarlo, ScrambledSobol
 from hdopt.tolerance.space import InputSpace, Tolerance
-from hdopt.tolerance.stack import run_stack
+from hdopt.tolerance.stack import StackRequest, part_size, run_stack
 
 SPACE = InputSpace({f"x{i}": Tolerance(Normal(std=1.0)) for i in range(4)})
 LIMIT = 2.7
@@ -27,7 +29,7 @@ def total(x):
 
 @pytest.mark.parametrize("name", SAMPLINGS)
 def test_figures_of_a_normal_response(name):
-    result = run_stack(total, SPACE, limit=LIMIT, n=2**18, sampling=SAMPLINGS[name](), seed=0)
+    result = run_stack(total, SPACE, StackRequest(limit=LIMIT, n=2**18, sampling=SAMPLINGS[name](), seed=0))
     # five standard errors of plain Monte Carlo at this size
     error = 5 / np.sqrt(result.n)
     assert result.mean.value == pytest.approx(0, abs=error)
@@ -50,7 +52,9 @@ def test_intervals_cover_the_truth_as_often_as_they_say(name, n):
     ppk = LIMIT / NORMAL.ppf(0.99865)
     hits = []
     for seed in range(150):
-        result = run_stack(total, SPACE, limit=LIMIT, n=n, sampling=SAMPLINGS[name](), seed=seed, engine="process")
+        result = run_stack(
+            total, SPACE, StackRequest(limit=LIMIT, n=n, sampling=SAMPLINGS[name](), seed=seed, engine="process")
+        )
         required = result.required_quantile
         hits.append(
             (
@@ -66,17 +70,17 @@ def test_intervals_cover_the_truth_as_often_as_they_say(name, n):
 
 def test_same_seed_same_numbers_on_every_engine():
     results = [
-        run_stack(total, SPACE, limit=LIMIT, n=5000, seed=0, engine=engine).to_dict()
+        run_stack(total, SPACE, StackRequest(limit=LIMIT, n=5000, seed=0, engine=engine)).to_dict()
         for engine in (ThisProcess(), Threads(1), Threads(3), "threads")
     ]
     assert all(result == results[0] for result in results)
-    assert results[0] != run_stack(total, SPACE, limit=LIMIT, n=5000, seed=1).to_dict()
+    assert results[0] != run_stack(total, SPACE, StackRequest(limit=LIMIT, n=5000, seed=1)).to_dict()
 
 
 def test_streamed_sample_agrees_with_the_kept_one(monkeypatch):
-    kept = run_stack(total, SPACE, limit=LIMIT, n=2**15, seed=0)
+    kept = run_stack(total, SPACE, StackRequest(limit=LIMIT, n=2**15, seed=0))
     monkeypatch.setattr(stack_module, "KEPT_VALUES", 2**14)
-    streamed = run_stack(total, SPACE, limit=LIMIT, n=2**15, seed=0)
+    streamed = run_stack(total, SPACE, StackRequest(limit=LIMIT, n=2**15, seed=0))
     width = 3 * 8 / 2**18  # one bin, of a pilot that spans 8
     for q, estimate in kept.quantiles.items():
         other = streamed.quantiles[q]
@@ -89,14 +93,14 @@ def test_streamed_sample_agrees_with_the_kept_one(monkeypatch):
 
 
 def test_all_within_the_limit_is_not_certainty():
-    result = run_stack(total, SPACE, limit=100.0, n=4096)
+    result = run_stack(total, SPACE, StackRequest(limit=100.0, n=4096))
     assert result.conforming.value == 1
     assert result.conforming.low == clopper_pearson(4096, 4096).low < 1
 
 
 def test_linear_response_is_its_own_line():
     """Slopes 1/2 each, equal shares, and root sum square right to the linearisation's own sampling."""
-    result = run_stack(total, SPACE, limit=LIMIT, n=2**14)
+    result = run_stack(total, SPACE, StackRequest(limit=LIMIT, n=2**14))
     assert list(result.linearisation.slopes.values()) == pytest.approx([0.5] * 4, abs=1e-9)
     assert list(result.linearisation.shares.values()) == pytest.approx([0.25] * 4, abs=1e-3)
     assert result.rss == pytest.approx(NORMAL.ppf(0.9973), rel=1e-3)
@@ -105,7 +109,7 @@ def test_linear_response_is_its_own_line():
 def test_kinked_response_keeps_its_shares():
     """|x| + |y| with x twice as wide: slopes about zero would be nil; the folded line gives 4 : 1."""
     space = InputSpace({"x": Tolerance(Normal(std=2.0)), "y": Tolerance(Normal(std=1.0))}, folded=frozenset({"x", "y"}))
-    result = run_stack(lambda z: np.abs(z).sum(axis=1), space, limit=9.0, n=2**14)
+    result = run_stack(lambda z: np.abs(z).sum(axis=1), space, StackRequest(limit=9.0, n=2**14))
     assert result.linearisation.shares["x"] == pytest.approx(0.8, abs=0.005)
     assert result.linearisation.std == pytest.approx(result.std.value, rel=0.01)
 
@@ -115,7 +119,7 @@ def test_not_a_number_names_its_sample():
         return np.where(x[:, 1] > 2.5, np.nan, 1.0)
 
     with pytest.raises(HdoptError, match=r"the response is nan for sample \d+ of replicate 0 of seed 7.*x1 = 2\.\d+"):
-        run_stack(broken, SPACE, limit=LIMIT, n=2**13, seed=7, engine="process")
+        run_stack(broken, SPACE, StackRequest(limit=LIMIT, n=2**13, seed=7, engine="process"))
 
 
 @pytest.mark.parametrize(
@@ -131,7 +135,7 @@ def test_not_a_number_names_its_sample():
 )
 def test_bad_requests(options, message):
     with pytest.raises(HdoptError, match=message):
-        run_stack(total, SPACE, **({"limit": LIMIT} | options))
+        run_stack(total, SPACE, StackRequest(**({"limit": LIMIT} | options)))
 
 
 def test_smallest_n_is_the_smallest():
@@ -176,3 +180,29 @@ def test_engines_by_name():
     assert engine_from(None) == Threads()
     assert engine_from("threads:3") == Threads(3)
     assert engine_from("dask://host:8786") == Dask("host:8786")
+
+
+@pytest.mark.parametrize("sampling", [ScrambledSobol(), PlainMonteCarlo()])
+def test_a_replicate_made_from_several_starts_has_the_same_points(sampling):
+    whole = np.concatenate(list(sampling.blocks(3, 1, 3 * BLOCK + 5, 4)))
+    parts = [
+        np.concatenate(list(sampling.blocks(3, 1, min(start + BLOCK, 3 * BLOCK + 5), 4, start)))
+        for start in range(0, 3 * BLOCK + 5, BLOCK)
+    ]
+    assert np.array_equal(whole, np.concatenate(parts))
+
+
+def test_work_splits_by_size():
+    assert [part_size(n) for n in (1000, 2**24, 10**9, 10**12)] == [2**20, 2**20, 2**20, 244187136]
+    assert part_size(10**12) % BLOCK == 0
+
+
+def test_parts_of_a_replicate_make_the_replicate(monkeypatch):
+    """Small parts instead of large ones: counts are the same, moments agree to rounding."""
+    space = InputSpace({"x": Tolerance(Normal(std=1.0))})
+    request = StackRequest(limit=2.0, n=16 * 3 * BLOCK, seed=0)
+    one = run_stack(lambda x: x[:, 0], space, request)
+    monkeypatch.setattr("hdopt.tolerance.stack.PART", BLOCK)
+    many = run_stack(lambda x: x[:, 0], space, request)
+    assert many.quantiles == one.quantiles and many.conforming == one.conforming
+    assert (many.mean.value, many.std.value) == pytest.approx((one.mean.value, one.std.value), rel=1e-12, abs=1e-12)

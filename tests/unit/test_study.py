@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from hdopt.drive import Structure
+from hdopt.drive.geometry import Structure
 from hdopt.errors import HdoptError
 from hdopt.study import load_study, shipped_drives, shipped_studies
 
@@ -102,7 +102,7 @@ def test_set_changes_a_key_by_last_name_or_path(override, read):
         ("wave_generator.widht_mm=8", "did you mean 'wave_generator.width_mm'?"),
         ("upper=8", "--set upper: ambiguous; write tolerances"),
         ("width_mm", "--set 'width_mm' has no '='; write KEY=VALUE"),
-        ("width_mm=-1", "--set wave_generator.width_mm: is -1; it must be greater than 0"),
+        ("width_mm=-1", "--set wave_generator.width_mm: is -1; it must be greater than or equal to 0.1"),
         ("width_mm=wide", "--set wave_generator.width_mm: is 'wide'; it must be a valid number"),
         ("width_mm=inf", "--set wave_generator.width_mm: is inf; it must be a finite number"),
         ("structure=floating", "is 'floating'; it must be 'integral', 'automatic'"),
@@ -123,7 +123,7 @@ def test_set_refuses_what_it_cannot_do(override, message):
             "line 5, drive.modul_mm: unknown key 'modul_mm'; did you mean 'module_mm'?",
         ),
         ("module_mm = 0.25", "", "mine.toml, line 2, drive.module_mm: is missing; give it"),
-        ("module_mm = 0.25", "module_mm = -0.25", "line 5, drive.module_mm: is -0.25; it must be greater than 0"),
+        ("module_mm = 0.25", "module_mm = -0.25", "line 5, drive.module_mm: is -0.25; it must be greater"),
         ("module_mm = 0.25", "module_mm = nan", "line 5, drive.module_mm: is nan; it must be a finite number"),
         ("module_mm = 0.25", 'module_mm = "0.25"', "line 5, drive.module_mm: is '0.25'; it must be a valid number"),
         ("module_mm = 0.25", "module_mm = ", "mine.toml is not valid TOML: Invalid value (at line 5"),
@@ -138,7 +138,8 @@ def test_set_refuses_what_it_cannot_do(override, message):
         ("wrap_angle_deg = 30", "", "line 8, wave_generator: the two-disk profile needs wave_generator.wrap_angle_deg"),
         ('"two_disk"', '"twodisk"', "line 9, wave_generator.profile: is 'twodisk'; it must be 'ellipse'"),
         ('"two_disk"', '"measured"', "the measured profile needs wave_generator.file"),
-        ('"two_disk"', '"measured"\nfile = "none.csv"', "none.csv: cannot be read"),
+        ('"two_disk"', '"measured"\nfile = "none.csv"', 'say what the measured file shows: surface = "cam"'),
+        ('"two_disk"', '"measured"\nfile = "none.csv"\nsurface = "cam"', "none.csv: cannot be read"),
         ('"two_disk"', '"ellipse"\nsemi_minor_mm = 25', "semi_minor is 25 mm, semi_major 24.45 mm; the minor axis"),
         ("[errors]", "[erors]", "mine.toml, line 13, erors: unknown section 'erors'; did you mean 'errors'?"),
         ("wg_eccentricity_direction_deg = 10", "", "wg_eccentricity_mm needs errors.wg_eccentricity_direction_deg"),

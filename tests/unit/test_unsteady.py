@@ -6,19 +6,19 @@ import pytest
 from scipy.signal import lfilter
 
 from hdopt.diagnosis import diagnose
-from hdopt.diagnosis import noise as noise_model
-from hdopt.diagnosis.candidates import joint_fit
-from hdopt.diagnosis.credible import PRICE
-from hdopt.diagnosis.effects import EFFECTS
-from hdopt.diagnosis.fit import Problem, evaluate, refine
-from hdopt.diagnosis.noise import Noise
-from hdopt.diagnosis.samples import gather
-from hdopt.diagnosis.steps import find_steps
-from hdopt.diagnosis.suddenness import sudden_steps
-from hdopt.diagnosis.wander import lost_in_wander, slow_wave
-from hdopt.drive import ARCMIN
+from hdopt.diagnosis.checks.slow_wander import lost_in_wander, slow_wave
+from hdopt.diagnosis.checks.step_detection import sudden_steps
+from hdopt.diagnosis.inference import noise as noise_model
+from hdopt.diagnosis.inference.change_points import find_steps
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.search.candidates import joint_fit
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.drive.geometry import ARCMIN
+from hdopt.effects import EFFECTS
 from hdopt.kinematics.waveform import kinematic_error_arcmin
-from hdopt.recording import recording_from_table
+from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.rows import gather
 from hdopt.study import load_study
 
 TURN = 2 * np.pi
@@ -28,6 +28,7 @@ TURNS = 60
 THETA = np.linspace(0, TURNS * TURN, ROWS)
 """60 turns forward, 100 rows a turn, a hundredth of a second apart."""
 SEEDS = [0, 1, 2]
+SLOW_COST = DEFAULT.search.slow_cost
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +48,7 @@ def record(error, theta=THETA):
 def fit_of(error):
     """An offset fitted to `error`, with the noise that an autoregression makes of the rest."""
     samples = gather([record(error)])
-    problem = Problem(samples, None, np.ones((len(samples), 1)), Noise.white(samples, float(np.std(error))))
+    problem = FitProblem(samples, None, np.ones((len(samples), 1)), Noise.white(samples, float(np.std(error))))
     bare = refine(evaluate(problem, np.zeros(0), np.zeros(1), (), ()))
     return evaluate(
         problem.with_noise(noise_model.estimate(samples, bare.residual)), np.zeros(0), bare.offsets, (), ()
@@ -123,7 +124,7 @@ def test_a_slow_wave_is_told_from_wander(seed):
 def warmed(error):
     """A drift fitted to `error` beside an offset."""
     start = fit_of(error)
-    return joint_fit(start, [EFFECTS["thermal_drift"].term(start.problem.samples, {"time_constant_s": 20.0})])
+    return joint_fit(start, [EFFECTS["thermal_drift"].term(start.problem.rows, {"time_constant_s": 20.0})])
 
 
 def test_a_drift_stands_in_noise_and_is_lost_in_a_walk():
@@ -132,8 +133,8 @@ def test_a_drift_stands_in_noise_and_is_lost_in_a_walk():
     for seed in range(10):
         rng = np.random.default_rng(seed)
         drift = 0.2 * (1 - np.exp(-np.arange(ROWS) * 0.01 / 20.0))
-        assert not lost_in_wander(warmed(drift + coloured(rng)), 0, PRICE)
-        lost.append(lost_in_wander(warmed(np.cumsum(rng.normal(0, 0.006, ROWS)) + coloured(rng)), 0, PRICE))
+        assert not lost_in_wander(warmed(drift + coloured(rng)), 0, SLOW_COST)
+        lost.append(lost_in_wander(warmed(np.cumsum(rng.normal(0, 0.006, ROWS)) + coloured(rng)), 0, SLOW_COST))
     assert sum(lost) >= 8
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hdopt.trade.minimax import minimise
-from hdopt.trade.nlopt_guard import Effort, Evaluation
+from hdopt.optimize.minimax import minimise
+from hdopt.optimize.nlopt_adapter import Effort, Evaluation
 
 LOW, SPREAD = np.array([-1.0, -1.0]), 4.0
 

@@ -3,8 +3,8 @@ Report 99-6 (1999); inches and relative cost."""
 
 import pytest
 
-from hdopt.tolerance.allocate import Infeasible, Item, rss_rule, solve, total_cost, worst_case_rule
-from hdopt.tolerance.cost import Power
+from hdopt.allocation.convex import Infeasible, Item, rss_rule, solve, total_cost, worst_case_rule
+from hdopt.allocation.cost import Power
 
 NAMES = ("shaft", "first sleeve", "housing", "second sleeve")
 B = (0.15997, 0.07202, 0.12576, 0.07202)

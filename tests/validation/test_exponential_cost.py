@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hdopt.tolerance.allocate import Item, solve, worst_case_rule
-from hdopt.tolerance.cost import Exponential
+from hdopt.allocation.convex import Item, solve, worst_case_rule
+from hdopt.allocation.cost import Exponential
 
 A, B, TOTAL = np.array([3, 5, 2.0]), np.array([0.01, 0.02, 0.015]), 0.08
 

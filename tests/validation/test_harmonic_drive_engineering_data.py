@@ -12,7 +12,14 @@ from dataclasses import replace
 import pytest
 from cases import CSF_25_80
 
-from hdopt.trade.bearing import BearingConstants, axial_force, bearing_life_h, bearing_load, radial_force, ring_force
+from hdopt.mechanics.bearing_life import (
+    BearingConstants,
+    axial_force,
+    bearing_life_h,
+    bearing_load,
+    radial_force,
+    ring_force,
+)
 
 RPM = 2 * math.pi / 60
 CONSTANTS = BearingConstants(rated_torque=63_000.0, rated_speed=2000 * RPM)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hdopt.sensitivity import first_and_total, run_sobol, second_order_indices
 from hdopt.tolerance.distributions import Uniform
+from hdopt.tolerance.sensitivity import first_and_total, run_sobol, second_order_indices
 from hdopt.tolerance.space import InputSpace, Tolerance
 
 FIRST = (0.313905, 0.442411, 0.0)

@@ -6,10 +6,10 @@ from functools import cache
 
 import pytest
 
-from hdopt.drive import Structure
+from hdopt.drive.geometry import Structure
+from hdopt.optimize.design_space import Combination
 from hdopt.study import load_study
-from hdopt.trade.setup import setup_of
-from hdopt.trade.space import Combination
+from hdopt.workflow.search_setup import setup_of
 
 
 @cache

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from cases import BASE_ERRORS, PROFILES, TABLE_1_ELLIPSE, drive
 
-from hdopt.contact import contact_angle, homogenization_coefficient, meshing_teeth
-from hdopt.deviations import DriveErrors
-from hdopt.drive import Structure
+from hdopt.drive.errors import DriveErrors
+from hdopt.drive.geometry import Structure
 from hdopt.kinematics.extremes import extremes_arcmin
 from hdopt.kinematics.waveform import relative_turn
-from hdopt.spectrum import model_orders, order_spectrum
+from hdopt.mechanics.contact import contact_angle, homogenization_coefficient, meshing_teeth
+from hdopt.recordings.orders import model_orders, order_spectrum
 from hdopt.studies import jia_2021
 from hdopt.studies.paper_reproduction import profile_table, sampled
 

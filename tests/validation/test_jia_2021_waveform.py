@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from cases import BASE_ERRORS, drive
 
-from hdopt.drive import Structure
+from hdopt.drive.geometry import Structure
 from hdopt.kinematics import peak_to_peak_arcmin
 from hdopt.kinematics.extremes import extremes_arcmin, walked_peak_to_peak_arcmin
 

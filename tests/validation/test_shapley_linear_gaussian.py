@@ -3,9 +3,9 @@
 import pytest
 
 from hdopt.errors import HdoptError
-from hdopt.sensitivity import run_shapley, run_sobol
 from hdopt.tolerance.copula import CorrelationGroup
 from hdopt.tolerance.distributions import Normal
+from hdopt.tolerance.sensitivity import run_shapley, run_sobol
 from hdopt.tolerance.space import InputSpace, Tolerance
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hdopt.sensitivity import run_sobol
 from hdopt.tolerance.distributions import Uniform
+from hdopt.tolerance.sensitivity import run_sobol
 from hdopt.tolerance.space import InputSpace, Tolerance
 
 A = np.array([0, 0.5, 3, 9] + [99] * 10)

@@ -1,0 +1,130 @@
+"""A measured cam against its study. The measurements are made here from the ellipse's formula, not from the export."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+
+import numpy as np
+import pytest
+from cases import TABLE_1_ELLIPSE
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hdopt.cli import main
+from hdopt.geometry.compare import fit_cam
+from hdopt.geometry.contour import Circle, ParallelCurve
+
+BEARING = 3.0
+CAM = ParallelCurve(TABLE_1_ELLIPSE, BEARING)
+
+
+def measured(distance=-BEARING, error=lambda t: 0.0 * t, turn=0.0, shift=(0.0, 0.0), points=720):
+    """Points at a distance outside the ellipse of Table 1 along its normals, turned clockwise and moved."""
+    t = np.arange(points) * 2 * np.pi / points
+    a, b = TABLE_1_ELLIPSE.semi_major, TABLE_1_ELLIPSE.semi_minor
+    normal = np.column_stack([a * np.sin(t), b * np.cos(t)])
+    normal /= np.hypot(*normal.T)[:, None]
+    x, y = (np.column_stack([b * np.sin(t), a * np.cos(t)]) + (distance + error(t))[:, None] * normal).T
+    cos, sin = math.cos(turn), math.sin(turn)
+    return np.column_stack([x * cos + y * sin, y * cos - x * sin]) + shift
+
+
+@given(
+    turn=st.floats(-20, 20),
+    x=st.floats(-0.02, 0.02),
+    y=st.floats(-0.02, 0.02),
+    probe=st.floats(0, 5),
+)
+@settings(max_examples=15, deadline=None)
+def test_fit_finds_what_was_done_to_a_perfect_cam(turn, x, y, probe):
+    fit = fit_cam(measured(probe - BEARING, turn=math.radians(turn), shift=(x, y)), CAM, probe)
+    # An oval of 0.7 mm holds its rotation by the 0.02 um to which the optimiser brings the residuals.
+    assert math.degrees(fit.rotation) == pytest.approx(turn, abs=2e-4)
+    c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+    assert fit.shift == pytest.approx((x * c - y * s, x * s + y * c), abs=1e-6)
+    assert fit.largest < 1e-6
+    # The surface, without the probe, lies where the cam was put.
+    assert np.abs(CAM.deviation(fit.points - fit.shift)).max() < 1e-6
+
+
+def test_deviation_and_its_scatter_are_what_was_put_in():
+    rng = np.random.default_rng(3)
+    noise = rng.normal(0, 2e-4, 720)
+    fit = fit_cam(measured(error=lambda t: 0.003 * np.cos(6 * t) + noise), CAM)
+    # Six lobes are square to turning and moving an ellipse but for its 1.2 % of ovality.
+    assert fit.rms == pytest.approx(math.hypot(0.003 / math.sqrt(2), 2e-4), rel=0.03)
+    assert fit.noise == pytest.approx(2e-4, rel=0.15)
+
+
+def test_disc_has_no_direction():
+    circle = Circle(27.0, 0.8)
+    angle = np.arange(100) * 2 * np.pi / 100
+    points = np.column_stack([27.01 * np.sin(angle) + 0.005, 0.8 + 27.01 * np.cos(angle)])
+    fit = fit_cam(points, circle)
+    assert fit.rotation == 0.0 and fit.shift == pytest.approx((0.005, 0.0), abs=1e-7)
+    assert fit.deviations == pytest.approx(0.01, abs=1e-7)
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stopped:
+        main(["compare", *map(str, arguments)])
+    return stopped.value.code, capsys.readouterr()
+
+
+def save(path, points):
+    np.savetxt(path, points, delimiter=",", header="x_mm,y_mm", comments="")
+    return path
+
+
+def test_command_says_within_and_outside(tmp_path, capsys):
+    inside = save(tmp_path / "in.csv", measured(error=lambda t: 0.003 * np.cos(6 * t)))
+    code, said = run(capsys, inside, "--study", "csf-25-80", "--json", "-")
+    values = json.loads(said.out)
+    assert code == 0 and values["met"] is True
+    assert values["deviation_um"]["largest"] == pytest.approx(3.0, abs=0.1)
+    assert set(values["fit"]) == {"rotation_deg", "shift_um"}
+    outside = save(tmp_path / "out.csv", measured(error=lambda t: 0.006 * np.cos(6 * t)))
+    code, said = run(capsys, outside, "--plot", tmp_path / "plot.svg", "--csv", tmp_path / "points.csv")
+    assert code == 1 and "OUTSIDE the profile's zone of 7.5 um" in said.out
+    assert len((tmp_path / "points.csv").read_text().splitlines()) == 721
+    assert "deviation along the normal" in (tmp_path / "plot.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("surface", "distance"), [("cam", -BEARING), ("bearing", 0.0)])
+def test_measured_cam_goes_on_to_kinematic_error(surface, distance, tmp_path, capsys):
+    from hdopt import kinematic_error, load_study
+
+    cam = save(tmp_path / "cam.csv", measured(distance + 2.0, turn=math.radians(4)))
+    study = tmp_path / "own.toml"
+    code, _ = run(capsys, cam, "--probe-radius-mm", 2, "--surface", surface, "--write-study", study)
+    assert code == 0
+    assert tomllib.loads(study.read_text())["wave_generator"]["surface"] == surface
+    # A perfect cam gives the kinematic error of the design, to what its points hold.
+    own, design = (
+        kinematic_error(load_study(source)).to_dict()["peak_to_peak_arcmin"] for source in (study, "csf-25-80")
+    )
+    assert own == pytest.approx(design, abs=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1,2\n", "its first line must name the columns angle_deg,radius_mm or x_mm,y_mm"),
+        ("angle_deg,radius_mm\n1,2\n3,x\n", "line 3: does not hold angle_deg and radius_mm as numbers"),
+        ("angle_deg,radius_mm\n1,nan\n", "line 2: holds a number that is not finite"),
+        ("angle_deg,radius_mm\n1,28\n", "has 1 points; at least 16 are needed"),
+        (
+            "angle_deg,radius_mm\n" + "".join(f"{i},28\n" for i in range(180)),
+            "the points leave [0-9]+ deg of the cam out",
+        ),
+        ("angle_deg,radius_mm\n" + "".join(f"{i},31.5\n" for i in range(360)), "not of|mm off the cam of this study"),
+    ],
+)
+def test_unusable_measurements_are_refused(text, message, tmp_path, capsys):
+    import re
+
+    (tmp_path / "cam.csv").write_text(text)
+    code, said = run(capsys, tmp_path / "cam.csv")
+    assert code == 2 and re.search(message, said.err), said.err

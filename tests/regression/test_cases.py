@@ -1,0 +1,20 @@
+"""Sixty short bench cases are answered as they were (`python -m tests.regression.renew cases`)."""
+
+import pytest
+
+from tests.regression.cases import FITTED, SPECS, answer
+from tests.regression.golden import differences, stored
+
+GOLDEN = stored("cases")
+QUICK = ("nothing 2000", "encoder_input_eccentricity 1.0", "mains 1.0")
+"""Those that `make check` answers."""
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[] if n in QUICK else [pytest.mark.slow], id=n) for n in SPECS])
+def test_case_is_answered_as_before(name, session_answers):
+    moved = differences(GOLDEN[name], answer(name, session_answers), FITTED)
+    assert not moved, "\n".join(moved)
+
+
+def test_there_are_sixty_and_no_answer_is_left_over():
+    assert len(SPECS) == 60 and set(GOLDEN) == set(SPECS)

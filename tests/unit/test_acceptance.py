@@ -1,0 +1,171 @@
+"""What a name rests on besides its evidence: every part of an effect shows, and no other's orders are borrowed."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.inference.nuisance import nuisances_for
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.search.acceptance import is_acceptable
+from hdopt.diagnosis.search.candidates import Candidate, joint_fit
+from hdopt.diagnosis.search.high_order import strong_ripple
+from hdopt.diagnosis.search.refinement import otherwise_acceptable, shortened, trimmed
+from hdopt.diagnosis.search.subset_search import acceptable_first
+from hdopt.drive.geometry import ARCMIN
+from hdopt.effects import EFFECTS
+from hdopt.effects.bearing_pass import bearing_orders
+from hdopt.effects.cs_tooth_harmonics import members_of, shape_of
+from hdopt.effects.declared import Shaft
+from hdopt.effects.encoder_interpolation import is_of_teeth
+from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
+from hdopt.kinematics.waveform import kinematic_error_arcmin
+from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.rows import gather, neighbours_for
+from hdopt.study import load_study
+
+TURN = 2 * np.pi
+RATIO = 80.0
+NOISE = 0.01
+
+
+@pytest.fixture(scope="module")
+def study():
+    return load_study(drive="csf-25-80")
+
+
+def fitted(study, hidden, turns=40, rate=100):
+    """The base, from the errors it was made with, on a record that has `hidden` (a function of the input angle) too."""
+    theta = np.arange(turns * rate) * TURN / rate
+    error = kinematic_error_arcmin(study.drive, study.errors, theta) + hidden(theta)
+    error = error + np.random.default_rng(0).normal(0, NOISE, len(theta))
+    table = {
+        "time_s": 0.01 * np.arange(len(theta)),
+        "input_angle_deg": np.degrees(theta),
+        "output_angle_deg": np.degrees(theta / RATIO - error * ARCMIN),
+    }
+    recording = recording_from_table(pd.DataFrame(table), RATIO, name="record")
+    samples = gather([recording], neighbours_for([recording]))
+    base = CartesianModel.of(study.drive)
+    nuisances = nuisances_for(samples, base)
+    problem = FitProblem(samples, base, nuisances.columns(samples), Noise.white(samples, NOISE))
+    errors = to_cartesian(study.errors, base.half_width)
+    fit = refine(evaluate(problem, errors, np.zeros(problem.nuisance.shape[1]), (), ()), iterations=3)
+    return fit, recording, nuisances
+
+
+def with_effect(fit, name, shape):
+    return joint_fit(fit, [EFFECTS[name].term(fit.problem.rows, shape, fit.base_value)])
+
+
+def test_a_few_harmonics_are_found_alone(study):
+    """Waves 3 and 7 round the flexspline, none between them."""
+    ratio = 1 + 1 / RATIO
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(4 * ratio * t) + 0.08 * np.sin(8 * ratio * t + 1))
+    found = EFFECTS["fs_tooth_harmonics"].search(FitProbe(fit))
+    assert (4, 8) in [members_of(term.shape) for term in found]
+
+
+def test_parts_that_do_not_show_are_left_out(study):
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(4 * t) + 0.08 * np.sin(8 * t + 1))
+    all_of_them = with_effect(fit, "cs_tooth_harmonics", shape_of((4, 6, 8)))
+    assert not is_acceptable(all_of_them)
+    few = trimmed(all_of_them)
+    assert members_of(few.terms[0].shape) == (4, 8)
+    assert is_acceptable(few)
+    # One wave alone is a lobe of the clamping: nothing is left of such a set.
+    lobes, _, _ = fitted(study, lambda t: 0.1 * np.sin(6 * t))
+    assert trimmed(with_effect(lobes, "cs_tooth_harmonics", shape_of((4, 6)))) is None
+
+
+def test_a_line_and_its_double_are_no_bearing(study):
+    """At 2.667 and 5.333 cycles a turn they are waves 4 and 8 of some bearing's balls, without wave 2."""
+    half = (1 + 0.3168) * (1 + 1 / RATIO) / 2
+    shape = {"ball_to_pitch_ratio": 0.3168, "balls": 8, "zones": (2, 4)}
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(4 * half * t) + 0.03 * np.sin(8 * half * t + 1))
+    assert not is_acceptable(with_effect(fit, "bearing_pass", shape))
+    fit, _, _ = fitted(
+        study, lambda t: 0.1 * np.sin(4 * half * t) + 0.03 * np.sin(8 * half * t + 1) + 0.05 * np.sin(2 * half * t)
+    )
+    assert is_acceptable(with_effect(fit, "bearing_pass", shape))
+
+
+def test_an_eccentric_encoder_with_an_ellipse_shows_both(study):
+    shape = {"shaft": Shaft.OUTPUT, "orders": (1, 2)}
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(2 * t / RATIO), turns=80)
+    assert not is_acceptable(with_effect(fit, "encoder_output_eccentricity", shape))
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(2 * t / RATIO) + 0.04 * np.sin(t / RATIO), turns=80)
+    assert is_acceptable(with_effect(fit, "encoder_output_eccentricity", shape))
+
+
+@pytest.mark.parametrize(
+    ("lines", "multiples", "output", "expected"),
+    [
+        (240, (1,), True, True),  # order 3
+        (243, (1,), True, True),  # order 3 (1 + 1/N)
+        (250, (1,), True, False),
+        (24, (1, 2), False, False),
+        (162, (1,), False, True),  # the mesh
+        (81, (1, 2), False, True),  # its double is
+        (81, (1,), False, False),
+    ],
+)
+def test_lines_at_the_orders_of_the_teeth(lines, multiples, output, expected):
+    order = lines / RATIO if output else float(lines)
+    assert is_of_teeth(order, multiples, RATIO, output) is expected
+
+
+def test_those_that_may_not_be_said_neither_lead_nor_rival(study):
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(4 * t) + 0.08 * np.sin(8 * t + 1))
+    bad = with_effect(fit, "cs_tooth_harmonics", shape_of((4, 6, 8)))
+    good = with_effect(fit, "cs_tooth_harmonics", shape_of((4, 8)))
+    candidates = [Candidate(bad, 100.0, 0.0), Candidate(good, 98.0, 0.0), Candidate(bad, 95.0, 0.0)]
+    candidates += [Candidate(bad, 50.0, 0.0), Candidate(fit, 0.0, 0.0)]
+    assert [c.log_bayes_factor for c in acceptable_first(candidates, close_behind=10.0)] == [98.0, 50.0, 0.0]
+
+
+def test_a_name_that_may_not_be_said_this_way_may_be_in_another(study):
+    """26 balls unlike in place: most of it at their own wave, the rest at others. A bearing of 37 balls has an outer
+    pass there too, and no line besides that shows."""
+    half = (1 + 0.1267) * (1 + 1 / RATIO) / 2
+    outer = 26 * half
+    ratio = 1 - 2 * outer / 37 / (1 + 1 / RATIO)
+    assert bearing_orders(ratio, 37, RATIO)[3] == pytest.approx(outer)
+    fit, _, _ = fitted(
+        study,
+        lambda t: 0.1 * np.sin(outer * t) + sum(0.015 * np.sin(k * half * t + k) for k in range(2, 25, 2)),
+        turns=60,
+    )
+    wrong = with_effect(fit, "bearing_pass", {"ball_to_pitch_ratio": ratio, "balls": 37, "lines": (0, 3)})
+    assert not is_acceptable(wrong)
+    others = otherwise_acceptable(wrong, (), (0.0, wrong.problem.rows.highest_order))
+    assert others
+    assert all("zones" in other.terms[0].shape for other in others)
+    assert others[0].terms[0].shape["ball_to_pitch_ratio"] == pytest.approx(0.1267, abs=2e-4)
+    assert others[0].objective < wrong.objective
+
+
+def test_a_run_of_waves_is_tried_shorter(study):
+    """Waves 2 and 4 round the circular spline, fitted with 2 to 24: runs get shorter, and 2 to 4 is enough."""
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(2 * t) + 0.08 * np.sin(4 * t + 1))
+    wide = with_effect(fit, "cs_tooth_harmonics", shape_of(range(2, 25)))
+    runs = [(members_of(less.terms[0].shape), less) for less in shortened(wide, np.random.default_rng(0))]
+    assert [members[-1] for members, _ in runs] == [14, 8, 5, 4, 3]
+    left = {members[-1]: np.std(less.residual) for members, less in runs}
+    assert left[4] < 1.02 * np.std(wide.residual)
+    assert left[3] > 2 * left[4]
+    few = with_effect(fit, "cs_tooth_harmonics", shape_of((2, 4)))
+    assert list(shortened(few, np.random.default_rng(0))) == []
+
+
+@pytest.mark.parametrize(("size", "set_aside"), [(0.3, True), (0.002, False)])
+def test_strong_ripple_waits_for_its_own_search(study, size, set_aside):
+    """Order 101.3 in rows that are means of several samples: kept, it would come back as another order."""
+    fit, recording, nuisances = fitted(study, lambda t: size * np.sin(101.3 * t), turns=60, rate=400)
+    assert fit.problem.rows.are_averages
+    ripple = strong_ripple([recording], fit, nuisances)
+    assert (ripple is not None) is set_aside
+    if set_aside:
+        expected = size * np.sin(101.3 * recording.input_angle)
+        assert np.std(ripple - expected) < 0.2 * np.std(expected)

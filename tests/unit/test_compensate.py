@@ -1,0 +1,164 @@
+"""`hdopt compensate`: what it leaves on a fresh run, what its C code computes, and that it refuses noise."""
+
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hdopt.cli import main
+from hdopt.compensation.surface import Harmonics, surface_of
+from hdopt.compensation.writers import written
+from hdopt.drive.errors import DriveErrors
+from hdopt.errors import HdoptError
+from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
+from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.rows import gather
+from hdopt.study import load_study
+from hdopt.workflow.compensate import _worth, compensate
+
+RATIO, TURN, NOISE = 80.0, 2 * np.pi, 0.01
+ERRORS = DriveErrors(
+    axis_eccentricity=0.01, axis_eccentricity_direction=0.8, wg_eccentricity=0.005, cs_tooth_amplitude=0.002,
+    fs_tooth_amplitude=0.002,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return load_study(drive="csf-25-80").drive
+
+
+def error_of(drive, theta):
+    model = CartesianModel.of(drive)
+    return model.evaluate(theta, to_cartesian(ERRORS, model.half_width))[0]
+
+
+def table(error, turns, per_turn=80, seed=1, play=0.0, back=False):
+    one = np.arange(round(turns * per_turn)) * TURN / per_turn
+    theta = np.r_[one, one[::-1]] if back else one
+    way = np.r_[np.ones(len(one)), -np.ones(len(theta) - len(one))]
+    noisy = error(theta) + play / 2 * way + np.random.default_rng(seed).normal(0, NOISE, len(theta))
+    output = np.degrees(theta) / RATIO - noisy / 60
+    return pd.DataFrame(
+        {"time_s": np.arange(len(theta)) * 0.01, "input_angle_deg": np.degrees(theta), "output_angle_deg": output}
+    )
+
+
+def recorded(*arguments, **options):
+    return recording_from_table(table(*arguments, **options), RATIO)
+
+
+@pytest.mark.parametrize("terms", [64, 0])
+def test_a_fresh_run_keeps_what_was_promised(drive, terms):
+    """Trained on two runs, applied to a third: the noise is left, and what was predicted is found within 10 %."""
+
+    def error(theta):
+        return error_of(drive, theta)
+
+    runs = [recorded(error, 41, seed=s, play=0.1, back=True) for s in (1, 2, 3)]
+    made = compensate(runs[:2], drive, terms)
+    fresh = runs[2]
+    direction = np.sign(np.gradient(fresh.input_angle))
+    left = fresh.error_arcmin - made.found.at(fresh.input_angle, fresh.input_angle / RATIO, direction)
+    assert made.worth and made.held_out == "recordings"
+    assert np.std(left) < 1.25 * NOISE
+    assert np.ptp(left) == pytest.approx(made.predicted, rel=0.1)
+    assert np.ptp(left) < 0.2 * np.ptp(fresh.error_arcmin)
+    assert made.found.back == pytest.approx(0.05, abs=0.002)
+
+
+def test_without_a_drive_harmonics_of_both_angles_are_found():
+    """Orders 2, 2 (1 + 1/N) and 1/N over two output turns, no model: each amplitude within the noise."""
+
+    def error(theta):
+        return 0.3 * np.sin(2 * theta) + 0.2 * np.cos(2 * theta * (1 + 1 / RATIO)) + 0.1 * np.sin(theta / RATIO + 1)
+
+    made = compensate([recorded(error, 161, per_turn=40)])
+    terms = made.found
+    size = dict(zip(zip(terms.k, terms.j, strict=True), np.hypot(terms.cos, terms.sin), strict=True))
+    assert made.held_out == "output turns" and made.method == "harmonics"
+    assert size[(2, 0)] == pytest.approx(0.3, abs=1e-3)
+    assert size[(2, 2)] == pytest.approx(0.2, abs=1e-3)
+    assert size[(0, 1)] == pytest.approx(0.1, abs=1e-3)
+    assert len(size) < 8
+
+
+def test_a_surface_and_its_harmonics_agree():
+    some = Harmonics(np.array([2, 0, 3]), np.array([2, 1, -1]), np.array([0.3, 0, 0.1]), np.array([0.1, 0.2, 0]), 0.05)
+    theta = np.linspace(0, 500, 3000)
+    again = surface_of([some], back=0.05).harmonics(3)
+    np.testing.assert_allclose(again.at(theta, theta / RATIO, 1.0), some.at(theta, theta / RATIO, 1.0), atol=1e-12)
+    # Straight lines over 3/192 of a period are off by (2 pi 3/192)^2/8 = 0.12 % of an amplitude.
+    table_like = surface_of([some], back=0.05)
+    np.testing.assert_allclose(table_like.at(theta, theta / RATIO, 1.0), some.at(theta, theta / RATIO, 1.0), atol=3e-3)
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+@pytest.mark.parametrize("kind", ["terms", "table"])
+def test_c_code_computes_the_same(tmp_path, kind):
+    """Compiled with cc, to 1e-6 arcmin: digits of the constants or an index off by one would show."""
+    rng = np.random.default_rng(2)
+    some = Harmonics(rng.integers(0, 9, 20), rng.integers(-8, 9, 20), *rng.normal(0, 0.1, (2, 20)), -0.07)
+    found = some if kind == "terms" else surface_of([some], back=some.back)
+    (tmp_path / "c.c").write_text(
+        written(found, "c", {"note": "ends */ here"})
+        + '\n#include <stdio.h>\nint main(void){double a,b;int d;while(scanf("%lf %lf %d",&a,&b,&d)==3)'
+        'printf("%.17g\\n",hdopt_error_arcmin(a,b,d));return 0;}\n'
+    )
+    subprocess.run(["cc", "-std=c99", "-Wall", "-Werror", "-o", "c", "c.c", "-lm"], cwd=tmp_path, check=True)
+    a, b, d = rng.uniform(-20, 500, 300), rng.uniform(-20, 20, 300), rng.integers(-1, 2, 300)
+    lines = "\n".join(f"{x!r} {y!r} {z}" for x, y, z in zip(a.tolist(), b.tolist(), d.tolist(), strict=True))
+    out = subprocess.run([tmp_path / "c"], input=lines, capture_output=True, text=True, check=True).stdout
+    np.testing.assert_allclose(np.array(out.split(), float), found.at(a, b, d), atol=1e-6)
+
+
+def run(*arguments):
+    with pytest.raises(SystemExit) as end:
+        main([*arguments])
+    return end.value.code
+
+
+def test_noise_is_refused_with_1_and_no_file(tmp_path, capsys):
+    table(lambda theta: 0 * theta, 90, per_turn=40).to_csv(tmp_path / "r.csv", index=False)
+    out, told = tmp_path / "t.csv", tmp_path / "t.json"
+    code = run(
+        "compensate", str(tmp_path / "r.csv"), "--drive", "none", "--ratio", "80", "-o", str(out), "--json", str(told)
+    )
+    assert code == 1 and not out.exists()
+    assert json.loads(told.read_text())["file"] is None
+    assert "nothing written: no better than no compensation beyond chance" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("form", ["csv", "json", "c"])
+def test_command_writes_every_form(tmp_path, capsys, form):
+    table(lambda t: 0.3 * np.sin(2 * t), 90, per_turn=40).to_csv(tmp_path / "r.csv", index=False)
+    out, told = tmp_path / f"t.{form}", tmp_path / "told.json"
+    gear = ("--drive", "none", "--ratio", "80")
+    assert run("compensate", str(tmp_path / "r.csv"), *gear, "-o", str(out), "--json", str(told)) == 0
+    content = json.loads(told.read_text())
+    assert set(content["heldout_peak_to_peak_arcmin"]) == {"before", "after", "predicted", "low", "high"}
+    assert {"terms", "file"} <= set(content)
+    text = out.read_text()
+    assert {"csv": "k_input,j_output", "json": '"terms"', "c": "hdopt_error_arcmin"}[form] in text
+    assert "home both shafts" in text and "void after" in text
+    assert "home both shafts" in capsys.readouterr().out
+
+
+def test_terms_out_of_range(drive):
+    with pytest.raises(HdoptError, match="--terms is 65; give 1 to 64 coefficients, or 0 for a table"):
+        compensate([recorded(lambda t: np.sin(t), 5)], drive, 65)
+
+
+def test_a_fall_within_chance_is_not_worth_a_file():
+    """Squares that fall on some stretches and rise on others by as much are chance, whatever their sum; a steady fall
+    of a fifth is not."""
+    rows = gather([recorded(lambda t: 0 * t, 120, per_turn=40)])
+    before = np.ones(len(rows))
+    stretch = rows.block // 10
+    after = np.sqrt(1 - np.where(stretch % 2 == 0, 0.5, -0.4))
+    assert not _worth(before, after, rows)[0]
+    steady = np.sqrt(0.8 + 0.05 * (stretch % 2))
+    assert _worth(before, steady, rows)[0]

@@ -1,0 +1,258 @@
+"""Each stage of the diagnosis, and of its search, on a short record of a known drive."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hdopt.diagnosis.checks.scale import fitted_scale
+from hdopt.diagnosis.inference.fit import evaluate
+from hdopt.diagnosis.orientation import as_counted, turn_round
+from hdopt.diagnosis.search import subset_search
+from hdopt.diagnosis.search.search_state import SearchPlan, SearchState
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.diagnosis.stages import (
+    STAGES,
+    begin,
+    choose_orientation,
+    fit_base_in_noise,
+    fit_time_warp,
+    measure_noise_again,
+    search_effects,
+    search_high_orders,
+    search_without_ripple,
+    set_strong_ripple_aside,
+)
+from hdopt.drive.geometry import ARCMIN
+from hdopt.effects import EFFECTS
+from hdopt.effects.declared import Shaft
+from hdopt.effects.estimate import Parameter
+from hdopt.kinematics.cartesian import CartesianModel
+from hdopt.kinematics.waveform import kinematic_error_arcmin
+from hdopt.recordings.read import recording_from_table
+from hdopt.study import load_study
+
+TURN = 2 * np.pi
+RATIO, TURNS, RATE, NOISE = 80.0, 30, 60, 0.01
+HIDDEN = 0.15
+INPUT_SINE = {"shaft": Shaft.INPUT, "orders": (1,)}
+
+
+@pytest.fixture(scope="module")
+def study():
+    return load_study(drive="csf-25-80")
+
+
+def recorded(study, hidden, rate=RATE, turns=TURNS):
+    theta = np.arange(turns * rate) * TURN / rate
+    error = 40.0 + kinematic_error_arcmin(study.drive, study.errors, theta) + hidden(theta)
+    error = error + np.random.default_rng(5).normal(0, NOISE, len(theta))
+    table = {
+        "time_s": 0.01 * np.arange(len(theta)),
+        "input_angle_deg": np.degrees(theta),
+        "output_angle_deg": np.degrees(theta / RATIO - error * ARCMIN),
+    }
+    return recording_from_table(pd.DataFrame(table), RATIO, name="record")
+
+
+@pytest.fixture(scope="module")
+def started(study):
+    """An eccentric input encoder hidden."""
+    recording = recorded(study, lambda theta: HIDDEN * np.sin(theta + 0.4))
+    return begin([recording], CartesianModel.of(study.drive), 3, DEFAULT)
+
+
+@pytest.fixture(scope="module")
+def in_noise(started):
+    return fit_base_in_noise(started)
+
+
+@pytest.fixture(scope="module")
+def searched(in_noise):
+    return search_effects(in_noise)
+
+
+def test_begin_takes_the_zero_out_and_fits_the_base(started):
+    assert abs(np.median(started.problem.rows.error)) < 1e-9
+    assert started.selection.best.fit is started.base
+    left = np.std(started.base.residual)
+    assert 2 * NOISE < left < HIDDEN
+    assert started.high is None
+
+
+def test_nothing_is_set_aside_where_no_rows_were_averaged(started):
+    assert set_strong_ripple_aside(started) is started
+
+
+def test_strong_ripple_is_set_aside(study):
+    """Order 101.3 in rows that are means of several samples."""
+    recording = recorded(study, lambda theta: 0.3 * np.sin(101.3 * theta), rate=400, turns=60)
+    state = begin([recording], CartesianModel.of(study.drive), 3, DEFAULT)
+    aside = set_strong_ripple_aside(state)
+    assert np.std(aside.base.residual) < 0.5 * np.std(state.base.residual)
+
+
+def test_time_is_bent_only_where_it_was_asked_for(started):
+    assert fit_time_warp(started) is started
+
+
+def test_a_time_warp_is_fitted_where_it_was_asked_for(study):
+    recording = recorded(study, lambda theta: 0 * theta)
+    state = begin([recording], CartesianModel.of(study.drive), 3, DEFAULT, ("time-warp",))
+    bent = fit_time_warp(state)
+    assert bent.nuisances.slope is not None
+    assert bent.problem.nuisance.shape[1] == state.problem.nuisance.shape[1] + DEFAULT.nuisance.warp_degree
+
+
+def test_noise_is_measured_beside_what_is_hidden(in_noise):
+    """What a smooth basis explains, the hidden order among it, is no noise. A fifth above the truth is allowed: the
+    base is bent towards what is hidden, and where its driving zone switches is not smooth."""
+    assert in_noise.problem.noise.sigma == pytest.approx(NOISE, rel=0.2)
+    assert in_noise.clean is not None
+
+
+def test_a_stage_can_be_run_again(started, in_noise):
+    """It draws from a copy of the random stream: the same state gives the same numbers."""
+    again = fit_base_in_noise(started)
+    np.testing.assert_array_equal(again.base.errors, in_noise.base.errors)
+    assert again.rng.bit_generator.state == in_noise.rng.bit_generator.state
+
+
+def test_a_recording_as_the_model_counts_stays_as_it_is(in_noise):
+    after = choose_orientation(in_noise)
+    assert after.base is in_noise.base
+    assert (after.orientation.input, after.orientation.decided_by) == (1, "data")
+
+
+def test_a_recording_that_counts_the_other_way_is_turned_round(in_noise):
+    """The smaller zone drives there: taken as it is, a third more than what is hidden is left."""
+    start = begin(turn_round(in_noise.recordings), in_noise.problem.base, 3, DEFAULT)
+    wrong = fit_base_in_noise(start)
+    after = choose_orientation(wrong)
+    assert np.std(wrong.base.residual) > 1.3 * np.std(in_noise.base.residual)
+    assert np.std(after.base.residual) == pytest.approx(np.std(in_noise.base.residual), rel=0.02)
+    assert (after.orientation.input, after.orientation.output, after.orientation.decided_by) == (-1, -1, "data")
+
+
+def test_where_no_zone_switches_the_way_of_counting_is_asked_for(study):
+    """An ideal drive: nothing but noise, the same either way."""
+    theta = np.arange(1800) * TURN / 60
+    error = np.random.default_rng(2).normal(0, NOISE, 1800)
+    table = pd.DataFrame(
+        {
+            "time_s": 0.01 * np.arange(1800),
+            "input_angle_deg": np.degrees(theta),
+            "output_angle_deg": np.degrees(theta / RATIO - error * ARCMIN),
+        }
+    )
+    state = begin([recording_from_table(table, RATIO, name="still")], CartesianModel.of(study.drive), 3, DEFAULT)
+    assert choose_orientation(fit_base_in_noise(state)).orientation.decided_by == "convention"
+
+
+def test_phases_are_given_in_the_counting_of_the_recording(in_noise):
+    """a sin(k theta + phi) at theta = -theta', its sign turned, is a sin(k theta' - phi)."""
+    term = EFFECTS["encoder_input_eccentricity"].term(in_noise.problem.rows, INPUT_SINE)
+    found = as_counted({"phase_deg": Parameter(30.0, 25.0, 36.0, "deg"), "delay_s": Parameter(1.0, 0, 2, "s")}, term)
+    assert found["phase_deg"] == Parameter(-30.0, -36.0, -25.0, "deg")
+    assert found["delay_s"].value == 1.0
+
+
+def test_search_finds_what_is_hidden(searched):
+    assert searched.selection.best.effects == ("encoder_input_eccentricity",)
+    assert searched.base is searched.selection.base
+
+
+def test_noise_that_has_not_changed_asks_for_no_new_search(searched):
+    assert measure_noise_again(searched).selection is searched.selection
+
+
+def test_rows_as_recorded_hold_no_other_orders(searched):
+    after = search_high_orders(searched)
+    assert after.high is None
+    assert after.ripple is None
+    assert search_without_ripple(after) is after
+
+
+def test_order_of_work():
+    names = [stage.__name__ for stage in STAGES]
+    assert names.index("fit_base_in_noise") < names.index("search_effects") < names.index("search_without_ripple")
+
+
+@pytest.fixture(scope="module")
+def search(in_noise):
+    """A search that knows nothing yet."""
+    return SearchState(in_noise.base, SearchPlan(clean=in_noise.clean), in_noise.inflation, np.random.default_rng(0))
+
+
+@pytest.fixture(scope="module")
+def explored(search):
+    return subset_search.explore_base(search)
+
+
+def test_nothing_is_refitted_where_nothing_is_known(search):
+    assert subset_search.refit_known(search) is search
+
+
+def test_exploring_brings_the_hidden_effect(search, explored):
+    assert search.leader is None
+    assert "encoder_input_eccentricity" in explored.leader.effects
+    assert subset_search.explore_base(explored) is explored
+
+
+def test_known_leaders_take_the_place_of_exploring(search, explored):
+    known = SearchState(search.base, SearchPlan(known=(explored.leader.fit,)), 1.0, np.random.default_rng(0))
+    refitted = subset_search.refit_known(known)
+    assert set(refitted.fits) == {frozenset(explored.leader.effects)}
+    assert subset_search.explore_base(refitted) is refitted
+
+
+def test_a_stiff_leader_needs_no_second(search, in_noise):
+    term = EFFECTS["encoder_input_eccentricity"].term(in_noise.problem.rows, INPUT_SINE)
+    stiff = search.with_fit(subset_search.joint_fit(in_noise.base, [term]))
+    assert subset_search.single_effects_worth_a_second(stiff) == []
+
+
+def test_a_term_without_a_part_is_left_out(search, in_noise):
+    """A second term, at an order that is not there, comes in with the first."""
+    rows = in_noise.problem.rows
+    own = EFFECTS["encoder_input_eccentricity"].term(rows, INPUT_SINE)
+    idle = EFFECTS["circular_spline_lobing"].term(rows, {"lobes": 9.0})
+    both = subset_search.joint_fit(in_noise.base, [own, idle])
+    after = subset_search.leave_out_each_term(search.with_fit(both))
+    assert after.leader.effects == ("encoder_input_eccentricity",)
+
+
+def test_the_better_base_is_the_one_to_beat(search, explored):
+    """A base that stands away from its minimum is replaced by the one beside the leader."""
+    problem = search.base.problem
+    poor = evaluate(problem, 0 * search.base.errors, search.base.offsets, (), ())
+    state = SearchState(poor, SearchPlan(), 1.0, np.random.default_rng(0), explored.fits)
+    assert subset_search.base_beside_leader(state).base.objective < poor.objective
+
+
+def test_the_whole_search_names_the_hidden_effect(explored):
+    for stage in subset_search.STAGES[2:]:
+        explored = stage(explored)
+    ranked = subset_search.acceptable_first(subset_search.ranked(explored), DEFAULT.search.close_behind)
+    assert ranked[0].effects == ("encoder_input_eccentricity",)
+    assert ranked[0].log_bayes_factor > 100
+
+
+def test_a_gain_that_is_off_is_found_as_a_scale(study):
+    """An output encoder that counts 1.0005 turns a turn: no physics of the drive, and told as what it is."""
+    theta = np.arange(TURNS * RATE) * TURN / RATE
+    slope = -0.0005 * theta / RATIO / ARCMIN
+    recording = recorded(study, lambda theta: -0.0005 * theta / RATIO / ARCMIN)
+    state = search_effects(fit_base_in_noise(begin([recording], CartesianModel.of(study.drive), 3, DEFAULT)))
+    assert np.ptp(slope) > 5 * HIDDEN
+    assert state.selection.best.effects == ("_scale",)
+    scale = fitted_scale(state.selection.best.fit)
+    assert scale.found
+    assert scale.low < 1.0005 < scale.high
+    assert scale.high - scale.low < 1e-4
+
+
+def test_a_scale_that_is_right_is_one(in_noise):
+    scale = fitted_scale(in_noise.base)
+    assert not scale.found
+    assert scale.gain == pytest.approx(1.0, abs=2e-5)
+    assert scale.ratio == pytest.approx(RATIO, rel=2e-5)

@@ -1,0 +1,208 @@
+"""Outputs are written whole or not at all, inputs are never outputs, and JSON input is refused in one sentence."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from hdopt.errors import HdoptError
+from hdopt.files import (
+    check_output,
+    claim_output,
+    note_input,
+    read_json,
+    replacing,
+    replacing_all,
+    to_csv,
+    watching_files,
+    write_text,
+)
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_a_failure_in_the_middle_leaves_the_old_file_and_nothing_else(tmp_path):
+    target = tmp_path / "report.html"
+    target.write_text("the good old one")
+    with pytest.raises(RuntimeError), replacing(target) as passing:
+        passing.write_text("half of the n")
+        raise RuntimeError
+    assert target.read_text() == "the good old one"
+    assert names(tmp_path) == ["report.html"]
+
+
+def test_files_that_belong_together_take_their_names_together(tmp_path):
+    one, two = tmp_path / "one", tmp_path / "two"
+    with pytest.raises(RuntimeError), replacing_all([one, two]) as passing:
+        for path in passing:
+            path.write_text("x")
+        raise RuntimeError
+    assert names(tmp_path) == []
+    with replacing_all([one, two]) as passing:
+        for path in passing:
+            path.write_text("x")
+    assert names(tmp_path) == ["one", "two"]
+
+
+def test_a_symbolic_link_stays_and_its_target_changes(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    real, link = tmp_path / "elsewhere" / "real.json", tmp_path / "link.json"
+    real.write_text("old")
+    link.symlink_to(real)
+    write_text(link, "new")
+    assert link.is_symlink() and real.read_text() == "new"
+    dangling = tmp_path / "dangling.json"
+    dangling.symlink_to(tmp_path / "elsewhere" / "made.json")
+    write_text(dangling, "new")
+    assert dangling.is_symlink() and (tmp_path / "elsewhere" / "made.json").read_text() == "new"
+
+
+def test_rights_of_the_old_file_are_kept_and_a_new_one_follows_the_mask(tmp_path):
+    old = tmp_path / "old"
+    old.write_text("x")
+    old.chmod(0o640)
+    write_text(old, "y")
+    assert old.stat().st_mode & 0o777 == 0o640
+    before = os.umask(0o027)
+    try:
+        write_text(tmp_path / "new", "y")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "new").stat().st_mode & 0o777 == 0o640
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
+def test_devices_are_written_to_and_stay_devices():
+    write_text(__import__("pathlib").Path("/dev/null"), "x")
+    assert not os.path.isfile("/dev/null")
+    with pytest.raises(HdoptError, match="cannot write /dev/full: No space left on device"):
+        write_text(__import__("pathlib").Path("/dev/full"), "x")
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("", "it is a folder"),
+        ("folder", "it is a folder"),
+        ("no/such.json", "there is no folder"),
+        ("x" * 300, "too long"),
+        ("a\0b", "cannot write"),
+        ("loop", "cannot write"),
+    ],
+)
+def test_what_cannot_be_written_is_said_before_the_work(tmp_path, name, message):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    with pytest.raises(HdoptError, match=message):
+        check_output(tmp_path / name)
+
+
+def test_an_input_can_be_no_output(tmp_path):
+    (tmp_path / "r.csv").write_text("x")
+    (tmp_path / "link.csv").symlink_to(tmp_path / "r.csv")
+    with watching_files():
+        claim_output(tmp_path / "link.csv")
+        with pytest.raises(HdoptError, match=r"r\.csv is read and was also given as an output"):
+            note_input(tmp_path / "r.csv")
+    with watching_files():
+        note_input(tmp_path / "r.csv")
+        with pytest.raises(HdoptError, match="is an input of this command"):
+            write_text(tmp_path / "link.csv", "new")
+    with watching_files():
+        claim_output(tmp_path / "a")
+        with pytest.raises(HdoptError, match="is given for two outputs"):
+            claim_output(tmp_path / "." / "a")
+    assert (tmp_path / "r.csv").read_text() == "x"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[" * 100_000, "is nested too deeply"),
+        ('{"a": 1' + "0" * 400 + "}", "holds an integer of 401 digits"),
+        ('{"a": 1' + "0" * 5000 + "}", "holds an integer of 5001 digits"),
+        ('{"a": NaN}', "holds the number NaN, which is not finite"),
+        ('{"a": 1e999}', "holds the number 1e999, which is not finite"),
+        ("root:x:0:0:secret", r"line 1: is not valid JSON \(Expecting value\); give it"),
+    ],
+)
+def test_json_that_is_none(tmp_path, text, message):
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(HdoptError, match=message) as caught:
+        read_json(tmp_path / "a.json", "it")
+    assert "secret" not in str(caught.value)
+
+
+SLOW_WRITER = """
+import sys, time
+from pathlib import Path
+from hdopt.cli import _sigterm_raises, Terminated
+from hdopt.files import replacing
+try:
+    with _sigterm_raises(), replacing(Path(sys.argv[1])) as passing:
+        passing.write_text("half")
+        print("writing", flush=True)
+        time.sleep(30)
+except (KeyboardInterrupt, Terminated):
+    sys.exit(3)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_leaves_no_passing_file(tmp_path, number):
+    (tmp_path / "report.html").write_text("old")
+    with subprocess.Popen(
+        [sys.executable, "-c", SLOW_WRITER, str(tmp_path / "report.html")], stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout.readline() == "writing\n"
+        assert len(names(tmp_path)) == 2
+        process.send_signal(number)
+        assert process.wait(20) == 3
+    assert names(tmp_path) == ["report.html"]
+    assert (tmp_path / "report.html").read_text() == "old"
+
+
+READER = """
+import sys
+from pathlib import Path
+from hdopt.files import write_text
+while True:
+    for letter in "ab":
+        write_text(Path(sys.argv[1]), letter * 1_000_000)
+"""
+
+
+def test_sigkill_at_any_moment_leaves_a_whole_file(tmp_path):
+    target = tmp_path / "report.html"
+    target.write_text("a" * 1_000_000)
+    for delay in (0.21, 0.25, 0.3, 0.33):
+        process = subprocess.Popen([sys.executable, "-c", READER, str(target)])
+        time.sleep(delay)
+        process.kill()
+        process.wait(20)
+        text = target.read_text()
+        assert len(text) == 1_000_000 and text in ("a" * 1_000_000, "b" * 1_000_000)
+
+
+def test_no_cell_of_a_table_is_a_formula_and_numbers_stay_numbers():
+    import io
+
+    import pandas as pd
+
+    formulas = ["=1+1", "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "\t=1", "\r=1"]
+    frame = pd.DataFrame(
+        {"=name": formulas, "value": [-1.5, 2, -3, 4e-9, 5, 6], "text": ["-1.5", "+2", "a=b", "", "x", "é"]},
+        index=pd.Index(["=a", "b", "c", "d", "e", "f"], name="@index"),
+    )
+    before = frame.copy()
+    back = pd.read_csv(io.StringIO(to_csv(frame, index=True)), keep_default_na=False, dtype={"text": str})
+    assert list(back.columns) == ["'@index", "'=name", "value", "text"]
+    assert list(back["'=name"]) == ["'" + formula for formula in formulas]
+    assert list(back["value"]) == list(frame["value"]) and back["value"].dtype == float
+    assert list(back["text"]) == list(frame["text"]) and back["'@index"][0] == "'=a"
+    pd.testing.assert_frame_equal(frame, before)

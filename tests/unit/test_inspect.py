@@ -1,0 +1,240 @@
+"""`hdopt inspect`: every figure against a waveform whose figures are known, and its limits by the guard band."""
+
+import json
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hdopt.cli import main
+from hdopt.drive.errors import DriveErrors
+from hdopt.errors import HdoptError
+from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
+from hdopt.recordings import figures
+from hdopt.recordings.capability import gauge, outliers, performance
+from hdopt.recordings.decision import decide, parse_limits
+from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
+from hdopt.study import load_study
+from hdopt.workflow.inspect import inspect
+
+RATIO, TURN, NOISE = 80.0, 2 * np.pi, 0.004
+
+
+def recorded(ke_arcmin, turns=6, per_turn=400, play=0.0, back=True, noise=NOISE, seed=1, **channels):
+    """A recording forward (and back) of an error given as a function of the input angle; `play` is the return error."""
+    one = np.arange(turns * per_turn) * TURN / per_turn
+    theta = np.r_[one, one[::-1]] if back else one
+    way = np.r_[np.ones(len(one)), -np.ones(len(one))][: len(theta)]
+    error = ke_arcmin(theta) + way * play / 2 + np.random.default_rng(seed).normal(0, noise, len(theta))
+    table = {"time_s": np.arange(len(theta)) * 0.01, "input_angle_deg": np.degrees(theta)}
+    table["output_angle_deg"] = np.degrees(theta) / RATIO - error / 60
+    return recording_from_table(pd.DataFrame(table | channels), RATIO)
+
+
+def wave(theta):
+    return 0.3 * np.sin(2 * theta + 0.4)
+
+
+def test_figures_of_a_sine():
+    """Peak-to-peak 0.6, rms 0.3/sqrt 2, return error 0.2, slope 0.6 arcmin per rad. Nine sigma of noise in the
+    extremes; a line over 11 deg dims the slope of order 2 by 4 parts in 1000."""
+    found = inspect([recorded(wave, play=0.2)])
+    assert found.one_turn == pytest.approx(0.6, abs=9 * NOISE / math.sqrt(2))
+    assert found.recording_peak_to_peak == pytest.approx(0.6, abs=9 * NOISE / math.sqrt(2))
+    assert found.rms == pytest.approx(0.3 / math.sqrt(2), abs=2e-3)
+    assert found.returned.median == pytest.approx(0.2, abs=1e-3)
+    quiet = inspect([recorded(wave, noise=1e-4)])
+    assert quiet.slope_per_deg == pytest.approx(0.6 * math.pi / 180, rel=0.01)
+    assert found.slope_arcsec_per_s == pytest.approx(found.slope_per_deg * 60 * 0.9 / 0.01, rel=1e-3)
+    assert {o.symbol: o.amplitude_arcmin for o in found.orders}["2"] == pytest.approx(0.3, abs=1e-3)
+    assert found.beat is None
+    assert found.drift == pytest.approx(0, abs=0.01)
+
+
+def test_repeatability_is_the_noise_of_a_cell_and_needs_a_second_pass():
+    per_cell = recorded(wave, per_turn=300)
+    twice = [figures.cells_of(recorded(wave, seed=s, noise=0.03)) for s in (1, 2)]
+    cell = 0.03 / math.sqrt(400 / round(TURN / twice[0].width))
+    assert figures.repeatability(twice) == pytest.approx(cell, rel=0.1)
+    assert figures.repeatability([figures.cells_of(per_cell)]) is None
+
+
+def test_slipped_counts_are_found_where_they_are():
+    slipped = recorded(lambda theta: wave(theta) + 0.5 * (theta > 20.0), back=False)
+    ((place, size),) = figures.slips(figures.cells_of(slipped), 0.0)
+    assert place == pytest.approx(20.0, abs=0.05) and size == pytest.approx(0.5, abs=0.1)
+    assert figures.slips(figures.cells_of(recorded(wave)), 0.0) == []
+
+
+def test_skew_is_told_from_play_by_two_speeds():
+    delay, theta, time = 0.004, [0.0], [0.0]
+    for speed in (5.0, -5.0, 2.0, -2.0, 8.0, -8.0):
+        n = round(3 * TURN / abs(speed) / 0.005)
+        theta = np.r_[theta, theta[-1] + speed * 0.005 * np.arange(1, n + 1)]
+        time = np.r_[time, time[-1] + 0.005 * np.arange(1, n + 1)]
+    late = np.interp(np.asarray(time) - delay, time, theta)
+    play = np.where(np.gradient(theta) > 0, 0.1, -0.1)
+    output = late / RATIO - np.radians((wave(late) + play) / 60)
+    table = pd.DataFrame({"time_s": time, "input_angle_deg": np.degrees(theta), "output_angle_deg": np.degrees(output)})
+    found, doubt = figures.skew_s(recording_from_table(table, RATIO))
+    assert found == pytest.approx(delay, abs=max(3 * doubt, 2e-4))
+    assert figures.skew_s(recorded(wave)) is None
+
+
+ERRORS = DriveErrors(
+    axis_eccentricity=0.01,
+    axis_eccentricity_direction=0.8,
+    wg_eccentricity=0.005,
+    wg_tilt_major=0.001,
+    cs_tooth_amplitude=0.002,
+    fs_tooth_amplitude=0.002,
+)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_the_beat_of_a_short_record_and_the_orientation(mirrored):
+    """From 50 of 80 turns the model gives the whole beat within its interval, whichever way the angles count."""
+    drive = load_study(drive="csf-25-80").drive
+    model = CartesianModel.of(drive)
+    errors = to_cartesian(ERRORS, model.half_width)
+    sign = -1.0 if mirrored else 1.0
+    truth = np.ptp(model.evaluate(np.arange(80 * 360) * TURN / 360, errors)[0])
+    found = inspect([recorded(lambda t: sign * model.evaluate(sign * t, errors)[0], 50, 60, back=False)], drive)
+    assert found.beat.source == "model"
+    assert found.beat.low <= truth <= found.beat.high
+    assert found.beat.value == pytest.approx(truth, rel=0.03)
+    way = found.to_dict()["orientation"]
+    assert way["decided_by"] == "data"
+    assert way["input"] == ("the other way round" if mirrored else "as counted")
+
+
+def test_guard_band_of_iso_14253():
+    """1.645 u on either side: 0.90 + 0.0823 is below 1, 0.93 is not decidable, 1.09 is above."""
+    assert [decide("rms", v, 0.05, 1.0).verdict for v in (0.91, 0.93, 1.07, 1.09)] == [
+        "met",
+        "not decidable",
+        "not decidable",
+        "missed",
+    ]
+    assert decide("rms", None, 0.05, 1.0).met is None
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("peak=1", "unknown figure in --limit 'peak'"), ("rms=x", "write NAME=NUMBERarcmin"), ("rms=0", "above 0")],
+)
+def test_bad_limits(text, message):
+    with pytest.raises(HdoptError, match=message):
+        parse_limits(text)
+
+
+def test_torsion_of_a_known_spring():
+    """K1 3e4, K2 5e4, K3 6e4 Nm/rad, knees 14 and 48 Nm, a loop of 0.8 arcmin."""
+    torque = np.r_[np.linspace(0, 80, 400), np.linspace(80, -80, 800), np.linspace(-80, 80, 800)]
+    size = np.abs(torque)
+    bend = np.minimum(size, 14) / 3e4 + np.clip(size - 14, 0, 34) / 5e4 + np.maximum(size - 48, 0) / 6e4
+    way = np.sign(np.gradient(torque))
+    error = np.degrees(np.sign(torque) * bend) * 60 + 0.4 * way
+    table = pd.DataFrame({"t": np.arange(2000) * 0.01, "e": error, "m": torque})
+    found = torsion_of(recording_from_table(table, RATIO, "time=t:s,error=e:arcmin,torque=m:Nm"))
+    assert found.stiffness == pytest.approx((3e4, 5e4, 6e4), rel=0.02)
+    assert found.knees == pytest.approx((14, 48), abs=1.0)
+    assert found.hysteresis_loss_arcmin == pytest.approx(0.8, rel=0.02)
+
+
+def test_starting_torque_is_the_largest_before_it_turns():
+    torque = np.r_[np.linspace(0, 7, 500), np.full(2300, 4.0)]
+    found = recorded(wave, turns=7, back=False)
+    theta = np.r_[np.zeros(500), found.input_angle[:2300] - found.input_angle[0]]
+    table = pd.DataFrame(
+        {"time_s": np.arange(2800) * 0.01, "input_angle_deg": np.degrees(theta), "torque_Nm": torque}
+    ).assign(output_angle_deg=np.degrees(theta) / RATIO)
+    assert starting_torque_nm(recording_from_table(table, RATIO)) == pytest.approx(7.0, abs=0.05)
+
+
+def test_ppk_outliers_and_gauge():
+    """Log-normal with a spread of 0.1 about 0.5: X99.865 = 0.5 e^0.3; a limit there is Ppk 1."""
+    values = np.exp(np.log(0.5) + 0.1 * np.random.default_rng(3).standard_normal(400))
+    found = performance(values, 0.5 * math.exp(0.3))
+    assert found.low < 1.0 < found.high and found.ppk == pytest.approx(1.0, abs=0.12)
+    assert performance(values[:7], 1.0) is None
+    assert outliers([0.5, 0.51, 0.49, 0.5, 0.52, 0.48, 1.5]) == [6]
+    rng = np.random.default_rng(5)
+    readings = [
+        (0.5 + m + rng.normal(0, 0.01), f"{k}") for k, m in enumerate(rng.normal(0, 0.05, 60)) for _ in range(4)
+    ]
+    both = gauge(*map(list, zip(*readings, strict=True)))
+    assert both.repeatability == pytest.approx(0.01, rel=0.2)
+    assert both.reproducibility == pytest.approx(0.05, rel=0.25)
+
+
+def write(tmp_path, name, recording):
+    output = recording.input_angle / RATIO - np.radians(recording.error_arcmin / 60)
+    pd.DataFrame(
+        {
+            "time_s": recording.time,
+            "input_angle_deg": np.degrees(recording.input_angle),
+            "output_angle_deg": np.degrees(output),
+        }
+    ).to_csv(tmp_path / name, index=False, float_format="%.9f")
+    return str(tmp_path / name)
+
+
+def run(*arguments):
+    with pytest.raises(SystemExit) as end:
+        main([*arguments])
+    return end.value.code
+
+
+def test_command_check_ends_with_1_for_missed_only(tmp_path, capsys):
+    path = write(tmp_path, "a.csv", recorded(wave))
+    gear = ("inspect", path, "--drive", "none", "--ratio", "80")
+    assert run(*gear, "--limit", "recording=0.5arcmin", "--check") == 1
+    assert run(*gear, "--limit", "recording=0.5arcmin") == 0
+    assert run(*gear, "--limit", "recording=0.7arcmin,peak_to_peak=0.1arcmin", "--check") == 0
+    assert "peak_to_peak: not decidable, too little of the beat was recorded" in capsys.readouterr().out
+
+
+def test_command_writes_json_csv_report_and_bench(tmp_path, capsys):
+    path = write(tmp_path, "a.csv", recorded(wave, play=0.1))
+    files = {kind: str(tmp_path / f"out.{kind}") for kind in ("json", "csv", "html", "toml")}
+    options = (
+        "--json",
+        files["json"],
+        "--csv",
+        files["csv"],
+        "--report",
+        files["html"],
+        "--write-bench",
+        files["toml"],
+    )
+    assert run("inspect", path, "--drive", "none", "--ratio", "80", "--serial", "<b>7", *options) == 0
+    content = json.loads((tmp_path / "out.json").read_text())
+    assert set(content["peak_to_peak_arcmin"]) >= {"one_turn", "recording", "beat"}
+    assert {"rms_arcmin", "return_error_arcmin", "repeatability_arcmin", "steepest_slope_arcmin_per_deg"} < set(content)
+    assert {"orders", "checks", "limits", "provenance"} < set(content)
+    assert "return_error_median" in (tmp_path / "out.csv").read_text()
+    assert "<b>7" not in (tmp_path / "out.html").read_text()
+    capsys.readouterr()
+    assert run("inspect", path, "--drive", "none", "--bench", files["toml"]) == 0
+    assert "input_angle_deg" in capsys.readouterr().out
+
+
+def test_many_drives_name_the_outlier(tmp_path, capsys):
+    paths = [
+        write(tmp_path, f"d{k}.csv", recorded(lambda t, a=a: a * np.sin(2 * t), turns=3, seed=k))
+        for k, a in enumerate([0.30, 0.31, 0.29, 0.30, 0.305, 0.295, 0.315, 0.9])
+    ]
+    (tmp_path / "broken.csv").write_text("a,b\n1,2\n")
+    out = str(tmp_path / "m.json")
+    code = run(
+        "inspect", *paths, str(tmp_path / "broken.csv"), "--each", "--drive", "none", "--ratio", "80", "--limit",
+        "peak_to_peak=1arcmin", "--json", out, "--report", str(tmp_path / "m.html"),
+    )  # fmt: skip
+    assert code == 0
+    content = json.loads((tmp_path / "m.json").read_text())
+    assert content["outliers"] == ["d7.csv"]
+    assert content["drives"][-1]["error"].startswith("broken.csv")
+    assert content["performance"]["n"] == 8

@@ -1,0 +1,174 @@
+"""Measured teeth: known answers of the mean over the teeth in contact, and what a study says of them."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cases import BASE_ERRORS, drive
+
+from hdopt.drive.errors import DriveErrors
+from hdopt.drive.teeth import MeasuredTeeth, read_teeth
+from hdopt.drive.values import DriveError
+from hdopt.errors import HdoptError
+from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin, extremes_arcmin
+from hdopt.kinematics.load_sharing import LoadSharing, mesh_tables
+from hdopt.kinematics.waveform import kinematic_error_arcmin
+from hdopt.mechanics.contact import contact_angle, meshing_teeth
+from hdopt.study import load_study
+from hdopt.workflow.kinematic_error import kinematic_error
+from hdopt.workflow.stack import study_problem
+
+Z_CS, Z_FS = 162, 160
+
+
+def sine(teeth: int, amplitude: float, phase: float, waves: int = 1) -> MeasuredTeeth:
+    angles = 2 * np.pi * np.arange(teeth) / teeth
+    return MeasuredTeeth.of(amplitude * np.sin(waves * angles + phase))
+
+
+def shared(waves: int = 1, teeth: int = Z_CS) -> float:
+    return LoadSharing.of(drive()).response(waves, teeth)
+
+
+@pytest.mark.parametrize("waves", [1, 2, 3, 5])
+def test_even_weights_give_the_dirichlet_factor(waves):
+    """sin(k c/2)/(k c/2) for many teeth; 40,000 of them leave its sum within 1e-3 of the integral."""
+    c = contact_angle(drive().geometry, drive().wave_generator.profile)
+    found = LoadSharing.of(drive(), taper=0.0).response(waves, 40_000)
+    assert found == pytest.approx(math.sin(waves * c / 2) / (waves * c / 2), abs=1e-3)
+
+
+def test_independent_teeth_give_one_over_the_root_of_those_in_mesh():
+    rng, design = np.random.default_rng(0), drive()
+    z_mp = meshing_teeth(design.geometry, contact_angle(design.geometry, design.wave_generator.profile))
+    sharing = LoadSharing.of(design)
+    tables = [sharing.table(MeasuredTeeth(tuple(rng.normal(0, 0.005, Z_CS)))) for _ in range(400)]
+    # 400 drives with some six independent windows each: the standard deviation is known to 1.5 %.
+    assert np.std(tables) == pytest.approx(0.005 / math.sqrt(z_mp), rel=0.05)
+
+
+def test_a_sine_as_a_table_is_a_sine_of_shared_amplitude():
+    amplitude = 0.002
+    measured = replace(drive(), cs_teeth=sine(Z_CS, amplitude, 0.3), fs_teeth=sine(Z_FS, amplitude, 1.1))
+    without = BASE_ERRORS.with_(cs_tooth_amplitude=0.0, fs_tooth_amplitude=0.0)
+    as_sines = BASE_ERRORS.with_(
+        cs_tooth_amplitude=amplitude * shared(1, Z_CS),
+        cs_tooth_phase=0.3,
+        fs_tooth_amplitude=amplitude * shared(1, Z_FS),
+        fs_tooth_phase=1.1,
+    )
+    theta = np.linspace(0, 500, 999)
+    found, expected = (
+        kinematic_error_arcmin(d, e, theta, "closed form") for d, e in ((measured, without), (drive(), as_sines))
+    )
+    # Whole teeth enter and leave a tapered window: what is left of that is far below 1e-3 of the amplitude, 0.2 arcmin.
+    assert found == pytest.approx(expected, abs=2e-4)
+    for method in ("exact", "closed form"):
+        pair = extremes_arcmin(measured, without, method), extremes_arcmin(drive(), as_sines, method)
+        assert pair[0] == pytest.approx(pair[1], abs=2e-4)
+
+
+def test_an_eccentricity_is_a_pitch_sine_of_amplitude_e_tan_alpha():
+    """To first order: the quadratic part of an eccentricity of 1 um is 1e-3 of it."""
+    e, alpha = 0.001, drive().geometry.pressure_angle
+    table = sine(Z_CS, e * math.tan(alpha) / shared(), math.pi / 2)  # sin(theta + 90 deg): along +y
+    found = converged_peak_to_peak_arcmin(replace(drive(), cs_teeth=table), DriveErrors())
+    assert found == pytest.approx(converged_peak_to_peak_arcmin(drive(), DriveErrors(axis_eccentricity=e)), rel=2e-3)
+
+
+def test_a_single_tooths_step_shows_where_that_tooth_meshes():
+    """Tooth 41 of 162 lies at 88.9 deg; zone 1 passes it there, zone 2 half a turn later, once in every turn."""
+    values = np.zeros(Z_CS)
+    values[40] = 0.01
+    design = replace(drive(), cs_teeth=MeasuredTeeth(tuple(values)))
+    weights = LoadSharing.of(design).weights(2 * np.pi * (np.arange(Z_CS) - 40) / Z_CS)
+    theta = np.arange(0, 2 * np.pi, 1e-3)
+    error = kinematic_error_arcmin(design, DriveErrors(), theta, "closed form")
+    at = 2 * np.pi * 40 / Z_CS
+    expected = 0.01 / weights.sum() * design.geometry.arcmin_per_mm
+    for place in (at, at + np.pi):
+        # Even in the middle of the window; far from it nothing.
+        assert np.interp(place, theta, error) == pytest.approx(expected, rel=1e-2)
+        assert np.interp(np.mod(place + np.pi / 2, 2 * np.pi), theta, error) == pytest.approx(0, abs=1e-9)
+
+
+def test_search_over_all_phases_finds_what_a_walk_of_the_beat_finds():
+    rng = np.random.default_rng(3)
+    design = replace(
+        drive(),
+        cs_teeth=MeasuredTeeth.of(rng.normal(0, 0.004, Z_CS), "single"),
+        fs_teeth=MeasuredTeeth.of(rng.normal(0, 0.004, Z_FS), "single"),
+    )
+    errors = BASE_ERRORS.with_(cs_tooth_amplitude=0.0, fs_tooth_amplitude=0.0)
+    theta = np.arange(80 * 1440) * 2 * np.pi / 1440
+    walked = np.ptp(kinematic_error_arcmin(design, errors, theta, "closed form"))
+    found = converged_peak_to_peak_arcmin(design, errors, "closed form")
+    assert walked - 1e-6 <= found < walked + 5e-3
+
+
+def test_recentring_takes_out_what_a_part_measured_off_centre_shows():
+    true = np.random.default_rng(1).normal(0, 0.002, Z_CS)
+    angles = 2 * np.pi * np.arange(Z_CS) / Z_CS
+    off_centre = MeasuredTeeth.of(true + 0.01 * np.sin(angles + 0.4), recentre=True)
+    centred = MeasuredTeeth.of(true, recentre=True)
+    assert off_centre.deviations == pytest.approx(centred.deviations, abs=1e-12)
+    assert off_centre.eccentricity == pytest.approx(0.01, rel=0.05)
+
+
+def test_single_and_cumulative_deviations_are_the_same_teeth():
+    cumulative = np.random.default_rng(2).normal(0, 0.002, Z_FS)
+    single = cumulative - np.roll(cumulative, 1)
+    one, other = MeasuredTeeth.of(cumulative), MeasuredTeeth.of(single, "single")
+    assert one.deviations == pytest.approx(other.deviations, abs=1e-12)
+    assert one.largest_single == pytest.approx(np.abs(single).max())
+
+
+@pytest.fixture
+def study_with_teeth(tmp_path):
+    rng = np.random.default_rng(5)
+    rows = "\n".join(f"{i + 1},left,{value:.3f}" for i, value in enumerate(rng.normal(0, 3, Z_CS)))
+    (tmp_path / "cs.csv").write_text(f"tooth,flank,fp_um\n{rows}\n")
+    (tmp_path / "mine.toml").write_text('drive = "csf-25-80"\n[cs_teeth]\nfile = "cs.csv"\ndeviation = "single"\n')
+    return tmp_path / "mine.toml"
+
+
+def test_a_study_takes_measured_teeth(study_with_teeth):
+    study = load_study(study_with_teeth)
+    assert study.errors.cs_tooth_amplitude == 0  # the table stands instead of the sine
+    found = kinematic_error(study).to_dict()
+    assert found["measured_teeth"]["cs_teeth"]["teeth"] == Z_CS
+    assert any("cs_teeth: a first harmonic of" in note for note in found["notes"])
+    table = mesh_tables(study.drive)[0]
+    span = np.ptp(table) * study.drive.geometry.arcmin_per_mm
+    assert found["peak_to_peak_arcmin"] != pytest.approx(1.3694, abs=1e-4)
+    assert found["peak_to_peak_arcmin"] < 1.3694 + span
+    # Misalignment by its own mean, not by k_e: much more is left than k_e times all.
+    assert found["nonuniform_arcmin"] > 2 * found["homogenization_coefficient"] * found["peak_to_peak_arcmin"]
+    problem = study_problem(study)
+    assert "cs_tooth_amplitude_mm" not in problem.space.names
+    inputs = problem.space.sample(np.full((1, problem.space.dimension), 0.5))
+    one = DriveErrors.from_matrix(problem.response.matrix(inputs)[0])
+    expected = converged_peak_to_peak_arcmin(study.drive, one, "closed form")
+    assert problem.response(inputs) == pytest.approx([expected], abs=1e-9)
+
+
+def test_a_study_that_evens_out_measured_teeth_twice_is_refused(study_with_teeth):
+    with pytest.raises(HdoptError, match=r"measured teeth are shared by those in contact already"):
+        study_problem(load_study(study_with_teeth, ["requirement.homogenization=contact"]))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1,left,0\n2,left,0\n", r"6 of 8 teeth are missing \(3, 4, 5, 6, 7 \.\.\.\); give every tooth"),
+        ("1,left,0\n1,left,1\n", "gives tooth 1 twice"),
+        ("9,left,0\n", "tooth 9; this spline has teeth 1 to 8"),
+        ("1,left,0\n1,right,0\n", "has the flanks left, right; say which one carries"),
+        ("tooth,flank,fp_um\n1,left\n", "line 2: '1,left'; each line must hold tooth, flank, fp_um"),
+    ],
+)
+def test_a_table_that_is_none_is_refused(tmp_path, text, message):
+    (tmp_path / "t.csv").write_text(text)
+    with pytest.raises(DriveError, match=message):
+        read_teeth(tmp_path / "t.csv", 8)

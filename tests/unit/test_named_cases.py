@@ -1,0 +1,81 @@
+"""Sixty short records of the bench whose truth is known: verdict, names and sizes.
+
+Every effect of the catalogue at half of the drive's own error and at all of it, nothing hidden, and physics outside the
+catalogue. The bench shares no code with the diagnosis; truths come from its physics, never from an answer. What is
+known to be answered wrongly stands in `WRONG_YET`, and is run like the rest.
+"""
+
+import pytest
+
+from hdopt.bench.cases import simulate
+from hdopt.bench.marking import COMPARED
+from tests.regression.cases import SPECS, diagnosed
+
+# Brief records have 40 samples a turn and noise up to a third of the smallest wave hidden: stiffness, the least well
+# determined size, has a standard error of 2 % in them.
+SIZE = 0.05
+
+WRONG_YET = {
+    "hysteresis 0.5": "friction over 0.09 deg of output is called a delay or play",
+    "cs_tooth_harmonics 1.0": "teeth cut in segments: the ramps' ends are called a defect as well",
+    "nothing 2011": "structure is seen where nothing is",
+    "mains 1.0": "50 Hz, folded to few samples a turn, is taken as noise",
+    "slow wave 1.0": "a slow wave in time is called a coupling",
+}
+WRONG_SIZE_YET = {
+    "local_tooth_defect 0.5": "the defect is found half a turn off, at the other zone",
+    "encoder_interpolation 0.5": "720 lines at the output and 9 at the input have the same order",
+}
+
+SAME_COLUMNS = {
+    "output_coupling": "encoder_output_eccentricity",
+    "circular_spline_lobing": "cs_tooth_harmonics",
+    "channel_delay": "resonance",
+}
+"""Effects that another one gives as well, so that `ambiguous` is the true answer and names both: 2/N of an oval code
+wheel, as many waves of the teeth, and a spring damped at its output, which lags a steady speed by 2 zeta/w.
+"""
+
+CHECKED_IN_MAKE_CHECK = ("nothing 2000", "encoder_input_eccentricity 1.0")
+
+
+def marks(name):
+    found = [] if name in CHECKED_IN_MAKE_CHECK else [pytest.mark.slow]
+    if name in WRONG_YET:
+        found.append(pytest.mark.xfail(reason=WRONG_YET[name], strict=False))
+    return found
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=marks(name), id=name) for name in SPECS])
+def test_verdict_names_and_sizes(name, session_answers):
+    spec = SPECS[name]
+    said = diagnosed(name, session_answers)
+    named = {effect["id"] for effect in said["effects"]}
+    if spec.family == "nothing":
+        assert (said["verdict"], named) == ("adequate", set())
+    elif spec.outside:
+        assert (said["verdict"], named) == ("unknown", set())
+    else:
+        rival = SAME_COLUMNS.get(spec.effects[0])
+        assert (said["verdict"], named) == ("ambiguous" if rival else "named", set(spec.effects))
+        assert not rival or [rival] in said["ambiguous_with"]
+        if name not in WRONG_SIZE_YET:
+            _has_the_true_size(said["effects"][0], simulate(spec).parameters()[spec.effects[0]])
+
+
+def _has_the_true_size(effect, truth):
+    for parameter in COMPARED.get(effect["id"], ()):
+        if parameter in truth and truth[parameter]["identifiable"]:
+            stated, true = effect["parameters"][parameter]["value"], truth[parameter]["value"]
+            if parameter.endswith("_deg"):
+                assert abs((stated - true + 180) % 360 - 180) < 2.0, parameter  # the teeth stand 2.2 deg apart
+            else:
+                assert stated == pytest.approx(true, rel=SIZE), parameter
+
+
+def test_every_effect_is_among_them_and_few_are_excused():
+    from hdopt.bench.cases import CATALOGUE
+
+    asserted = [name for name in SPECS if name not in WRONG_YET]
+    assert len(asserted) >= 40
+    assert {effect for name in asserted for effect in SPECS[name].effects} == set(CATALOGUE)

@@ -1,0 +1,120 @@
+"""The search under tolerances, how sure its choice is, and the study file it leaves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hdopt.kinematics import peak_to_peak_arcmin
+from hdopt.optimize.objectives import ROBUST
+from hdopt.optimize.robustness import constants_of, perturb
+from hdopt.report import Figure, Table
+from hdopt.study import load_study
+from hdopt.workflow.search import search
+from hdopt.workflow.search_setup import sample_rows, tolerance_problem
+from hdopt.workflow.search_verification import verify
+from hdopt.workflow.steps import Context, find_step
+from hdopt.workflow.write_design import chosen_study_toml
+
+SMALL = (
+    'search.profiles=["ellipse", "two_disk"]',
+    'search.structures=["automatic"]',
+    "search.samples=512",
+    "search.front_points=3",
+    "search.robust=false",
+)
+
+
+@pytest.fixture(scope="module")
+def study():
+    return load_study("csf-25-80-design-trade", SMALL)
+
+
+@pytest.fixture(scope="module")
+def result(study):
+    return search(study, fronts=False)
+
+
+def test_slopes_of_the_quantile_agree_with_wide_differences(result):
+    problem = result.setup.problem(result.chosen.combination)
+    u = problem.place(result.best.variables) * 0.6 + 0.2
+    found = problem.evaluate(u)
+    for i in range(problem.n):
+        step = np.zeros(problem.n)
+        step[i] = 4e-3
+        wide = [problem.evaluate(u + sign * step, slopes=False).objective for sign in (-1, 1)]
+        # Drives change ranks within the step, and the kernel's real phases move under it: 2 % of the largest slope.
+        error = abs(found.piece_slopes[0, i] - (wide[1] - wide[0]) / 8e-3)
+        assert error < 0.02 * np.abs(found.piece_slopes).max()
+
+
+def test_the_quantile_is_that_of_the_sample(study, result):
+    rows = result.setup.trade.sample
+    assert rows.shape == (512, 12)
+    assert np.array_equal(rows, sample_rows(study, 512, 1))
+    response, _ = tolerance_problem(study)
+    drive = result.setup.space.design(result.chosen.combination, result.chosen.values).drive
+    values = np.sort(peak_to_peak_arcmin(drive, type(response.held).from_matrix(rows)))
+    # Harrell and Davis' weights spread over the few largest of 512 drives.
+    assert values[-8] < result.best.quantities[ROBUST] < values[-1]
+
+
+def test_fresh_drives_confirm_the_quantile(study, result):
+    checked = verify(study, result, seed=1)
+    assert checked.low < checked.quantile_arcmin < checked.high
+    # 512 drives know the 99.73 % quantile to a few per cent: 1.4 of them lie beyond it.
+    assert checked.searched_arcmin == pytest.approx(checked.quantile_arcmin, rel=0.05)
+    assert checked.exact_arcmin == pytest.approx(checked.kernel_arcmin, abs=1e-3)
+
+
+def test_every_constant_has_a_source_and_is_perturbed(result):
+    constants = constants_of(result.setup)
+    assert len({constant.name for constant in constants}) == len(constants) > 12
+    assert all(c.source.startswith(("cited", "assumed", "the study")) for c in constants)
+    made = perturb(result.setup, result, (0.8,), 1)
+    assert [item.constant for item in made] == [constant.name for constant in constants]
+    regrets = [item.regret for item in made if item.regret is not None]
+    assert min(regrets) > -1e-3  # no design beats the one searched anew
+
+
+def test_more_of_what_limits_never_helps(result):
+    """Half a trailing-flank room more costs error; an easier limit cannot."""
+    made = {item.constant: item for item in perturb(result.setup, result, (1.2,), 1)}
+    assert made["Limit: Room of the trailing flank"].objective > result.chosen.objective
+    assert made["Endurance limit"].objective <= result.chosen.objective * (1 + 1e-4)
+
+
+def test_the_chosen_study_file_is_the_chosen_design(study, result, tmp_path):
+    file = tmp_path / "chosen.toml"
+    file.write_text(chosen_study_toml(study, result), encoding="utf-8")
+    chosen = load_study(file)
+    assert chosen.drive.wave_generator.profile.name == result.best.profile
+    assert chosen.drive.wave_generator.structure.value == result.best.structure
+    # The file keeps a nanometre and 1e-6 deg.
+    error = float(peak_to_peak_arcmin(chosen.drive, chosen.errors))
+    assert error == pytest.approx(result.best.quantities["peak_to_peak_arcmin"], abs=1e-5)
+    assert chosen.sections["tolerances"] == study.sections["tolerances"]
+
+
+@pytest.mark.slow
+def test_the_step_names_the_wave_generator_and_shows_it(study, tmp_path):
+    done = find_step("search")(study, Context(tmp_path, 1))
+    assert done.answer
+    assert done.says[0].startswith("chosen wave generator: ")
+    assert load_study(done.files[0]).drive.wave_generator.width < 9.0
+    items = {item.key: item for section in done.sections for item in section.items if hasattr(item, "key")}
+    assert isinstance(items["trade-chosen-against-baseline"], Table)
+    assert {"trade-front-nominal-figure", "trade-front-robust-figure"} & set(items)
+    for key in ("trade-designs-parallel", "trade-map-figure", "trade-profiles-curvature", "trade-confidence-figure"):
+        assert isinstance(items[key], Figure)
+
+
+def test_no_design_is_an_answer_not_an_error(tmp_path):
+    study = load_study(
+        "csf-25-80-design-trade",
+        (*SMALL, 'search.objective="width_mm"', "search.limits={peak_to_peak_arcmin={max=0.05}}"),
+    )
+    done = find_step("search")(study, Context(tmp_path, 1))
+    assert not done.answer
+    assert "No design keeps all limits" in done.says[0]
+    assert not done.files

@@ -1,0 +1,30 @@
+"""What `import hdopt` offers: every name is there, a version, and calls that take records, names and studies alike."""
+
+import importlib.metadata
+
+import pytest
+
+import hdopt
+
+
+def test_every_public_name_is_there():
+    missing = [name for name in hdopt.__all__ if getattr(hdopt, name, None) is None]
+    assert not missing
+    assert hdopt.__version__ == importlib.metadata.version("hdopt")
+
+
+def test_kinematic_error_of_records_of_a_name_and_of_a_study_are_one():
+    study = hdopt.load_study("csf-25-80")
+    by_study = hdopt.kinematic_error(study)
+    by_name = hdopt.kinematic_error("csf-25-80")
+    by_records = hdopt.kinematic_error(study.drive, study.errors)
+    assert by_study.to_dict() == by_name.to_dict()
+    assert by_records.to_dict() | {"study": "csf-25-80"} == by_study.to_dict()
+    assert hdopt.profile("csf-25-80") == hdopt.profile(study)
+    without = hdopt.kinematic_error(study.drive)
+    assert without.peak_to_peak_arcmin < by_study.peak_to_peak_arcmin
+
+
+def test_errors_beside_a_study_are_refused():
+    with pytest.raises(hdopt.HdoptError, match=r"change them with study\.with_"):
+        hdopt.kinematic_error("csf-25-80", hdopt.DriveErrors())

@@ -1,0 +1,139 @@
+"""Design searches with effects: value and slopes of the objective, what follows the design, what is refused."""
+
+import math
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from effect_examples import toml
+
+from hdopt.drive.geometry import Structure
+from hdopt.errors import HdoptError
+from hdopt.optimize.design_space import Combination
+from hdopt.optimize.objectives import NOMINAL, find_quantity
+from hdopt.simulation import ExtendedModel
+from hdopt.simulation.extremes import peak_to_peak_arcmin
+from hdopt.study import load_study
+from hdopt.workflow.run import run_study
+from hdopt.workflow.search import search
+from hdopt.workflow.search_setup import setup_of
+from hdopt.workflow.write_design import chosen_study_toml
+
+EFFECTS = {
+    "circular_spline_lobing": {"lobes": 6, "radial_amplitude_um": 8.0, "phase_deg": 10.0},
+    "cs_tooth_harmonics": {"amplitude_3_um": 0.5, "phase_3_deg": -60.0},
+    "lost_motion": {"lost_motion_arcmin": 0.3, "crossing_arcmin": 0.3},
+    "encoder_output_eccentricity": {"amplitude_arcmin": 0.1, "phase_deg": 20.0},
+}
+NARROW = """
+[search]
+profiles = ["ellipse"]
+structures = ["integral", "automatic"]
+second_objective = "flank_pressure_mpa"
+[search.variables]
+pressure_angle_deg = { lower = 8.0, upper = 16.0 }
+width_mm = { lower = 7.0, upper = 12.0 }
+[search.limits]
+flank_pressure_mpa = { max_of_baseline = 1.0 }
+bearing_life_h = { min_of_baseline = 1.0 }
+"""
+
+
+@pytest.fixture
+def study_with(tmp_path):
+    def load(effects, operation=None, text=NARROW, overrides=()):
+        (tmp_path / "extended.toml").write_text(toml(effects, operation or {}) + text)
+        return load_study(tmp_path / "extended.toml", overrides)
+
+    return load
+
+
+ELLIPSE = Combination("ellipse", Structure.INTEGRAL)
+
+
+def test_the_objective_is_the_extended_models_peak_to_peak(study_with):
+    """Within 1e-3 arcmin of the reference, for a design with another pressure angle, whose lobes make another arc."""
+    setup = setup_of(study_with(EFFECTS, {"motion": "both"}), seed=1)
+    design = setup.space.design(ELLIPSE, {"pressure_angle_deg": 9.0, "width_mm": 8.0})
+    added = setup.trade.added
+    assert "encoder_output_eccentricity" not in {effect.id for effect in added.effects}
+    model = ExtendedModel(
+        design.drive, setup.trade.errors, added.at(design.drive), added.operation, geometry="closed form"
+    )
+    assert find_quantity(NOMINAL).value(setup.trade, design) == pytest.approx(peak_to_peak_arcmin(model), abs=1e-3)
+    before, after = (next(e for e in effects if e.id == "circular_spline_lobing")
+                     for effects in (added.effects, added.at(design.drive)))  # fmt: skip
+    ratio = math.tan(math.radians(9)) / math.tan(math.radians(12))
+    assert after.coefficients == pytest.approx(tuple(ratio * c for c in before.coefficients))
+
+
+def test_the_largest_piece_is_the_value_and_its_slope_the_values(study_with):
+    """Slopes against differences of the value over 1e-3 of each range: 5 % for what curves and for the walk's end."""
+    setup = setup_of(study_with(EFFECTS, {"motion": "both"}), seed=1)
+    problem = setup.problem(ELLIPSE)
+    values = {"pressure_angle_deg": 11.0, "width_mm": 9.5}
+    pieces, slopes = find_quantity(NOMINAL).pieces(problem.point(values))
+    quantity = find_quantity(NOMINAL)
+
+    def at(changed):
+        return quantity.value(setup.trade, setup.space.design(ELLIPSE, {**values, **changed}))
+
+    assert pieces.max() == pytest.approx(at({}), abs=1e-4)
+    assert slopes.shape == (len(pieces), 2)
+    for i, (name, step) in enumerate((("pressure_angle_deg", 0.04), ("width_mm", 0.025))):
+        difference = (at({name: values[name] + step}) - at({name: values[name] - step})) / (2 * step)
+        assert slopes[pieces.argmax(), i] == pytest.approx(difference, rel=0.05, abs=2e-3)
+
+
+@pytest.mark.slow
+def test_a_search_finds_a_better_design_with_effects(study_with):
+    result = search(study_with(EFFECTS, {"motion": "both"}), fronts=False)
+    assert result.feasible
+    assert result.best.quantities[NOMINAL] < result.baseline.quantities[NOMINAL] - 0.01
+    bare = search(study_with({}), fronts=False)
+    assert result.best.quantities[NOMINAL] > bare.best.quantities[NOMINAL] + 0.3
+    said = " ".join(result.to_dict()["notes"])
+    assert "computed without encoder_output_eccentricity" in said
+    assert "carried over to every design" in said
+    chosen = tomllib.loads(chosen_study_toml(result.setup and study_with(EFFECTS, {"motion": "both"}), result))
+    assert chosen["effects"]["circular_spline_lobing"]["radial_amplitude_um"] == 8.0
+    assert chosen["operation"]["motion"] == "both"
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("search.robust=true", "a search under the tolerances does not compute effects"),
+        ("search.objective=peak_to_peak_quantile_arcmin", "set search.robust=false with a nominal search.objective"),
+        ("search.size=fixed_outside_diameter", "changes the ratio and with it the orders of the effects"),
+    ],
+)
+def test_what_a_search_cannot_use_is_refused(study_with, override, message):
+    with pytest.raises(HdoptError, match=message):
+        setup_of(study_with(EFFECTS, overrides=[override]), seed=1)
+    setup = setup_of(study_with(EFFECTS, {"include": "none"}, overrides=[override]), seed=1)
+    assert setup.trade.added is None
+
+
+def test_without_effects_nothing_changes(study_with):
+    setup = setup_of(study_with({}), seed=1)
+    assert setup.trade.added is None
+    assert replace(setup.trade).sample is None
+    assert np.isfinite(find_quantity(NOMINAL).value(setup.trade, setup.baseline))
+
+
+@pytest.mark.slow
+def test_a_run_reports_a_nominal_search_with_effects(study_with, tmp_path):
+    """Also of a study with tolerances, whose quantile is verified though the search did not look at it."""
+    text = NARROW.replace('["integral", "automatic"]', '["integral"]').replace(
+        'second_objective = "flank_pressure_mpa"\n', "front_points = 2\n"
+    )
+    study = study_with(EFFECTS, {}, text + '[study]\nsteps = ["search"]\n')
+    result = run_study(study, tmp_path / "out")
+    page = result.report.read_text()
+    assert "Computed with cs_tooth_harmonics" in page
+    checked = result.steps["search"].results["verification"]
+    assert checked["exact_arcmin"] == pytest.approx(checked["kernel_arcmin"], abs=3e-3)
+    assert checked["searched_arcmin"] is None
+    assert checked["quantile_arcmin"] > 0

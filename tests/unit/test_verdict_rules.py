@@ -1,0 +1,149 @@
+"""Each rule of the verdict: facts that fire it, and the same facts with one thing changed that do not."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hdopt.diagnosis.checks.confounding import Confounding
+from hdopt.diagnosis.inference.cross_validation import HeldOut
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.diagnosis.verdict.draw import base_notes, prior_notes
+from hdopt.diagnosis.verdict.facts import Facts, resolution
+from hdopt.diagnosis.verdict.named_effect import NamedEffect
+from hdopt.diagnosis.verdict.rivals import imitating_sets, placebo_as_good
+from hdopt.diagnosis.verdict.rules import RULES, rule_for
+from hdopt.effects.estimate import Parameter
+
+CLEAN = Facts(
+    settings=DEFAULT.verdict,
+    turns_suffice=True,
+    explained=False,
+    false_alarm_p=0.6,
+    own_gain=0.0,
+    high=False,
+    outside_share=0.0,
+    high_outside_share=0.0,
+    momentary=False,
+    unsteady=False,
+    generic_wins=False,
+    generic_t=0.3,
+    too_little=False,
+    rivals=(),
+)
+NAMED = replace(CLEAN, explained=True, false_alarm_p=0.002, own_gain=1.0)
+
+FIRED = [
+    ("happened once", replace(NAMED, momentary=True), {"momentary": False}),
+    ("happened once", replace(NAMED, momentary=True), {"turns_suffice": False}),
+    ("no physics explains", replace(NAMED, outside_share=0.5), {"outside_share": 0.1}),
+    ("no physics explains", replace(NAMED, outside_share=0.5), {"false_alarm_p": 0.2}),
+    ("no physics explains", replace(CLEAN, high=True, high_outside_share=0.5), {"high_outside_share": 0.1}),
+    ("changes in time", replace(CLEAN, unsteady=True), {"unsteady": False}),
+    ("generic basis wins", replace(NAMED, generic_wins=True, generic_t=4.5), {"generic_wins": False}),
+    ("generic basis wins", replace(CLEAN, generic_wins=True, generic_t=6.5), {"generic_t": 5.0}),
+    ("too much for noise", replace(CLEAN, noise_over_neighbours=9.7), {"noise_over_neighbours": 2.9}),
+    ("too much for noise", replace(CLEAN, noise_over_neighbours=9.7), {"turns_suffice": False}),
+    ("more than noise is left", replace(NAMED, heldout_over_floor=2.0, generic_t=8.0), {"heldout_over_floor": 1.2}),
+    ("more than noise is left", replace(NAMED, heldout_over_floor=2.0, generic_t=8.0), {"generic_t": 1.0}),
+    ("others are as good", replace(NAMED, rivals=(("lost_motion",),)), {"rivals": ()}),
+    ("named", NAMED, {"own_gain": 0.01}),
+    ("named", NAMED, {"false_alarm_p": 0.02}),
+    ("named", NAMED, {"turns_suffice": False}),
+    ("named", replace(CLEAN, high=True), {"high": False}),
+    ("named", NAMED, {"scale_as_good": True}),
+    ("named", NAMED, {"above_resolution": False}),
+    ("too little", replace(CLEAN, too_little=True), {"too_little": False}),
+    ("adequate", CLEAN, {"too_little": True}),
+]
+
+
+@pytest.mark.parametrize(("name", "facts", "changed"), FIRED)
+def test_rule_fires_on_its_facts_alone(name, facts, changed):
+    assert rule_for(facts).name == name
+    assert rule_for(replace(facts, **changed)).name != name
+
+
+def test_every_rule_is_tried():
+    assert [rule.name for rule in RULES] == list(dict.fromkeys(name for name, _, _ in FIRED))
+
+
+def test_what_happened_once_is_asked_before_what_can_be_named():
+    """An event beside an effect: the event comes first, nothing is named."""
+    both = replace(NAMED, momentary=True, rivals=(("lost_motion",),))
+    assert rule_for(both).name == "happened once"
+
+
+def pair(**changes):
+    return replace(Confounding("lost_motion", "hysteresis", 0.0, 1.0, 0.0, "turn further"), **changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sets"),
+    [
+        ({}, (("hysteresis", "thermal_drift"),)),
+        ({"imitates": 0.9}, ()),
+        ({"evidence_apart": 500.0}, ()),
+        ({"other": "thermal_drift"}, ()),
+    ],
+)
+def test_what_can_be_imitated_wholly_is_a_tie(changes, sets):
+    """Would catch a name at full confidence beside `confounded` 100 % and log evidence apart 0."""
+    assert imitating_sets([pair(**changes)], ["lost_motion", "thermal_drift"], DEFAULT.verdict) == sets
+
+
+def held(turns, variance):
+    return HeldOut(np.full(turns, variance), np.full(turns, variance), np.ones(turns))
+
+
+@pytest.mark.parametrize(
+    ("placebo", "apart", "said"),
+    [(1.0, 0.0, (("hysteresis",),)), (1.0, 19.0, (("hysteresis",),)), (1.0, 21.0, ()), (1.5, 0.0, ())],
+)
+def test_a_placebo_that_predicts_as_well_is_another_explanation(placebo, apart, said):
+    """Where single rows part the two by more than 20 in log evidence, whole turns that do not are no tie."""
+    pair = SimpleNamespace(effect="lost_motion", other="hysteresis", evidence_apart=apart)
+    settings = DEFAULT
+    evidence = SimpleNamespace(
+        settings=settings,
+        base_held_out=held(20, 3.0),
+        extended_held_out=held(20, 1.0),
+        placebo_held_out=held(20, placebo),
+        placebo="hysteresis",
+        selection=SimpleNamespace(best=SimpleNamespace(effects=("lost_motion",))),
+    )
+    spread = np.linspace(0.9, 1.1, 20)
+    evidence.placebo_held_out = HeldOut(placebo * spread, placebo * spread, np.ones(20))
+    assert placebo_as_good(evidence, [pair]) == said
+
+
+def test_resolution_is_that_of_the_model_or_of_the_sensors():
+    base = SimpleNamespace(base_value=np.array([-1.0, 1.0]))
+    known = {"settings": DEFAULT, "selection": SimpleNamespace(base=base)}
+    quiet = SimpleNamespace(neighbours_arcmin=1e-4, sensor_arcmin=0.0, **known)
+    coarse = SimpleNamespace(neighbours_arcmin=0.01, sensor_arcmin=0.5, **known)
+    assert resolution(quiet) == pytest.approx(DEFAULT.verdict.model_resolution)
+    assert resolution(coarse) == pytest.approx(0.5 * DEFAULT.verdict.sensor_resolution)
+
+
+@pytest.mark.parametrize(("delay", "warned"), [(2.5, True), (0.01, False)])
+def test_a_parameter_outside_its_prior_is_no_plain_name(delay, warned):
+    """Time in ms read as s gives a delay of seconds."""
+    parameters = {"delay_s": Parameter(delay, 0.99 * delay, 1.01 * delay, "s")}
+    where = {"domain": "speed", "orders_per_input_turn": [], "direction": "both", "share_of_residual": 1.0}
+    found = NamedEffect("channel_delay", 0.97, where | {"rms_arcmin": 1.0}, parameters, "Says.")
+    notes = prior_notes([found])
+    assert bool(notes) is warned
+    if warned:
+        assert "delay_s 2.5 s lies outside of what drives and benches have" in notes[0]
+
+
+def test_a_drive_far_outside_its_tolerances_is_warned_of():
+    """An axis 0.06 mm off in a drive whose kind has 0.03 mm at most."""
+    problem = SimpleNamespace(base=object(), prior=np.full(12, 0.03), settings=DEFAULT)
+    errors = np.zeros(12)
+    assert base_notes(SimpleNamespace(problem=problem, errors=errors)) == ()
+    errors[0] = 0.06
+    (note,) = base_notes(SimpleNamespace(problem=problem, errors=errors))
+    assert "axis eccentricity x 0.06 mm" in note
