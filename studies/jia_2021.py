@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from hdopt.deviations import DriveErrors
-from hdopt.drive import Drive, Structure
-from hdopt.profiles import Ellipse, Resal, TwoDisk, WaveGeneratorProfile
+from hdopt.drive.errors import DriveErrors
+from hdopt.drive.geometry import Drive, Structure
+from hdopt.drive.profiles import Ellipse, Resal, TwoDisk, WaveGeneratorProfile
 
 SOURCE = "Jia 2021, MMT 155, 104122"
 SAMPLING_DEG = 10.0

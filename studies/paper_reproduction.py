@@ -8,13 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from hdopt.contact import contact_angle, homogenization_coefficient, meshing_teeth
-from hdopt.deviations import DriveErrors
-from hdopt.drive import Drive
+from hdopt.drive.errors import DriveErrors
+from hdopt.drive.geometry import Drive
 from hdopt.kinematics.extremes import extremes_arcmin, walked_peak_to_peak_arcmin
+from hdopt.mechanics.contact import contact_angle, homogenization_coefficient, meshing_teeth
 from hdopt.report import Section, Table, Text
 from hdopt.report.sections.published import published_section
-from hdopt.steps import Context, StepResult
 from hdopt.studies.jia_2021 import (
     CASES,
     NO_TOOTH_ERROR_ARCMIN,
@@ -24,6 +23,7 @@ from hdopt.studies.jia_2021 import (
     TURNS,
 )
 from hdopt.study import Study
+from hdopt.workflow.steps import Context, StepResult
 
 
 def sampled(drive: Drive, errors: DriveErrors, sampling_deg: float = SAMPLING_DEG) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,8 +10,8 @@ import numpy as np
 
 from hdopt.errors import HdoptError
 from hdopt.report import Section, Table, Text
-from hdopt.steps import Context, StepResult
 from hdopt.study import Study
+from hdopt.workflow.steps import Context, StepResult
 
 REVERSING = "planetary-7to1-reversing.csv"
 REVERSING_COLUMNS = "time=time_s:s,input=odrive_pos_rad:rad,output=output_pos_rad:rad"
@@ -81,17 +80,10 @@ def real_residuals(study: Study, context: Context) -> StepResult:
 
 def answered_cases(drive, size, folder: Path, seed: int) -> Iterator[dict[str, object]]:
     """Every case with what was hidden and what was said. `wrong` is a name (or `unknown`) for what is not there."""
-    if Path("tests/blind").is_dir() and str(Path.cwd()) not in sys.path:
-        sys.path.insert(0, str(Path.cwd()))
-    try:
-        from tests.blind.cases import CATALOGUE
-        from tests.blind.real_residuals import ON_REAL_MOTION, on_real_motion, on_simulated_drive
-    except ImportError as error:
-        raise HdoptError(
-            "real-residuals needs the simulated bench in tests/blind; run it in the folder of a checkout of hdopt"
-        ) from error
+    from hdopt.bench.cases import CATALOGUE
+    from hdopt.bench.real_residuals import ON_REAL_MOTION, on_real_motion, on_simulated_drive
     from hdopt.diagnosis import diagnose
-    from hdopt.recording import recording_from_table
+    from hdopt.recordings.read import recording_from_table
 
     rng = np.random.default_rng(size.seed)
     real = actuator_residual(folder)
@@ -136,13 +128,13 @@ def judged(noise: str, hidden: str, severity: float, diagnosis) -> dict[str, obj
 
 def actuator_residual(folder: Path):
     """What the diagnosis leaves of the reversing actuator's recording, with its motion."""
+    from hdopt.bench.real_residuals import RealResidual
     from hdopt.diagnosis import diagnose
-    from hdopt.recording import read_recording
-    from tests.blind.real_residuals import RealResidual
+    from hdopt.recordings.read import read_recording
 
     recording = read_recording(folder / REVERSING, REVERSING_RATIO, REVERSING_COLUMNS)
     fit = diagnose(recording, None, REVERSING_RATIO).evidence.selection.best.fit
-    samples = fit.problem.samples
+    samples = fit.problem.rows
     return RealResidual(samples.time, samples.theta, fit.residual, REVERSING_RATIO)
 
 

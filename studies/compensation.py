@@ -1,0 +1,141 @@
+"""How much a compensation leaves on the concealed bench: `python -m hdopt.studies.compensation --cases 60 --seed 1`.
+
+Each case is a drive of the bench (which shares no code with hdopt), half of them with one hidden effect. The
+compensation is made from its recordings and tried on a fresh run of the last one: same motion, new noise. An oracle
+takes away the true error, torque, time and temperature included, so only noise and the encoders' steps are left of it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hdopt.drive.geometry import ARCMIN, Drive
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SEVERITIES = (0.25, 0.5, 1.0)
+FIFTH = 0.2
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case: peak-to-peak (arcmin) of the fresh run as it is, with the compensation, and with the oracle."""
+
+    seed: int
+    effect: str
+    method: str
+    worth: bool
+    before: float
+    after: float
+    oracle: float
+    predicted: float
+
+
+def run_case(seed: int, effect: str, severity: float, drive: Drive) -> Case | None:
+    """The case of `seed` with `effect` ("" for none) at `severity` (rms in units of the base's), on `drive`.
+
+    None where the bench cannot make the effect so large in this draw.
+    """
+    from hdopt.bench import cases
+    from hdopt.bench.instrument import record
+    from hdopt.bench.signal_chain import read_angles, read_error
+    from hdopt.recordings.read import recording_from_table
+    from hdopt.recordings.rows import gather, neighbours_for
+    from hdopt.workflow.compensate import compensate
+
+    spec: Any = cases.Spec("single" if effect else "nothing", seed, (effect,) if effect else (), severity)
+    drawn: Any = cases._simulate(spec, np.random.default_rng([seed, 7]))
+    if drawn is None:
+        return None
+    seen = [recording_from_table(table, drive.geometry.ratio, name=f"run {k}") for k, table in enumerate(drawn.tables)]
+    made = compensate(seen, drive, seed=seed)
+    setup, last = drawn.setups[-1], len(drawn.plans) - 1
+    rng = np.random.default_rng([seed, 8])
+    angles = read_angles(setup, drawn.hidden)
+    torque = drawn.torque_gain * setup.run.torque
+    table, _ = record(drawn.instrument, last, drawn.plans[-1], setup.run, angles, torque, rng)
+    fresh = recording_from_table(table, drive.geometry.ratio)
+    truth = read_error(setup, drawn.hidden) / ARCMIN
+    if len(truth) != len(fresh):
+        truth = truth[np.searchsorted(table["time_s"].to_numpy(), fresh.time)]
+    neighbours = neighbours_for(seen)
+    rows = gather([fresh], neighbours)
+    left = gather([replace(fresh, error_arcmin=fresh.error_arcmin - truth)], neighbours)
+    direction = rows.direction if rows.reverses else 0.0
+    after = rows.error - made.found.at(rows.theta, rows.theta / rows.ratio, direction)
+    return Case(
+        seed,
+        effect,
+        made.method,
+        made.worth,
+        float(np.ptp(rows.error)),
+        float(np.ptp(after)),
+        float(np.ptp(left.error)),
+        made.predicted,
+    )
+
+
+def summary(frame: pd.DataFrame) -> list[str]:
+    """The figures asked for, of a `frame` with one row a case."""
+    written = frame[frame.worth]
+    within = written.after / written.oracle
+    off = (written.predicted / written.after - 1).abs()
+    could = frame[frame.oracle < (1 - FIFTH) * frame.before]
+    return [
+        f"{len(frame)} cases, {len(written)} written",
+        f"median share of peak-to-peak left: {(written.after / written.before).median():.3f}, oracle "
+        f"{(written.oracle / written.before).median():.3f}, ratio {within.median():.3f}",
+        f"predicted within 10 % of found: {(off <= 0.1).mean():.1%}, median off by {off.median():.1%}",
+        f"worse than none: {(written.after > written.before).sum()} of {len(written)}",
+        f"refused where the oracle removes a fifth: {(~could.worth).sum()} of {len(could)}",
+    ]
+
+
+def plan(seed: int, count: int) -> list[tuple[int, str, float]]:
+    """`count` cases from `seed`: every other one clean, the others with each effect of the catalogue in turn."""
+    from hdopt.bench.cases import CATALOGUE
+
+    names = sorted(CATALOGUE)
+    return [
+        (1000 * seed + n, "" if n % 2 == 0 else names[n // 2 % len(names)], SEVERITIES[n // 2 % 3] if n % 2 else 0.0)
+        for n in range(count)
+    ]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the cases that `arguments` name and write a line each, then the summary; finished lines are kept."""
+    import pandas as pd
+
+    from hdopt.study import load_study
+
+    parser = argparse.ArgumentParser(prog="python -m hdopt.studies.compensation", description=__doc__)
+    parser.add_argument("--cases", type=int, default=60)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--out", default="compensation.csv", help="One line a case; cases that stand there are kept.")
+    options = parser.parse_args(arguments)
+    drive = load_study(drive="csf-25-80").drive
+    try:
+        kept = pd.read_csv(options.out, keep_default_na=False)
+    except FileNotFoundError:
+        kept = pd.DataFrame()
+    rows = kept.to_dict("records")
+    done = {int(row["seed"]) for row in rows}
+    for seed, effect, severity in plan(options.seed, options.cases):
+        if seed in done:
+            continue
+        case = run_case(seed, effect, severity, drive)
+        if case is not None:
+            rows.append({str(key): value for key, value in asdict(case).items()})
+            pd.DataFrame(rows).to_csv(options.out, index=False)
+    for line in summary(pd.DataFrame(rows)):
+        print(line)
+
+
+if __name__ == "__main__":
+    main()
