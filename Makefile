@@ -5,29 +5,45 @@ TEST_VENV := build/test-environment
 OUT ?= out
 SHIPPED := csf-25-80 paper-reproduction csf-25-80-design-trade
 
-.PHONY: study test check lint lock benchmark clean
+.PHONY: study test check lint types lock benchmark fuzz clean
 
 study: $(VENV)/ready
 	for study in $(SHIPPED); do $(VENV)/bin/hdopt run $$study -o $(OUT)/$$study || exit 1; done
 
 test:
 	rm -rf $(TEST_VENV)
-	$(MAKE) $(TEST_VENV)/ready VENV=$(TEST_VENV)
+	$(MAKE) $(TEST_VENV)/ready-to-test VENV=$(TEST_VENV)
 	$(TEST_VENV)/bin/ruff check .
+	$(MAKE) types VENV=$(TEST_VENV)
 	$(TEST_VENV)/bin/python -m pytest -n 2 --benchmark-disable $(PYTEST_ARGS)
 
-check: $(VENV)/ready lint
+check: lint types
 	$(VENV)/bin/python -m pytest -q -m "not slow and not browser" --benchmark-disable -x -n 2 $(PYTEST_ARGS)
 
-lint: $(VENV)/ready
+lint: $(VENV)/ready-to-test
 	$(VENV)/bin/ruff check .
 
-benchmark: $(VENV)/ready
+# The packages as they are installed: hdopt.geometry and hdopt.studies lie in folders of their own.
+types: $(VENV)/ready-to-test
+	rm -rf build/types && mkdir -p build/types/hdopt
+	ln -s $(CURDIR)/hdopt/* $(CURDIR)/geometry $(CURDIR)/studies build/types/hdopt/
+	cd build/types && $(abspath $(VENV))/bin/mypy --config-file $(CURDIR)/pyproject.toml --cache-dir $(CURDIR)/.mypy_cache -p hdopt
+
+fuzz: $(VENV)/ready-to-test
+	$(VENV)/bin/python -m tests.fuzz.soak --out build/fuzz $(FUZZ_ARGS)
+
+# Faults put in one at a time: which do the tests notice? Hours; continues where it stopped. MUTANTS="mechanics --sample 40"
+mutants: $(VENV)/ready-to-test
+	$(VENV)/bin/python -m tests.mutants $(MUTANTS)
+
+benchmark: $(VENV)/ready-to-test
 	$(VENV)/bin/python -m pytest tests/benchmarks --benchmark-only
 
+# What `hdopt` needs to run, and what its tests need besides, at the same versions.
+LOCK := uv pip compile --universal --python-version 3.11 --no-header --no-annotate pyproject.toml
 lock:
-	uv pip compile --universal --python-version 3.11 --all-extras pyproject.toml --upgrade \
-		--no-header --no-annotate -o requirements.lock
+	$(LOCK) --upgrade -o requirements.lock
+	$(LOCK) --upgrade --all-extras -c requirements.lock -o requirements-test.lock
 
 clean:
 	rm -rf $(VENV) build dist $(OUT) *.egg-info
@@ -36,4 +52,8 @@ $(VENV)/ready: requirements.lock pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
 	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
+	touch $@
+
+$(VENV)/ready-to-test: $(VENV)/ready requirements-test.lock
+	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-test.lock
 	touch $@
