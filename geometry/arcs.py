@@ -9,13 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 from hdopt.geometry.contour import Circle, Contour, ParallelCurve
 from hdopt.geometry.features import Bore, DBore, KeywayBore, Slot
-
-Array = NDArray[np.float64]
 
 ARC_TOLERANCE = 2e-5
 """Largest distance between a curve and its arcs, mm."""

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.contour import Circle, Contour, ParallelCurve
@@ -17,7 +17,6 @@ from hdopt.geometry.contour import Circle, Contour, ParallelCurve
 if TYPE_CHECKING:
     from hdopt.geometry.job import Job
 
-Array = NDArray[np.float64]
 
 COLUMNS = ("angle_deg", "radius_mm", "normal_deg", "curvature_per_mm")
 ROUNDING = 1e-6

@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 from hdopt.files import read_text
 from hdopt.geometry.contour import Circle, Contour
-
-Array = NDArray[np.float64]
 
 POLAR, CARTESIAN = ("angle_deg", "radius_mm"), ("x_mm", "y_mm")
 FEWEST_POINTS = 16

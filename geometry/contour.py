@@ -12,12 +12,12 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hdopt.arrays import Array
 from hdopt.drive.profiles import MeasuredProfile, TwoDisk, WaveGeneratorProfile, curvature
 from hdopt.errors import HdoptError
 
-Array = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 """x_min, y_min, x_max, y_max in mm."""
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.geometry.arcs import enclosed_area, outline_of, outline_of_bore, outline_of_slot, sample
 from hdopt.geometry.check import PROFILE_TOLERANCE, CheckFailed
 from hdopt.geometry.contour import Circle, Contour
@@ -32,7 +32,7 @@ class Outline:
     """A closed outline of the drawing: its layer, what it is to follow, and its area in closed form."""
 
     layer: str
-    rows: NDArray[np.float64]
+    rows: Array
     area: float
     contour: Contour | None = None
 

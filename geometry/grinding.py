@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.contour import Contour, ParallelCurve
@@ -23,7 +23,6 @@ from hdopt.geometry.contour import Contour, ParallelCurve
 if TYPE_CHECKING:
     from hdopt.geometry.job import Job
 
-Array = NDArray[np.float64]
 
 CODE_TOLERANCE = 1e-4
 """Largest distance between the cam and what the wheel leaves, mm."""

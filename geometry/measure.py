@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.profiles import MeasuredProfile, TwoDisk
 from hdopt.errors import HdoptError
 from hdopt.geometry.step import StepFile
@@ -46,7 +46,7 @@ def measured_profile(file: StepFile, bearing_thickness: float, wrap: TwoDisk | N
     return _as_profile(np.concatenate([on_discs, free_points]), file)
 
 
-def _offset_wall(file: StepFile, name: str, distance: float) -> NDArray[np.float64]:
+def _offset_wall(file: StepFile, name: str, distance: float) -> Array:
     """The outer wall of a part at its lowest sampled height, moved outward along its normals; shape (n, 2), mm."""
     from scipy.interpolate import CubicSpline
 
@@ -64,7 +64,7 @@ def _offset_wall(file: StepFile, name: str, distance: float) -> NDArray[np.float
     return np.asarray(level + distance * normal)
 
 
-def _as_profile(points: NDArray[np.float64], file: StepFile) -> MeasuredProfile:
+def _as_profile(points: Array, file: StepFile) -> MeasuredProfile:
     angle = np.mod(np.arctan2(points[:, 0], points[:, 1]), 2 * math.pi)
     order = np.argsort(angle)
     return MeasuredProfile(angle[order], np.hypot(*points[order].T), source=str(file.path))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index
 from hdopt.geometry.check import CheckFailed
 
 if TYPE_CHECKING:
@@ -27,11 +27,11 @@ ANGLE = 0.05
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 _PACKAGE = "http://schemas.openxmlformats.org/package/2006/"
 
-Triangles = NDArray[np.float64]
+Triangles = Array
 """Shape (n, 3, 3): corners of n triangles, counter-clockwise seen from outside."""
 
 
-def triangles(solid: cq.Solid) -> tuple[Triangles, NDArray[np.float64], NDArray[np.int64]]:
+def triangles(solid: cq.Solid) -> tuple[Triangles, Array, Index]:
     """A solid's mesh as triangles, and as its vertices (n, 3) with the indices of each triangle's corners."""
     found, corners = solid.tessellate(CHORD, ANGLE)
     vertices = np.array([vertex.toTuple() for vertex in found])

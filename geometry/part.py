@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hdopt.arrays import Array, Mask
 from hdopt.geometry.areas import strip_of_disc
-from hdopt.geometry.contour import Array, Contour
+from hdopt.geometry.contour import Contour
 from hdopt.geometry.features import (
     BoltCircle,
     Bore,
@@ -54,7 +52,7 @@ class Prism:
     def bore_area(self, bore: Bore) -> float:
         return bore.area_with_disc(0.0)
 
-    def contains(self, points: Array, margin: float) -> NDArray[np.bool_]:
+    def contains(self, points: Array, margin: float) -> Mask:
         """Which points (n, 3) lie in a prism with unbroken edges, deeper than `margin` mm."""
         inside = (points[:, 2] > self.bottom + margin) & (points[:, 2] < self.top - margin)
         inside &= self.outline.deviation(points[:, :2]) < -margin

@@ -14,9 +14,9 @@ from functools import lru_cache
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hdopt.arrays import Array
+
 Point = tuple[float, float]
 
 WIDE, NARROW = 0.4, 0.2

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
-from hdopt.geometry.contour import Array, Circle, Contour, ParallelCurve
+from hdopt.geometry.contour import Circle, Contour, ParallelCurve
 
 if TYPE_CHECKING:
     import cadquery as cq

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from hdopt.arrays import Array
 
 if TYPE_CHECKING:
     import cadquery as cq
@@ -27,7 +28,7 @@ UPRIGHT = 1e-7
 class Wall:
     """Points (n, 3) on one closed ring of upright faces, mm."""
 
-    points: NDArray[np.float64]
+    points: Array
 
     @property
     def largest_gap(self) -> float:
@@ -44,7 +45,7 @@ def walls(solid: cq.Solid, shares: Sequence[float] = BETWEEN) -> list[Wall]:
     return sorted(rings, key=lambda wall: -np.ptp(wall.points[:, 1]))
 
 
-def face_points(solid: cq.Solid, per_side: int = 5) -> NDArray[np.float64]:
+def face_points(solid: cq.Solid, per_side: int = 5) -> Array:
     """Points (n, 3) spread over all faces of a solid, mm; those that fall into a face's holes are left out."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.BRepTopAdaptor import BRepTopAdaptor_FClass2d
@@ -110,7 +111,7 @@ def _rings(faces: list[TopoDS_Face]) -> list[list[TopoDS_Face]]:
     return list(rings.values())
 
 
-def _wall_points(face: TopoDS_Face, shares: Sequence[float]) -> NDArray[np.float64]:
+def _wall_points(face: TopoDS_Face, shares: Sequence[float]) -> Array:
     from OCP.BRepAdaptor import BRepAdaptor_Surface
 
     surface = BRepAdaptor_Surface(face)

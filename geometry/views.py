@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from hdopt.arrays import Array
 
 if TYPE_CHECKING:
     import cadquery as cq
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 SAGITTA = 0.01

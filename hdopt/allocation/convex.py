@@ -14,12 +14,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hdopt.allocation.cost import CostModel, GradeTable, Piecewise
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
-
-Array = NDArray[np.float64]
 
 FEASIBLE = 1e-9
 """Violation of the requirement, relative to its limit, that is left to rounding."""

@@ -12,11 +12,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from hdopt.allocation.convex import Infeasible, Item, Requirement, Solution, solve, total_cost
 from hdopt.allocation.cost import GradeTable
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 from hdopt.parallel.engine import Engine
 from hdopt.tolerance.intervals import IntervalEstimate
@@ -26,8 +26,6 @@ from hdopt.tolerance.sampling import ScrambledSobol
 from hdopt.tolerance.space import InputSpace
 from hdopt.tolerance.stack import Stack, StackRequest, run_stack
 from hdopt.tolerance.worst_case import find_worst_case
-
-Array = NDArray[np.float64]
 
 MODEL_POINTS = 2**17
 """Points of the sample, the same at every step, whose quantile the convex models follow."""

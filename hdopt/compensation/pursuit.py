@@ -9,11 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.compensation.surface import Harmonics
-
-Array = NDArray[np.float64]
 
 INPUT_ORDERS = 10
 OUTPUT_ORDERS = 10

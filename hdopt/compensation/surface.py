@@ -11,10 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from hdopt.arrays import Array, Index
 
 INPUT_CELLS, OUTPUT_CELLS = 192, 96
 """Grid of a surface: 1.9 deg of the input, 3.75 deg of the output; straight lines in between are off by half a per cent

@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 
 if TYPE_CHECKING:
     from hdopt.diagnosis.verdict.diagnosis import Diagnosis
     from hdopt.recordings.read import Recording
-
-Array = NDArray[np.float64]
 
 
 def predict(diagnosis: Diagnosis, recording: Recording, extended: bool = True) -> tuple[Array, Array]:

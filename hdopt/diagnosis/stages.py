@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hdopt.diagnosis.inference.base_fit import fit_base
 from hdopt.diagnosis.inference.catalogue import STRAIN_WAVE_ONLY
@@ -26,8 +25,6 @@ from hdopt.effects.sines import sine_columns
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import Recording
 from hdopt.recordings.rows import gather, neighbours_for
-
-Array = NDArray[np.float64]
 
 ORDER_DOMAINS = ("integer order", "output-synchronous order", "asynchronous order")
 """Domains of the generic basis in which the base itself lives."""

@@ -6,16 +6,14 @@ import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.diagnosis.inference.fit import Fit, FitProblem
 from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.orientation import AS_COUNTED, Orientation
 from hdopt.diagnosis.search.subset_search import Selection
 from hdopt.diagnosis.settings import DiagnosisSettings
 from hdopt.recordings.read import Recording
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Values = float | NDArray[np.float64]
+from hdopt.arrays import Array
+
+Values = float | Array
 """One value, or an array of them."""
 
 
@@ -65,7 +67,7 @@ class DriveErrors:
         """The common shape of all fields; () for one drive."""
         return np.broadcast_shapes(*(np.shape(value) for value in self.by_name().values()))
 
-    def to_matrix(self) -> NDArray[np.float64]:
+    def to_matrix(self) -> Array:
         """One row a drive, one column an error in the order of `ERROR_NAMES`: shape (n, 12)."""
         columns = np.broadcast_arrays(*(np.asarray(value, float) for value in self.by_name().values()))
         return np.stack([column.ravel() for column in columns], axis=1)

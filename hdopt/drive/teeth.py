@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.values import DriveError, require
-
-Array = NDArray[np.float64]
 
 KINDS = ("cumulative", "single")
 

@@ -16,9 +16,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hdopt.arrays import Array
 
 
 @dataclass(frozen=True)

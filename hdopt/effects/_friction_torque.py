@@ -15,8 +15,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import ARCMIN
-from hdopt.effects.conditions import Array, Conditions
+from hdopt.effects.conditions import Conditions
 
 
 def passes_of(conditions: Conditions) -> Iterator[slice]:

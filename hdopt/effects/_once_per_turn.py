@@ -7,8 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from hdopt.arrays import Array
 from hdopt.effects.base import Effect, terms_at
-from hdopt.effects.conditions import Array, Conditions
+from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Shaft
 from hdopt.effects.estimate import FitEstimate, Parameter
 from hdopt.effects.probe import Probe

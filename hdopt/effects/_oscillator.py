@@ -11,12 +11,10 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import ARCMIN
 from hdopt.effects.conditions import TURN, Conditions
-
-Array = NDArray[np.float64]
 
 PER_PERIOD = 40
 """Steps of the even clock in a period of the oscillator, at least: straight lines between 12 would take 2 % off a

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.effects.sines import sine_columns
-
-Array = NDArray[np.float64]
 
 
 def zone_harmonics(phase: Array, harmonics: Sequence[int]) -> Array:

@@ -7,9 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Category, Declared, Quantity, Sines, needed
@@ -19,7 +17,6 @@ from hdopt.effects.probe import Probe
 from hdopt.effects.requirements import requirement
 from hdopt.effects.term import Shape, Term
 
-Array = NDArray[np.float64]
 Keys = Mapping[str, object]
 """Keys of [effects.ID] with their values, those left out missing."""
 

@@ -14,10 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects._zone_harmonics import zone_harmonics
 from hdopt.effects.base import Effect, Keys
-from hdopt.effects.conditions import Array, Conditions
+from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import UM, Quantity, Sines, needed, number, smallest_set
 from hdopt.effects.estimate import FitEstimate, Parameter, counted
 from hdopt.effects.probe import Probe, best_terms, widest_that_pays

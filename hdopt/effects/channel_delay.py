@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import ARCMIN
 from hdopt.effects.base import Effect
-from hdopt.effects.conditions import Array, Conditions
+from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Quantity
 from hdopt.effects.estimate import Parameter
 from hdopt.effects.probe import Probe

@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects._zone_harmonics import zone_harmonics
 from hdopt.effects.base import Effect, Keys, terms_at
-from hdopt.effects.conditions import Array, Conditions
+from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import UM, Quantity, Sines, needed, polar
 from hdopt.effects.estimate import FitEstimate, Parameter, counted
 from hdopt.effects.probe import Probe, best_terms

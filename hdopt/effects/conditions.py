@@ -8,15 +8,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from hdopt.arrays import Array, Index, Mask
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
 
     from hdopt.effects.term import Term
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 TURN = 2 * math.pi
 """rad in a turn."""
@@ -39,7 +38,7 @@ class Conditions:
     output: Array
     direction: Array
     travel: Array
-    first: NDArray[np.bool_]
+    first: Mask
     record: Index
     piece: Index
     time: Array | None

@@ -14,10 +14,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects._zone_harmonics import strongest_few, zone_harmonics
 from hdopt.effects.base import Effect, Keys, terms_at
-from hdopt.effects.conditions import Array, Conditions
+from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import UM, Sines
 from hdopt.effects.estimate import FitEstimate, Parameter
 from hdopt.effects.probe import Probe, widest_that_pays

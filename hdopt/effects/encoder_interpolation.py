@@ -12,11 +12,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Mask
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects.base import Effect, Keys
-from hdopt.effects.conditions import Array, Conditions
+from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Category, Quantity, Shaft, Sines, needed, smallest_set
 from hdopt.effects.estimate import FitEstimate, Parameter, counted
 from hdopt.effects.probe import Probe, best_terms
@@ -48,7 +48,7 @@ SINES = Sines(
 )
 
 
-def beside_the_mesh(orders: Array, ratio: float) -> NDArray[np.bool_]:
+def beside_the_mesh(orders: Array, ratio: float) -> Mask:
     """Where one of `orders` (n,) is the tooth mesh of a drive of `ratio` N or a sideband of it, drawn aside by a few
     output turns' worth of modulation.
     """

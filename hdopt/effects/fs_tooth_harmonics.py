@@ -7,7 +7,8 @@ arc, prior 0 to 10 um.
 
 from __future__ import annotations
 
-from hdopt.effects.conditions import Array, Conditions
+from hdopt.arrays import Array
+from hdopt.effects.conditions import Conditions
 from hdopt.effects.cs_tooth_harmonics import CircularSplineToothHarmonics
 from hdopt.effects.term import Shape
 

@@ -7,12 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.term import Shape, Term
-
-Array = NDArray[np.float64]
 
 NODES = 9
 """Values of each continuous number on the first grid."""

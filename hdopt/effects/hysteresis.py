@@ -13,10 +13,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from hdopt.arrays import Array
 from hdopt.effects._friction_law import LAWS, NAMES, Law
 from hdopt.effects._friction_torque import friction_columns, half_loop, passes_of
 from hdopt.effects.base import Effect, terms_at
-from hdopt.effects.conditions import Array, Conditions
+from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Category, Quantity
 from hdopt.effects.estimate import FitEstimate, Parameter
 from hdopt.effects.probe import Probe, best_terms

@@ -17,9 +17,10 @@ from enum import StrEnum
 
 import numpy as np
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects.base import Effect, Keys
-from hdopt.effects.conditions import TURN, Array, Conditions
+from hdopt.effects.conditions import TURN, Conditions
 from hdopt.effects.declared import UM, Category, Quantity, needed, number
 from hdopt.effects.estimate import FitEstimate, Parameter
 from hdopt.effects.probe import Probe, best_terms

@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.term import Term
-
-Array = NDArray[np.float64]
 
 
 class Probe(Protocol):

@@ -21,10 +21,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects._oscillator import changes_of_speed, relative_responses, settled_drag, settled_responses
 from hdopt.effects.base import Effect, Keys
-from hdopt.effects.conditions import TURN, Array, Conditions
+from hdopt.effects.conditions import TURN, Conditions
 from hdopt.effects.declared import Category, Quantity, needed
 from hdopt.effects.estimate import FitEstimate, Parameter
 from hdopt.effects.probe import Probe, best_terms

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hdopt.arrays import Array, Index
 
 
 def sine_columns(phase: Array, harmonics: Sequence[float] | Array) -> Array:
@@ -32,7 +31,7 @@ def _sines(phase: Array, harmonics: Array) -> Array:
 
 
 @njit(cache=True, nogil=True)
-def _whole_sines(phase: Array, harmonics: NDArray[np.int64]) -> Array:
+def _whole_sines(phase: Array, harmonics: Index) -> Array:
     """The same for whole multiples, each from the one before by the sine's and cosine's addition theorems."""
     columns = np.empty((len(phase), 2 * len(harmonics)))
     place = np.full(harmonics.max() + 1, -1)

@@ -6,10 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from hdopt.arrays import Array
 
 Shape = Mapping[str, Any]
 """What of an effect is not linear: numbers, counts, categories and sets of waves, by the names that the effect gives

@@ -18,9 +18,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import ARCMIN, DriveGeometry
 from hdopt.effects.base import Effect, Keys, terms_at
-from hdopt.effects.conditions import Array, Conditions
+from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import REQUIRED, Quantity, needed, number, polar, sine_and_cosine
 from hdopt.effects.estimate import FitEstimate, Parameter
 from hdopt.effects.probe import Probe, best_terms

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hdopt.arrays import Array
 
 TIE_MM = 1e-12
 """Rims whose depths differ by less than this lie equally deep: a hundred roundings of a radius of 30 mm."""

@@ -13,15 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
 from hdopt.kinematics.kernel import motion_at, rigid_motion, rim_constants, rim_depth, tooth_deviation
-
-Array = NDArray[np.float64]
 
 CARTESIAN_NAMES = (
     "axis eccentricity x",
@@ -112,15 +110,11 @@ class CartesianModel:
         advance = self.advance * np.asarray(theta, float)
         return np.column_stack([np.cos(theta), np.sin(theta), np.cos(advance), np.sin(advance)])
 
-    def evaluate(
-        self, theta: Array, errors: Array, extra: Array | None = None
-    ) -> tuple[Array, NDArray[np.int64], Array]:
+    def evaluate(self, theta: Array, errors: Array, extra: Array | None = None) -> tuple[Array, Index, Array]:
         """`evaluate_at` for input angles `theta` (n,) rad."""
         return self.evaluate_at(self.rotation(theta), errors, extra)
 
-    def evaluate_at(
-        self, rotation: Array, errors: Array, extra: Array | None = None
-    ) -> tuple[Array, NDArray[np.int64], Array]:
+    def evaluate_at(self, rotation: Array, errors: Array, extra: Array | None = None) -> tuple[Array, Index, Array]:
         """KE (arcmin, n), the driving zone (0 or 1, n) and dKE/derrors (arcmin/mm, n x 12) at a `rotation` (n, 4).
 
         `errors` (12,) mm. `extra` (2, n) in mm is added to the deviation of each zone before the

@@ -13,14 +13,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors, Values
 from hdopt.drive.geometry import Drive
 from hdopt.drive.profiles import tip_radius_of_curvature
 from hdopt.kinematics.branches import Branches, DeepestPoints, deepest
-
-Array = NDArray[np.float64]
 
 
 class TipGeometry(NamedTuple):

@@ -13,12 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index
 from hdopt.kinematics import closed_form
 from hdopt.kinematics.branches import TIE_MM
-
-Array = NDArray[np.float64]
 
 OPTIONS = {"error_model": "numpy"}
 inlined = njit(inline="always", **OPTIONS)
@@ -260,7 +258,7 @@ def _stretches(gaps: Array) -> Array:
 
 
 @compiled
-def _rims_between(gaps: Array, low: float, high: float, rims: NDArray[np.int64]) -> bool:
+def _rims_between(gaps: Array, low: float, high: float, rims: Index) -> bool:
     """Fill `rims` (2,) with the deepest rims between two neighbouring changes; False where they only tie."""
     real = high > low
     for zone in range(2):

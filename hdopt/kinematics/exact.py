@@ -8,14 +8,13 @@ both rims, is the deepest point.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors, Values
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics import closed_form
 from hdopt.kinematics.branches import Branches, DeepestPoints, deepest
-
-Array = NDArray[np.float64]
 
 ZONE_HALF_WIDTH = np.pi / 3
 """How far from either end of the major axis the deepest point is sought, rad."""

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics.branches import Branches, deepest
@@ -24,8 +24,6 @@ from hdopt.kinematics.waveform import (
     geometry_for,
     kinematic_error_arcmin,
 )
-
-Array = NDArray[np.float64]
 
 PLACES = 360
 """Places of an input turn where the branches are sampled: 720 change the base case by 1e-9 arcmin."""

@@ -19,15 +19,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
 from hdopt.kinematics.kernel import motion_at, rigid_motion, rim_constants, rim_depth, tooth_deviation
 from hdopt.parallel.shared_memory import in_parts
-
-Array = NDArray[np.float64]
 
 HIGHS, LOWS = 4, 8
 SCAN = 144

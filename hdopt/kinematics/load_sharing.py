@@ -17,13 +17,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
 from hdopt.drive.teeth import MeasuredTeeth
 from hdopt.mechanics.contact import contact_angle
-
-Array = NDArray[np.float64]
 
 TAPER = 0.5
 """Share of the window that falls off, both ends together."""

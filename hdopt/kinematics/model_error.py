@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin
 from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin
-
-Array = NDArray[np.float64]
 
 PILOT = 16
 """Drives that are compared; half of them are those of the largest peak-to-peak, where limits are met."""

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics.closed_form import tip_geometry
 from hdopt.parallel.shared_memory import in_blocks
-
-Array = NDArray[np.float64]
 
 BLOCK = 8192
 """Drives a thread takes at a time: long enough to hide the hand-over, short enough to keep all cores busy."""

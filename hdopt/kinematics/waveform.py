@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors, Values
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics import closed_form, exact
 from hdopt.kinematics.branches import Branches, DeepestPoints
 from hdopt.kinematics.closed_form import tooth_deviation
 
-Array = NDArray[np.float64]
 Geometry = Callable[[Drive, DriveErrors, ArrayLike], DeepestPoints]
 
 EXACT, CLOSED_FORM = "exact", "closed form"

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive, DriveGeometry, Material
 from hdopt.drive.profiles import WaveGeneratorProfile, polar_curvature
 from hdopt.errors import MissingValue
-
-Array = NDArray[np.float64]
 
 QUARTER = np.linspace(0.0, math.pi / 2, 3601)
 """Angles over which extremes are taken: profiles are symmetric about both axes; 0.025 deg finds them to 1e-7."""

@@ -8,13 +8,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive, DriveGeometry
 from hdopt.drive.profiles import WaveGeneratorProfile
 from hdopt.errors import HdoptError, MissingValue
-
-Array = NDArray[np.float64]
 
 
 def tip_overlap(geometry: DriveGeometry, profile: WaveGeneratorProfile, phi: ArrayLike) -> Array:

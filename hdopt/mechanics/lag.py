@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import ARCMIN, Drive
 from hdopt.errors import MissingValue
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -17,14 +17,12 @@ from functools import cached_property
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.drive.profiles import WaveGeneratorProfile, polar_curvature
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.mechanics.contact import contact_angle
-
-Array = NDArray[np.float64]
 
 GRID = np.linspace(0.0, math.pi / 2, 91)
 """Where a profile is sampled with two derivatives: quintics between 1 deg steps keep 1e-13 mm of smooth profiles, and

@@ -6,14 +6,10 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
 from hdopt.simulation import EffectValues, Operation
 from hdopt.simulation.batch import AddedTable, local_extremes, matrix_peak_to_peak_arcmin, tabulate
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

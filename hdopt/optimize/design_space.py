@@ -8,15 +8,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from hdopt.drive.geometry import TOOTH_DIFFERENCE, Drive, DriveGeometry, Structure
 from hdopt.drive.profiles import Ellipse, Resal, TwoDisk, WaveGeneratorProfile
 from hdopt.errors import HdoptError
 from hdopt.mechanics.tooth_path import Mesh
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,9 @@ given by planes, stops short at a kink of the maximum (by 0.07 on CB3, `tests/va
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.optimize.nlopt_adapter import NO_PROBLEM, Effort, Guard, MinimaxProblem, Outcome, find_algorithm, run
-
-Array = NDArray[np.float64]
 
 LOCAL = "LD_SLSQP"
 """Fewest evaluations of all tried on the trade study, and none missed: `tests/benchmarks/test_search_methods.py`."""

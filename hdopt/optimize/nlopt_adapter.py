@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError, unknown_name
-
-Array = NDArray[np.float64]
 
 FEASIBLE = 1e-6
 """Largest constraint value (constraints are scaled to 1) that counts as met."""

@@ -13,8 +13,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, MissingValue, unknown_name
@@ -37,7 +37,6 @@ from hdopt.optimize.design_space import Combination, Design, DesignSpace
 if TYPE_CHECKING:
     from hdopt.optimize.design_effects import DesignEffects
 
-Array = NDArray[np.float64]
 
 NOMINAL, ROBUST = "peak_to_peak_arcmin", "peak_to_peak_quantile_arcmin"
 

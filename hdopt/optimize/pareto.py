@@ -7,13 +7,13 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hdopt.arrays import Array
 from hdopt.optimize.objectives import find_quantity
 from hdopt.optimize.problem import DesignProblem, Limit
 from hdopt.optimize.solve import Method, Solution, solve
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 KEPT_EQUAL = 1e-9

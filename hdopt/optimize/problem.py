@@ -7,13 +7,11 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.optimize.design_space import Combination, DesignSpace, Variable
 from hdopt.optimize.nlopt_adapter import Evaluation
 from hdopt.optimize.objectives import STEP, DesignConditions, Point, find_quantity
-
-Array = NDArray[np.float64]
 
 SMALL_SCALE = 1e-3
 """What a limit of zero is scaled with, in the quantity's unit."""

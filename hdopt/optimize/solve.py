@@ -7,15 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hdopt.optimize.design_space import Combination, Variable
 from hdopt.optimize.minimax import GLOBAL, LOCAL, explore, minimise
 from hdopt.optimize.nlopt_adapter import Effort, Outcome
 from hdopt.optimize.objectives import NOMINAL, ROBUST
 from hdopt.optimize.problem import DesignProblem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.mechanics.bending import curvature_change
 from hdopt.optimize.objectives import NOMINAL, ROBUST, find_quantity
 from hdopt.optimize.problem import Limit
 from hdopt.optimize.records import SearchResult, choose
-
-Array = NDArray[np.float64]
 
 MAP_POINTS = 25
 TURN = np.linspace(0.0, 2 * np.pi, 361)

@@ -7,9 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 FEWEST_FOR_PPK = 8
 """Fewer drives say too little of a scatter to give a performance."""

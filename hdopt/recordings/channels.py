@@ -6,15 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.recordings.clocks import on_one_clock, seconds_of
 from hdopt.recordings.columns import Column, with_units
 from hdopt.recordings.table import Channel, Table
 from hdopt.recordings.units import ANGLE_UNITS, CHANNEL_UNITS, DEGREE, TURN, parse_unit
 
-Array = NDArray[np.float64]
 ARCSEC = DEGREE / 3600
 OPTIONAL = ("time", "torque", "temperature")
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import ARCMIN
 from hdopt.recordings.ratio import check_ratio
 from hdopt.recordings.recording import TURN, Recording
@@ -30,8 +30,6 @@ from hdopt.recordings.repairs import (
     restore_whole_turns,
     unwrap_angles,
 )
-
-Array = NDArray[np.float64]
 
 FEWEST_ROWS = 50
 """Below this nothing can be told apart from the 12 parameters of the base model."""

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 from hdopt.recordings.table import Channel
-
-Array = NDArray[np.float64]
 
 GAP_STEPS = 4.0
 """A source that pauses for more than so many of its usual steps is not interpolated across the pause."""

@@ -11,13 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index
 from hdopt.recordings.passes import find_passes
 from hdopt.recordings.recording import TURN, Recording
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 CELLS_PER_TURN = 180
 """Cells an input turn: 2 deg, finer than the width of one tooth (2.2 deg for 162 teeth)."""

@@ -10,11 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
-
-Array = NDArray[np.float64]
 
 INSEPARABLE_GROWTH = 3.0
 """Neighbouring orders count as not separable when together they make their errors at least this many times larger."""

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index, Mask
 from hdopt.recordings.recording import TURN, Recording
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -19,10 +17,10 @@ class Passes:
     travel in rad since the last reversal; `first` marks rows before the first reversal, where the history is unknown.
     """
 
-    index: NDArray[np.int64]
+    index: Index
     direction: Array
     since_reversal: Array
-    first: NDArray[np.bool_]
+    first: Mask
 
     @property
     def count(self) -> int:
@@ -30,7 +28,7 @@ class Passes:
 
 
 @njit(cache=True)
-def _turning_points(angle: Array, threshold: float) -> NDArray[np.int64]:
+def _turning_points(angle: Array, threshold: float) -> Index:
     """Indices where the angle turns back by more than `threshold` (zigzag rule)."""
     turns = np.empty(len(angle), np.int64)
     found = 0
@@ -111,7 +109,7 @@ def conditions(recording: Recording) -> list[Condition]:
     return found
 
 
-def resample_in_angle(recording: Recording, samples_per_turn: int) -> tuple[Array, Array, NDArray[np.int64]]:
+def resample_in_angle(recording: Recording, samples_per_turn: int) -> tuple[Array, Array, Index]:
     """Angle-synchronous resampling: input angles on an even grid (rad), KE (arcmin, mean of the samples in each cell,
     cells without samples left out) and the pass each belongs to.
 

@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hdopt.arrays import Array, Index
 
 TURN = 2 * math.pi
 LOCKED_TURNS = 0.02
@@ -33,7 +32,7 @@ class Recording:
     time: Array | None = None
     torque: Array | None = None
     temperature: Array | None = None
-    segment: NDArray[np.int64] | None = None
+    segment: Index | None = None
     quantum_arcmin: float = 0.0
     warnings: tuple[str, ...] = field(default=())
     understood: tuple[str, ...] = field(default=())

@@ -11,11 +11,10 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index
 from hdopt.drive.geometry import ARCMIN
 from hdopt.errors import HdoptError
 from hdopt.recordings.recording import TURN
-
-Array = NDArray[np.float64]
 
 LARGEST_LOSS = 0.5
 """Refuse a file that loses more than this share of its rows."""
@@ -211,7 +210,7 @@ def unwrap_counter(checks: Checks, channel: str, angle: Array) -> None:
     )
 
 
-def find_gaps(checks: Checks) -> NDArray[np.int64]:
+def find_gaps(checks: Checks) -> Index:
     """Segment number of each row: it counts up where time (or, without time, the input) jumps.
 
     `checks` holds the rows so far, and is changed in place.
@@ -229,7 +228,7 @@ def find_gaps(checks: Checks) -> NDArray[np.int64]:
     return np.asarray(np.r_[0, np.cumsum(gaps)], np.int64)
 
 
-def restore_whole_turns(checks: Checks, segment: NDArray[np.int64]) -> None:
+def restore_whole_turns(checks: Checks, segment: Index) -> None:
     """Whole turns lost in a gap of a wrapped angle are put back: the error must not jump by a whole turn.
 
     `checks` holds the rows, `segment` (n,) their parts.
@@ -248,7 +247,7 @@ def restore_whole_turns(checks: Checks, segment: NDArray[np.int64]) -> None:
         checks.warn(f"whole input turns lost in {int((turns != 0).sum())} gaps have been put back")
 
 
-def drop_outliers(checks: Checks, segment: NDArray[np.int64]) -> NDArray[np.int64]:
+def drop_outliers(checks: Checks, segment: Index) -> Index:
     """Single samples far from their neighbours, forward and back at once, are read-out faults.
 
     `checks` holds the rows, `segment` (n,) their parts; returns the segments that stay.
@@ -264,6 +263,6 @@ def drop_outliers(checks: Checks, segment: NDArray[np.int64]) -> NDArray[np.int6
     if 0 < spikes.mean() <= 0.02:
         checks.keep(~spikes)
         checks.warn(f"{int(spikes.sum())} samples far from their neighbours (backward jumps, read-out faults) dropped")
-        kept: NDArray[np.int64] = segment[~spikes]
+        kept: Index = segment[~spikes]
         return kept
     return segment

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index
 from hdopt.drive.geometry import ARCMIN
-from hdopt.effects.conditions import Array, Conditions, Index
+from hdopt.effects.conditions import Conditions
 from hdopt.recordings.passes import find_passes
 from hdopt.recordings.recording import TURN, Recording
 

@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hdopt.arrays import Array
 from hdopt.recordings.capability import Gauge, Performance
 from hdopt.recordings.decision import Decision
 from hdopt.recordings.figures import Cells, Return
@@ -16,8 +14,6 @@ from hdopt.recordings.stiffness import Torsion
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

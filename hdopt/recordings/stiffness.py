@@ -10,13 +10,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import ARCMIN
 from hdopt.recordings.passes import find_passes
 from hdopt.recordings.recording import Recording
 
-Array = NDArray[np.float64]
 GRID = 24
 """Places tried for each knee, evenly over the torque; the best is refined between its neighbours."""
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
@@ -19,8 +19,6 @@ from hdopt.parallel.shared_memory import in_blocks
 from hdopt.simulation.effect_values import EffectValues
 from hdopt.simulation.model import ExtendedModel
 from hdopt.simulation.operation import Operation
-
-Array = NDArray[np.float64]
 
 WALK_PER_TURN, TABLE_PER_TURN = 180, 1440
 """Angles of the first walk, and places of the table, in an input turn at least."""
@@ -130,7 +128,7 @@ class LocalExtremes:
     `sign` +1 for minima, -1 for maxima."""
 
     theta: Array
-    way: NDArray[np.int64]
+    way: Index
     sign: float
 
     def values(self, drive: Drive, row: Array, added: AddedTable) -> Array:

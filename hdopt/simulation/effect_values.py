@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from hdopt.arrays import Array
 from hdopt.effects import EFFECTS
 from hdopt.effects.base import Effect
-from hdopt.effects.conditions import Array, Conditions
+from hdopt.effects.conditions import Conditions
 from hdopt.effects.term import Shape, Term
 
 

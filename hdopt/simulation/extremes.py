@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.kinematics.extremes import CANDIDATES, zoom_lowest
 from hdopt.simulation.model import ExtendedModel
-
-Array = NDArray[np.float64]
 
 RIPPLE_POINTS = 64
 """Points in a period of a ripple that is finer than the grid: its peak is met within 0.2 % of its amplitude."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.effects.term import Term
@@ -17,8 +17,6 @@ from hdopt.errors import MissingValue
 from hdopt.kinematics.waveform import full_turn, relative_turn_deviation, zone_deviation
 from hdopt.simulation.effect_values import EffectValues
 from hdopt.simulation.operation import NO_LOAD, Operation
-
-Array = NDArray[np.float64]
 
 FEWEST_PER_TURN, MOST_PER_TURN = 720, 8192
 PER_PERIOD = 16

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdopt.effects.conditions import Array, Conditions
+from hdopt.arrays import Array
+from hdopt.effects.conditions import Conditions
 
 RPM = 2 * np.pi / 60
 """rad/s in a revolution per minute."""

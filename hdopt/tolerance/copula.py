@@ -7,12 +7,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import special
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

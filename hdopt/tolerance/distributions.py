@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import special
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError, shown
 from hdopt.files import read_text
 
-Array = NDArray[np.float64]
 INFINITY = math.inf
 
 

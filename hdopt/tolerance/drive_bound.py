@@ -29,14 +29,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.errors import ERROR_NAMES, DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.drive.profiles import WaveGeneratorProfile
 from hdopt.kinematics.exact import ZONE_HALF_WIDTH
-
-Array = NDArray[np.float64]
 
 CONTOUR_POINTS = 20_001
 """Places of the contour within a zone where its slope is looked at; between them the second derivative limits it."""

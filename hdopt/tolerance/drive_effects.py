@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors
 from hdopt.simulation.batch import AddedTable, matrix_peak_to_peak_arcmin
 from hdopt.tolerance.drive_inputs import DriveResponse
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.errors import ERROR_GROUPS, ERROR_NAMES, PHASE_OF, STUDY_KEYS, DriveErrors, study_key
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, unknown_name
@@ -17,8 +17,6 @@ from hdopt.tolerance.contributors import TILT, VECTORS, Contributor
 from hdopt.tolerance.copula import CorrelationGroup
 from hdopt.tolerance.distributions import Distribution, Rayleigh, Uniform
 from hdopt.tolerance.space import InputSpace, Tolerance
-
-Array = NDArray[np.float64]
 
 FULL_TURN = Uniform(lower=0.0, upper=360.0)
 """A free direction, deg."""

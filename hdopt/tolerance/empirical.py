@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hdopt.arrays import Array, Index
 
 BINS = 2**18
 """Bins of a streamed sample; one is about the pilot's range / 87000 wide."""
@@ -80,7 +79,7 @@ class BinnedValues:
     """Counts in bins, and exactly the few values beyond them on either side. A ranked value is right to one bin."""
 
     bins: Bins
-    counts: NDArray[np.int64] = field(repr=False)
+    counts: Index = field(repr=False)
     below: Array = field(repr=False)
     above: Array = field(repr=False)
 

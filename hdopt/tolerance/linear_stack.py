@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.tolerance.distributions import Normal
 from hdopt.tolerance.space import InputSpace, Tolerance
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

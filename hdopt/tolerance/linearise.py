@@ -11,13 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.tolerance.response import Response, evaluate
 from hdopt.tolerance.sampling import ScrambledSobol
 from hdopt.tolerance.space import InputSpace
-
-Array = NDArray[np.float64]
 
 DIRECTIONS = 2**12
 """Sobol' points over which directions, phases and signs are averaged."""

@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
-
-Array = NDArray[np.float64]
 
 BLOCK = 2**16
 """Points made at a time: 12 inputs of them fit in 6 MB, so that the sample's size does not bound memory."""

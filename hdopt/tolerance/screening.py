@@ -14,8 +14,8 @@ from io import StringIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.parallel.engine import Engine, engine_from
 from hdopt.tolerance.response import Response, evaluate
@@ -25,7 +25,6 @@ from hdopt.tolerance.space import InputSpace
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
 EDGE = 1e-3
 """Share of an unbounded distribution that is left out at an open end: Morris and DGSM step to the ends of the cube,

@@ -13,9 +13,9 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.parallel.engine import Engine, engine_from
 from hdopt.tolerance.intervals import IntervalEstimate, over_scramblings
@@ -26,7 +26,6 @@ from hdopt.tolerance.space import InputSpace
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
 SCRAMBLINGS = 16
 SMALLEST_PER_SCRAMBLING = 16

@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.tolerance.copula import CorrelationGroup, GaussianCopula
 from hdopt.tolerance.distributions import Distribution, Scaled
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 from hdopt.parallel.engine import Engine, engine_from
 from hdopt.tolerance import capability
@@ -34,7 +34,6 @@ from hdopt.tolerance.space import InputSpace
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
 KEPT_VALUES = 2**24
 """Up to here every value is kept (128 MiB); a larger sample is counted in bins."""

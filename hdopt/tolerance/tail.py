@@ -12,15 +12,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 from hdopt.tolerance.intervals import CONFIDENCE, clopper_pearson
 from hdopt.tolerance.response import Response, evaluate
 from hdopt.tolerance.space import InputSpace
-
-Array = NDArray[np.float64]
 
 REPLICATES = 16
 LEVEL_SIZE = 20_000

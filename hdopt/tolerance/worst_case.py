@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 from hdopt.tolerance.response import Response, evaluate
 from hdopt.tolerance.sampling import ScrambledSobol
 from hdopt.tolerance.space import InputSpace
-
-Array = NDArray[np.float64]
 
 CORNERS = 2**17
 POPULATION = 192

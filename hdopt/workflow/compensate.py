@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index, Mask
 from hdopt.compensation.pursuit import dictionary, pursue
 from hdopt.compensation.surface import Harmonics, Surface, grid_angles, surface_of
 from hdopt.compensation.writers import homing_arcmin
@@ -19,7 +19,6 @@ from hdopt.recordings.recording import TURN, Recording
 from hdopt.recordings.rows import Rows, gather, neighbours_for
 from hdopt.workflow.waveform_fit import WaveformFit, fit_rows
 
-Array = NDArray[np.float64]
 Found = Harmonics | Surface
 
 MOST_TERMS = 64
@@ -172,9 +171,7 @@ def compensate(
     )
 
 
-def _trials(
-    rows: Rows, fold: NDArray[np.int64], terms: int, fit: Callable[[Rows], WaveformFit | None]
-) -> dict[str, Array]:
+def _trials(rows: Rows, fold: Index, terms: int, fit: Callable[[Rows], WaveformFit | None]) -> dict[str, Array]:
     """What each way leaves (n,) on every part, fitted to the others."""
     trials: dict[str, Array] = {}
     for k in range(int(fold.max()) + 1):
@@ -185,7 +182,7 @@ def _trials(
     return {name: _centred(left, rows, fold) for name, left in trials.items()}
 
 
-def _folds(rows: Rows) -> tuple[NDArray[np.int64], str]:
+def _folds(rows: Rows) -> tuple[Index, str]:
     """The part that each row belongs to, and what the parts are: recordings, output turns, passes, or stretches."""
     if rows.records >= 2:
         return np.asarray(rows.record % max(FOLDS, 2), np.int64), "recordings"
@@ -199,7 +196,7 @@ def _folds(rows: Rows) -> tuple[NDArray[np.int64], str]:
     return np.asarray(np.minimum((order * FOLDS).astype(int), FOLDS - 1), np.int64), STRETCHES
 
 
-def _rows(rows: Rows, mask: NDArray[np.bool_]) -> Rows:
+def _rows(rows: Rows, mask: Mask) -> Rows:
     """Some rows, their recordings numbered anew."""
     part = rows.rows(mask)
     return replace(part, record=np.unique(part.record, return_inverse=True)[1])
@@ -237,19 +234,19 @@ def _model_surface(fit: WaveformFit) -> Surface:
     return Surface(values - values.mean())
 
 
-def _at(found: Found, rows: Rows, mask: NDArray[np.bool_]) -> Array:
+def _at(found: Found, rows: Rows, mask: Mask) -> Array:
     theta = rows.theta[mask]
     return found.at(theta, theta / rows.ratio, rows.direction[mask] if rows.reverses else 0.0)
 
 
-def _centred(values: Array, rows: Rows, fold: NDArray[np.int64]) -> Array:
+def _centred(values: Array, rows: Rows, fold: Index) -> Array:
     """Values less the mean of their recording within their fold: a zero is nobody's error."""
     key = rows.record * (int(fold.max()) + 1) + fold
     _, inverse = np.unique(key, return_inverse=True)
     return np.asarray(values - (np.bincount(inverse, values) / np.bincount(inverse))[inverse], float)
 
 
-def _choose(trials: dict[str, Array], fold: NDArray[np.int64]) -> tuple[Array, str]:
+def _choose(trials: dict[str, Array], fold: Index) -> tuple[Array, str]:
     """What is left where each part is scored by the choice of the others, and the choice of all parts."""
     names = list(trials)
     squares = np.array([[float(np.sum(trials[n][fold == k] ** 2)) for k in range(int(fold.max()) + 1)] for n in names])

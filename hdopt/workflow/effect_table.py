@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hdopt.recordings.orders import ModelOrder, model_orders
 from hdopt.simulation import ExtendedModel
@@ -14,8 +13,6 @@ from hdopt.simulation.extremes import peak_to_peak_arcmin
 from hdopt.study import Study
 from hdopt.study.effects import effect_keys
 from hdopt.workflow.effect_selection import Inclusion
-
-Array = NDArray[np.float64]
 
 SAME_ORDER = 1e-9
 PER_CYCLE = 4

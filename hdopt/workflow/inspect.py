@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
 from hdopt.recordings import figures
@@ -21,8 +21,6 @@ from hdopt.recordings.recording import Recording
 from hdopt.recordings.sheet import Beat, Inspection, OrderLine
 from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
 from hdopt.workflow.waveform_fit import WaveformFit, fit_waveform
-
-Array = NDArray[np.float64]
 
 MODEL_LEAVES = 3.0
 """A model whose residual is below so many times the scatter of neighbouring samples explains the waveform: noise that

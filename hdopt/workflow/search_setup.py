@@ -7,8 +7,8 @@ from dataclasses import fields
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import Structure
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.mechanics.bearing_life import BearingConstants
@@ -154,7 +154,7 @@ def tolerance_problem(study: Study):
     return problem.response, problem.space
 
 
-def sample_rows(study: Study, n: int, seed: int) -> NDArray[np.float64]:
+def sample_rows(study: Study, n: int, seed: int) -> Array:
     """`n` drives of the study's tolerances as rows of `DriveErrors.to_matrix`: one scrambling, by `seed`, of Sobol'
     points."""
     from hdopt.tolerance.sampling import ScrambledSobol

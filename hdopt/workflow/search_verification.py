@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics.extremes import extremes_arcmin
 from hdopt.optimize.records import SearchResult, Verification
@@ -16,7 +16,6 @@ from hdopt.workflow.search_setup import tolerance_problem
 if TYPE_CHECKING:
     from hdopt.optimize.design_effects import DesignEffects
 
-Array = NDArray[np.float64]
 
 VERIFICATION = 1 << 16
 """Fresh drives that verify a quantile; none of them was seen by the search."""

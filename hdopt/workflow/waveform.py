@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.kinematics.extremes import extremes_arcmin, held_peak_to_peak, tooth_width_peak_to_peak_arcmin
 from hdopt.kinematics.waveform import DEFAULT_METHOD, relative_turn, relative_turn_deviation
 from hdopt.recordings.orders import ModelOrder, model_orders
@@ -16,8 +16,6 @@ from hdopt.simulation.extremes import extremes_arcmin as extended_extremes_arcmi
 from hdopt.study import Study
 from hdopt.workflow.effect_selection import extended_model
 from hdopt.workflow.effect_table import effect_orders
-
-Array = NDArray[np.float64]
 
 SAMPLES_PER_TURN = 720
 

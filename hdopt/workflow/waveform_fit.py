@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.diagnosis.inference.base_fit import fit_base
 from hdopt.diagnosis.inference.fit import Fit, FitProblem
 from hdopt.diagnosis.inference.noise import Noise
@@ -20,8 +20,6 @@ from hdopt.drive.geometry import Drive
 from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel
 from hdopt.recordings.recording import TURN, Recording
 from hdopt.recordings.rows import Rows, gather, neighbours_for
-
-Array = NDArray[np.float64]
 
 SIGN_EVIDENCE = 6.0
 """Difference of log-likelihood (four independent values an input turn) from which the data decide the error's sign."""

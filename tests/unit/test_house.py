@@ -86,8 +86,25 @@ def test_docstrings_name_every_argument():
     assert not more, f"docstrings that leave out an argument, by room: {more}; allowed are {UNDESCRIBED}"
 
 
+def array_aliases(tree: ast.Module) -> set[str]:
+    """The array types of `hdopt.arrays` that a module spells out itself."""
+    return {
+        ast.unparse(node)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Subscript)
+        and ast.unparse(node) in {"NDArray[np.float64]", "NDArray[np.int64]", "NDArray[np.bool_]"}
+    }
+
+
+def test_array_types_are_named_once():
+    """The bench shares no code with the rest and names its own."""
+    spelled = {path: array_aliases(tree) for path, tree in TREES.items() if path.parts[1] != "bench"}
+    assert {path for path, found in spelled.items() if found} == {Path("hdopt/arrays.py")}
+
+
 def test_the_rules_of_this_page_bite():
     tree = ast.parse('def f(first, *, second):\n    """Say `first`."""\n' + "    pass\n" * 60)
     (node,) = functions(tree)
     assert length(node) == 62
     assert unnamed_arguments(node) == ["second"]
+    assert array_aliases(ast.parse("Numbers = NDArray[np.float64]")) == {"NDArray[np.float64]"}

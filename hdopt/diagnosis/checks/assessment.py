@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index
 from hdopt.diagnosis.checks.scale import Scale, fitted_scale
 from hdopt.diagnosis.checks.slow_wander import SlowWave, slow_wave
 from hdopt.diagnosis.checks.step_detection import Steps, sudden_steps
@@ -32,8 +32,6 @@ from hdopt.effects.probe import strongest_orders
 from hdopt.effects.term import Term
 from hdopt.recordings.recording import Recording
 from hdopt.recordings.rows import Rows
-
-Array = NDArray[np.float64]
 
 SECOND_DIFFERENCE = 6
 """Variance of a second difference of white noise over the noise's own: 1 + 4 + 1."""
@@ -142,7 +140,7 @@ def best_placebo(probe: FitProbe, pool: Sequence[Term], best: Fit) -> Term | Non
     return max(others, key=probe.gain, default=None)
 
 
-def placebo_error(probe: FitProbe, placebo: Term, folds: NDArray[np.int64]) -> HeldOut:
+def placebo_error(probe: FitProbe, placebo: Term, folds: Index) -> HeldOut:
     """Held-out error, on `folds` (n,), with the `placebo` beside the base that `probe` looks at."""
     return held_out(probe.fit, term_columns(placebo, probe.fit.zone, probe.fit.problem.base), folds)
 
@@ -174,7 +172,7 @@ def lacking_effects(state: State, strange: Sequence[str]) -> dict[str, str]:
     return lacking
 
 
-def look_at_remainder(fit: Fit, folds: NDArray[np.int64], inflation: float) -> Remainder:
+def look_at_remainder(fit: Fit, folds: Index, inflation: float) -> Remainder:
     """Held-out gain of the generic basis beside `fit`, on `folds` (n,) of its rows, in noise rougher by `inflation`."""
     settings = fit.problem.settings.held_out
     probe = FitProbe(fit)

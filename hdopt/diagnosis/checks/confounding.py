@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import SPAN_RANK
@@ -23,8 +23,6 @@ from hdopt.diagnosis.search.candidates import search_terms
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.effects import EFFECTS
 from hdopt.effects.term import Term
-
-Array = NDArray[np.float64]
 
 RIGHT_ANGLE_DEG = 90.0
 

@@ -14,14 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index, Mask
 from hdopt.diagnosis.inference.fit import Fit, shape_columns
 from hdopt.diagnosis.numerical import LEAST_SQUARES_RANK, TINY
 from hdopt.diagnosis.settings import WanderSettings
 from hdopt.recordings.rows import Rows
-
-Array = NDArray[np.float64]
 
 KENDALL = 4
 """Of the bias (2 + 4 a)/n of a first-order coefficient a where a trend is fitted (Kendall, Biometrika 41, 1954)."""
@@ -142,14 +140,14 @@ def _neighbours(along: Array, cycles: int) -> list[Array]:
     return [f(2 * math.pi * (cycles + off) * along) for off in HALF_STEPS for f in (np.sin, np.cos)]
 
 
-def _cells(rows: Rows, per_turn: int) -> NDArray[np.int64]:
+def _cells(rows: Rows, per_turn: int) -> Index:
     """Number of the part of a turn of each row, counted along the motion; reversals and gaps begin a new one."""
     part = np.floor(rows.theta / (2 * math.pi / per_turn)).astype(np.int64)
     change = (np.diff(part) != 0) | (np.diff(rows.piece) != 0) | (np.diff(rows.direction) != 0)
     return np.asarray(np.r_[0, np.cumsum(change)], np.int64)
 
 
-def _autoregression(values: Array, record: NDArray[np.int64], orders: int) -> tuple[Array, NDArray[np.bool_]]:
+def _autoregression(values: Array, record: Index, orders: int) -> tuple[Array, Mask]:
     """Coefficients by least squares, of the order up to `orders` that Schwarz's criterion prefers, and the means that
     have a past within their `record`.
 
@@ -175,7 +173,7 @@ def _autoregression(values: Array, record: NDArray[np.int64], orders: int) -> tu
     return best, usable
 
 
-def _filtered(values: Array, ar: Array, usable: NDArray[np.bool_]) -> Array:
+def _filtered(values: Array, ar: Array, usable: Mask) -> Array:
     rows = np.flatnonzero(usable)
     result = values[rows]
     for lag, a in enumerate(ar, start=1):

@@ -13,22 +13,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index, Mask
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import MAD_TO_SIGMA, TINY
 from hdopt.diagnosis.settings import StepSettings
 from hdopt.recordings.rows import Rows
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class Steps:
     """Rows at which steps start, and the rms (arcmin) of what they and the creeping between them add."""
 
-    rows: NDArray[np.int64]
+    rows: Index
     rms: float
 
     @property
@@ -61,7 +59,7 @@ def sudden_steps(fit: Fit) -> Steps:
     return Steps(rows, float(np.sqrt(max(float(np.var(fit.residual)) - quiet, 0.0))))
 
 
-def _scores(white: Array, trace: Array, block: NDArray[np.int64]) -> Array:
+def _scores(white: Array, trace: Array, block: Index) -> Array:
     """Size of `trace` starting at each row, in units of its scatter over the row's turn."""
     score = np.correlate(white, trace, "valid") / np.sqrt(trace @ trace)
     turns = block[: len(score)]
@@ -77,7 +75,7 @@ def _scatter(values: Array) -> float:
     return MAD_TO_SIGMA * float(np.median(np.abs(values)))
 
 
-def _near_an_edge(record: Rows, settings: StepSettings) -> NDArray[np.bool_]:
+def _near_an_edge(record: Rows, settings: StepSettings) -> Mask:
     """Rows just before or after a reversal or a gap."""
     n = len(record)
     change = np.flatnonzero((np.diff(record.direction) != 0) | (np.diff(record.piece) != 0)) + 1
@@ -88,7 +86,7 @@ def _near_an_edge(record: Rows, settings: StepSettings) -> NDArray[np.bool_]:
     return near
 
 
-def _separate(size: Array, chosen: NDArray[np.bool_], reach: int) -> NDArray[np.int64]:
+def _separate(size: Array, chosen: Mask, reach: int) -> Index:
     """The largest of the chosen rows, and further ones that lie half a `reach` apart from it."""
     left: Array = np.where(chosen, size, 0.0)
     rows: list[int] = []
@@ -99,7 +97,7 @@ def _separate(size: Array, chosen: NDArray[np.bool_], reach: int) -> NDArray[np.
     return np.array(sorted(rows), np.int64)
 
 
-def _set_by_angle(record: Rows, rows: NDArray[np.int64], settings: StepSettings) -> bool:
+def _set_by_angle(record: Rows, rows: Index, settings: StepSettings) -> bool:
     """Whether the steps come back at an angle of the input, the flexspline or the output, once or twice a turn."""
     theta = record.theta[rows]
     length = max(

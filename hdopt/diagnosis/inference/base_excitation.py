@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hdopt.arrays import Array
 from hdopt.diagnosis.inference.catalogue import properties_of
 from hdopt.effects.term import Term
 from hdopt.recordings.rows import Rows
-
-Array = NDArray[np.float64]
 
 
 def excites(term: Term) -> bool:

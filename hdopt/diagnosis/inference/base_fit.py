@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Mask
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
 from hdopt.diagnosis.numerical import HALF, NORMAL_95, SMALLEST_POWER
 from hdopt.diagnosis.settings import DEFAULT, BaseSettings
@@ -22,8 +22,6 @@ from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Term
 from hdopt.kinematics.cartesian import CARTESIAN_NAMES, PARAMETERS, to_drive_errors
 from hdopt.recordings.rows import Rows
-
-Array = NDArray[np.float64]
 
 
 def fit_base(
@@ -69,7 +67,7 @@ def fit_base(
     return min(finals, key=lambda fit: fit.objective)
 
 
-def _thin(term: Term, mask: NDArray[np.bool_]) -> Term:
+def _thin(term: Term, mask: Mask) -> Term:
     return replace(
         term,
         columns=None if term.columns is None else term.columns[mask],

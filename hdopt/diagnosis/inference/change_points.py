@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.diagnosis.numerical import MAD_TO_SIGMA
 from hdopt.diagnosis.settings import DEFAULT, ChangePointSettings
-
-Array = NDArray[np.float64]
 
 
 def find_steps(

@@ -11,15 +11,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index
 from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
 from hdopt.diagnosis.settings import DEFAULT, ConditionSettings
 from hdopt.recordings.read import TURN
 from hdopt.recordings.rows import Rows
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 SECONDS_A_MINUTE = 60
 
 

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import SMALL_RIDGE, TINY
 from hdopt.diagnosis.settings import DEFAULT, HeldOutSettings
 from hdopt.effects.term import Term
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -28,7 +26,7 @@ class HeldOut:
     rows: Array
 
     @classmethod
-    def of(cls, block: NDArray[np.int64], plain: Array, white: Array) -> HeldOut:
+    def of(cls, block: Index, plain: Array, white: Array) -> HeldOut:
         """From the errors of all rows, (n,) each, and the turn of each row."""
         return cls(*(np.asarray(np.bincount(block, w), float) for w in (plain**2, white**2, np.ones(len(block)))))
 
@@ -43,7 +41,7 @@ class HeldOut:
         return float(self.plain.sum() / self.rows.sum())
 
 
-def held_out(fit: Fit, extra: Array | None, groups: NDArray[np.int64]) -> HeldOut:
+def held_out(fit: Fit, extra: Array | None, groups: Index) -> HeldOut:
     """Errors of `fit` (linearised where it stands), with `extra` columns beside it, on each group left out in turn.
 
     `groups` (n,) numbers the fold of each row: all rows of a turn, or of a recording, share one.
@@ -75,7 +73,7 @@ def held_out(fit: Fit, extra: Array | None, groups: NDArray[np.int64]) -> HeldOu
     return HeldOut.of(fit.problem.rows.block, plain, whitened)
 
 
-def turn_folds(fit: Fit, rng: np.random.Generator) -> NDArray[np.int64]:
+def turn_folds(fit: Fit, rng: np.random.Generator) -> Index:
     """A fold for each row of `fit` (n,), whole turns together, drawn by `rng`."""
     blocks = fit.problem.rows.blocks
     fold = rng.permutation(blocks) % min(fit.problem.settings.held_out.folds, max(blocks, 2))

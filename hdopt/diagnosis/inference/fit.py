@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index, Mask
 from hdopt.diagnosis.inference.base_excitation import driven_by, excites, motion_of, transmitted
 from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.noise import Noise
@@ -24,8 +24,6 @@ from hdopt.effects.estimate import FitEstimate
 from hdopt.effects.term import Term
 from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel
 from hdopt.recordings.rows import Rows
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -80,7 +78,7 @@ class FitProblem:
     def with_noise(self, noise: Noise) -> FitProblem:
         return replace(self, noise=noise)
 
-    def only(self, mask: NDArray[np.bool_]) -> FitProblem:
+    def only(self, mask: Mask) -> FitProblem:
         """The same problem on the rows in `mask` (n,), with white noise."""
         rows = self.rows.rows(mask)
         return replace(self, rows=rows, nuisance=self.nuisance[mask], noise=Noise.white(rows, self.noise.sigma))
@@ -97,7 +95,7 @@ class Fit:
     terms: tuple[Term, ...]
     coefficients: tuple[Array, ...]
     base_value: Array
-    zone: NDArray[np.int64]
+    zone: Index
     prediction: Array
     objective: float
     base_jacobian: Array
@@ -191,7 +189,7 @@ class Fit:
         return found
 
 
-def term_columns(term: Term, zone: NDArray[np.int64], base: CartesianModel | None) -> Array:
+def term_columns(term: Term, zone: Index, base: CartesianModel | None) -> Array:
     """The term's columns in arcmin per coefficient, with the zones as they drive now. `zone` (n,) is 0 or 1; `base`
     is None for a gear without one.
     """

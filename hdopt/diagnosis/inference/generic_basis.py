@@ -7,16 +7,14 @@ something is there that the catalogue does not hold.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import RIDGE, TINY
 from hdopt.diagnosis.settings import DEFAULT, GenericSettings
 from hdopt.effects.probe import strongest_orders
 from hdopt.effects.sines import sine_columns
 from hdopt.recordings.rows import Rows
-
-Array = NDArray[np.float64]
 
 SPEED_ORDERS = (1, 2, 4)
 """Orders of the base whose size may follow the speed."""

@@ -11,13 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index, Mask
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.settings import DEFAULT, NoiseSettings
 from hdopt.recordings.rows import Rows
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -34,7 +32,7 @@ class Noise:
         """Noise without colour on `rows`, of standard deviation `sigma` (arcmin)."""
         return cls(np.zeros(0), sigma, np.sqrt(rows.weight))
 
-    def without(self, left_out: NDArray[np.bool_]) -> Noise:
+    def without(self, left_out: Mask) -> Noise:
         """The same noise with no weight on the rows `left_out` (n,), nor where the filter would reach into them."""
         touched = left_out.copy()
         for lag in range(1, len(self.ar) + 1):
@@ -110,7 +108,7 @@ def estimate(rows: Rows, residual: Array, settings: NoiseSettings = DEFAULT.nois
     return Noise(ar, float(np.sqrt(np.sum(white**2) / max(valid.sum(), 1))), noise.root_weight)
 
 
-def _covariance(piece: NDArray[np.int64], residual: Array, settings: NoiseSettings) -> Array:
+def _covariance(piece: Index, residual: Array, settings: NoiseSettings) -> Array:
     """Mean products of `residual` (n,) with itself some rows later, over no gap between the contiguous `piece`s."""
     n = len(residual)
     highest = int(min(settings.highest_order, np.bincount(piece).max() // settings.rows_a_lag))

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
+from hdopt.arrays import Array
 from hdopt.diagnosis.inference.change_points import find_steps, step_columns
 from hdopt.diagnosis.settings import DEFAULT, AlternativeSettings
 from hdopt.drive.geometry import ARCMIN
@@ -22,8 +22,6 @@ from hdopt.effects.probe import Probe, best_terms, strongest_orders
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Term
 from hdopt.recordings.read import TURN
-
-Array = NDArray[np.float64]
 
 
 class Alternative(Explanation):

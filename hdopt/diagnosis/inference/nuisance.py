@@ -20,8 +20,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Mask
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.settings import DEFAULT, NuisanceSettings
 from hdopt.effects.estimate import FitEstimate, Parameter
@@ -29,8 +29,6 @@ from hdopt.effects.sines import sine_columns
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.rows import Rows
-
-Array = NDArray[np.float64]
 
 NUISANCES = ("drift", "time-warp")
 """What `--nuisance` may ask for."""
@@ -246,7 +244,7 @@ def notes(fit: Fit, nuisances: Nuisances) -> list[str]:
     return said
 
 
-def _for_each(own: NDArray[np.bool_], columns: Array) -> Array:
+def _for_each(own: Mask, columns: Array) -> Array:
     """Columns repeated for each recording, zero on the rows of the others."""
     return np.column_stack([columns * own[:, [r]] for r in range(own.shape[1])])
 

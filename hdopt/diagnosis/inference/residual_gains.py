@@ -8,15 +8,13 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.diagnosis.inference.base_excitation import excites, is_driven
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.numerical import RANK, RIDGE, TINY
 from hdopt.effects.term import Term
 from hdopt.recordings.read import TURN
-
-Array = NDArray[np.float64]
 
 
 class FitProbe:

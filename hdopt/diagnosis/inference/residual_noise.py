@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index
 from hdopt.diagnosis.inference import noise as noise_model
 from hdopt.diagnosis.inference.change_points import find_steps, step_columns
 from hdopt.diagnosis.inference.fit import Fit
@@ -14,8 +14,6 @@ from hdopt.diagnosis.inference.generic_basis import generic_columns
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import LEAST_SQUARES_RANK, TINY
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,7 @@ def measure_noise(fit: Fit) -> MeasuredNoise:
     return MeasuredNoise(noise, float(np.clip(inflation, 1.0, settings.noise.largest_inflation)))
 
 
-def roughness(noise: Noise, whitened: Array, columns: Array, block: NDArray[np.int64]) -> float:
+def roughness(noise: Noise, whitened: Array, columns: Array, block: Index) -> float:
     """Power of the scores of smooth whitened `columns` (n, q) on the `whitened` residual (n,), summed over each turn
     (`block`, (n,)), against what white noise of the same size would give: the median over the columns.
     """

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.diagnosis.inference import noise as noise_model
 from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
@@ -26,8 +26,6 @@ from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Term
 from hdopt.recordings.read import Recording
 from hdopt.recordings.rows import Rows, gather
-
-Array = NDArray[np.float64]
 
 
 def find_ripple(

@@ -13,14 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.diagnosis.inference.fit import Fit, evaluate, refine, term_columns
 from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.effects.term import Term
 from hdopt.recordings.rows import Rows
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.inference.catalogue import is_effect
 from hdopt.diagnosis.inference.fit import Fit
@@ -21,8 +21,6 @@ from hdopt.effects import EFFECTS
 from hdopt.effects.estimate import Parameter
 from hdopt.effects.term import Term
 from hdopt.recordings.read import TURN
-
-Array = NDArray[np.float64]
 
 EXACT_DIGITS, LISTED_DIGITS = 6, 5
 """Digits of an order in the JSON: of one that is known, and of one that was measured."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.report import Figure, Section
 from hdopt.report.theme import GREEN, INK, PAPER, PURPLE, SEQUENTIAL, VERMILLION, figure
 
@@ -23,7 +23,7 @@ class Limit:
     """A line on the map: where `values`, on the map's grid, equal `limit`. `name` stands in the legend."""
 
     name: str
-    values: NDArray[np.float64]
+    values: Array
     limit: float
 
 
@@ -37,9 +37,9 @@ class Design:
 
 
 def pressure_angle_width_section(
-    pressure_angle_deg: NDArray[np.float64],
-    width_mm: NDArray[np.float64],
-    peak_to_peak_arcmin: NDArray[np.float64],
+    pressure_angle_deg: Array,
+    width_mm: Array,
+    peak_to_peak_arcmin: Array,
     design: Design,
     *,
     requirement_arcmin: float | None = None,
@@ -75,9 +75,9 @@ def pressure_angle_width_section(
 
 
 def design_map(
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    values: NDArray[np.float64],
+    x: Array,
+    y: Array,
+    values: Array,
     titles: tuple[str, str, str],
     designs: Sequence[Design] = (),
     limits: Sequence[Limit] = (),

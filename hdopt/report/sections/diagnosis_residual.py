@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array, Index
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.recordings.passes import synchronous_average
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from hdopt.diagnosis.checks.localization import Location
     from hdopt.diagnosis.verdict.diagnosis import Diagnosis
 
-Array = NDArray[np.float64]
 
 SIGNIFICANT = 0.01
 """A domain is shown where noise alone would look like it less often than this."""
@@ -266,7 +265,7 @@ def means_along(values: Array, residual: Array, spread_log: bool = False) -> tup
     return np.array([values[p].mean() for p in parts]), np.array([residual[p].mean() for p in parts])
 
 
-def continued(time: Array, record: NDArray[np.int64]) -> Array:
+def continued(time: Array, record: Index) -> Array:
     """`time` (n,) s from the start of the first recording, each recording going on where the one before it ended."""
     starts = np.flatnonzero(np.diff(record, prepend=-1))
     ends = np.r_[starts[1:], len(time)] - 1

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.report import Figure, KeyFigures, Section, Table, Text
 from hdopt.report.sections.words import listed
 from hdopt.report.theme import BLUE, GREY, VERMILLION, faded, figure
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
 
-Array = NDArray[np.float64]
 WAYS = {1.0: "forward", -1.0: "backward"}
 
 

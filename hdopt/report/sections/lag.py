@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.report import Figure, KeyFigures, Section
 from hdopt.report.sections.words import label
 from hdopt.report.theme import GREY, INK, PALETTE, VERMILLION, faded, figure
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 
 def lag_section(
-    theta: NDArray[np.float64],
-    lag_arcmin: NDArray[np.float64],
-    parts: Mapping[str, NDArray[np.float64]],
+    theta: Array,
+    lag_arcmin: Array,
+    parts: Mapping[str, Array],
     interference: float,
     *,
     key: str = "lag",
@@ -56,9 +56,7 @@ def lag_section(
     )
 
 
-def _lag(
-    theta: NDArray[np.float64], lag_arcmin: NDArray[np.float64], parts: Mapping[str, NDArray[np.float64]]
-) -> go.Figure:
+def _lag(theta: Array, lag_arcmin: Array, parts: Mapping[str, Array]) -> go.Figure:
     made = figure("Input angle [deg]", "Lag [arcmin]", height=360)
     turns = max(1, round((theta[-1] - theta[0]) / (2 * np.pi)))
     points = len(theta) // turns

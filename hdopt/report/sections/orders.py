@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.report import Figure, Section, Table, Text
 from hdopt.report.sections.words import listed
 from hdopt.report.theme import PALETTE, figure
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 
 def spectrum_section(
-    orders: NDArray[np.float64],
-    amplitude_arcmin: NDArray[np.float64],
+    orders: Array,
+    amplitude_arcmin: Array,
     expressions: Sequence[str],
     origins: Sequence[str],
     ratio: float,
@@ -67,8 +67,8 @@ def spectrum_section(
 
 
 def _stems(
-    orders: NDArray[np.float64],
-    amplitude_arcmin: NDArray[np.float64],
+    orders: Array,
+    amplitude_arcmin: Array,
     expressions: Sequence[str],
     origins: Sequence[str],
     kinds: Sequence[str],

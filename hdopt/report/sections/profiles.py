@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.report import Figure, Section, Table
 from hdopt.report.sections.words import label
 from hdopt.report.theme import DIVERGING, GREY, INK, PALETTE, figure
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
 
-Curves = Mapping[str, NDArray[np.float64]]
+Curves = Mapping[str, Array]
 
 EXAGGERATED = 0.28
 """Largest deflection as drawn, as a share of the radius."""
 
 
 def profiles_section(
-    phi: NDArray[np.float64],
+    phi: Array,
     deflection_mm: Curves,
     curvature_change_per_mm: Curves,
     undeformed_radius_mm: float,
@@ -92,7 +92,7 @@ def _comparison(peaks: Mapping[str, float]) -> str:
     )
 
 
-def _rings(phi: NDArray[np.float64], deflection_mm: Curves, change: Curves, radius: float, times: float) -> go.Figure:
+def _rings(phi: Array, deflection_mm: Curves, change: Curves, radius: float, times: float) -> go.Figure:
     """One ring a profile, coloured by its curvature change, the free ring behind it; the major axis points up."""
     reach = max(float(np.abs(values).max()) for values in change.values())
     extent = radius * (1 + EXAGGERATED) * 1.08
@@ -165,7 +165,7 @@ def _colours(reach: float, shown: bool) -> dict[str, Any]:
     }
 
 
-def _along(phi: NDArray[np.float64], curves: Curves, title: str, number: str, first_colour: int = 0) -> go.Figure:
+def _along(phi: Array, curves: Curves, title: str, number: str, first_colour: int = 0) -> go.Figure:
     made = figure("Angle from the major axis [deg]", title, height=340)
     for colour, (name, values) in zip(PALETTE[first_colour:], curves.items(), strict=False):
         made.add_scatter(

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.report import Figure, Section, Table
 from hdopt.report.sections.words import label
 from hdopt.report.theme import BLUE, INK, ORANGE, PALETTE, figure
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def structures_section(
     frame: pd.DataFrame,
     *,
-    waveforms: tuple[NDArray[np.float64], Mapping[str, NDArray[np.float64]]] | None = None,
+    waveforms: tuple[Array, Mapping[str, Array]] | None = None,
     requirement_arcmin: float | None = None,
     key: str = "structures",
 ) -> Section:
@@ -101,7 +101,7 @@ def _bars(frame: pd.DataFrame, requirement_arcmin: float | None) -> go.Figure:
     return made
 
 
-def _waveforms(theta: NDArray[np.float64], waveforms: Mapping[str, NDArray[np.float64]]) -> go.Figure:
+def _waveforms(theta: Array, waveforms: Mapping[str, Array]) -> go.Figure:
     made = figure("Input angle [deg]", "Kinematic error [arcmin]", height=360)
     # A one-way type often runs exactly over one of the first two: dashes let what lies below be seen.
     styles = itertools.cycle([("solid", 3.5), ("solid", 3.5), ("5px,5px", 2), ("5px,5px", 2)])

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.report import Figure, KeyFigures, Section
 from hdopt.report.theme import BLUE, DIVERGING, GREY, INK, VERMILLION, faded, figure
 
@@ -20,8 +20,8 @@ HOVER = "%{x:.1f} deg: %{y:.3f} arcmin"
 
 
 def waveform_section(
-    theta: NDArray[np.float64],
-    ke_arcmin: NDArray[np.float64],
+    theta: Array,
+    ke_arcmin: Array,
     *,
     peak_to_peak_arcmin: float | None = None,
     requirement_arcmin: float | None = None,
@@ -77,15 +77,13 @@ def waveform_section(
     )
 
 
-def _whole_turns(theta: NDArray[np.float64]) -> int:
+def _whole_turns(theta: Array) -> int:
     """Whole turns in a record, whose last angle may be the end of a turn or the last sample before it."""
     step = (theta[-1] - theta[0]) / (len(theta) - 1)
     return max(1, math.floor((theta[-1] - theta[0] + 1.001 * step) / (2 * math.pi)))
 
 
-def _extremes_by_turn(
-    theta: NDArray[np.float64], ke_arcmin: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _extremes_by_turn(theta: Array, ke_arcmin: Array) -> tuple[Array, Array]:
     """Smallest and largest error in each whole turn, of the points given: each of shape (turns,)."""
     turns = _whole_turns(theta)
     starts = np.searchsorted(theta, theta[0] + 2 * math.pi * np.arange(turns) - 1e-9)
@@ -93,7 +91,7 @@ def _extremes_by_turn(
     return np.minimum.reduceat(within, starts), np.maximum.reduceat(within, starts)
 
 
-def _by_turn(theta: NDArray[np.float64], ke_arcmin: NDArray[np.float64]) -> NDArray[np.float64]:
+def _by_turn(theta: Array, ke_arcmin: Array) -> Array:
     """The error on an even grid, one row a whole turn: shape (turns, POINTS_PER_TURN + 1)."""
     turns = _whole_turns(theta)
     grid = np.linspace(0, 2 * math.pi, POINTS_PER_TURN + 1)
@@ -103,7 +101,7 @@ def _by_turn(theta: NDArray[np.float64], ke_arcmin: NDArray[np.float64]) -> NDAr
     return np.interp(theta[0] + 2 * math.pi * np.arange(turns)[:, None] + grid, theta, ke_arcmin)
 
 
-def _beat(theta: NDArray[np.float64], ke_arcmin: NDArray[np.float64], peak_to_peak: float) -> go.Figure:
+def _beat(theta: Array, ke_arcmin: Array, peak_to_peak: float) -> go.Figure:
     low, high = _extremes_by_turn(theta, ke_arcmin)
     middle = np.arange(len(low)) + 0.5
     step = max(1, len(theta) // (len(low) * BEAT_POINTS_PER_TURN))
@@ -146,7 +144,7 @@ def _beat(theta: NDArray[np.float64], ke_arcmin: NDArray[np.float64], peak_to_pe
     return made
 
 
-def _one_turn(turns: NDArray[np.float64], by_turn: NDArray[np.float64]) -> go.Figure:
+def _one_turn(turns: Array, by_turn: Array) -> go.Figure:
     angle = np.linspace(0, 360, turns.shape[1])
     made = figure("Input angle [deg]", "Kinematic error [arcmin]", height=400)
     made.add_scatter(
@@ -170,7 +168,7 @@ def _one_turn(turns: NDArray[np.float64], by_turn: NDArray[np.float64]) -> go.Fi
     return made
 
 
-def _carpet(turns: NDArray[np.float64]) -> go.Figure:
+def _carpet(turns: Array) -> go.Figure:
     made = figure("Input angle [deg]", "Input turn", height=440)
     made.add_heatmap(
         x=np.linspace(0, 360, turns.shape[1]),

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from hdopt.arrays import Array
 from hdopt.drive.errors import AMPLITUDE_NAMES, ERROR_NAMES, PHASE_OF, DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics import peak_to_peak_arcmin
@@ -79,9 +79,7 @@ def design_map(study: Study, context: Context) -> StepResult:
     return StepResult((section,), results)
 
 
-def map_arcmin(
-    drive: Drive, errors: DriveErrors, angles_deg: NDArray[np.float64], widths: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def map_arcmin(drive: Drive, errors: DriveErrors, angles_deg: Array, widths: Array) -> Array:
     """Converged peak-to-peak of `drive` with `errors` at each of `angles_deg`, pressure angles (m,), and of `widths`,
     mm (n,): arcmin, shape (m, n)."""
     return np.array(

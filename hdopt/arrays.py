@@ -1,0 +1,17 @@
+"""The names of array types that signatures use: what an array holds, in one word."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+"""Numbers in double precision."""
+
+Index: TypeAlias = NDArray[np.int64]
+"""Whole numbers: counts and places in other arrays."""
+
+Mask: TypeAlias = NDArray[np.bool_]
+"""True or false for each element, such as which rows count."""
