@@ -19,7 +19,7 @@ from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
-from hdopt.kinematics.kernel import motion_at, rigid_motion, rim_constants, rim_depth, tooth_deviation
+from hdopt.kinematics.compiled_closed_form import motion_at, rigid_motion, rim_constants, rim_depth, tooth_deviation
 
 CARTESIAN_NAMES = (
     "axis eccentricity x",

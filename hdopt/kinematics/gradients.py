@@ -24,7 +24,7 @@ from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
-from hdopt.kinematics.kernel import motion_at, rigid_motion, rim_constants, rim_depth, tooth_deviation
+from hdopt.kinematics.compiled_closed_form import motion_at, motion_of_row, rim_constants, rim_depth, tooth_deviation
 from hdopt.parallel.shared_memory import in_parts
 
 HIGHS, LOWS = 4, 8
@@ -341,18 +341,7 @@ def _extremes(tip, tan_alpha, rows, highs, high_slopes, lows, low_slopes):
     work = np.empty((3, 3, 6))
     for i in range(rows.shape[0]):
         row = rows[i]
-        motion = rigid_motion(
-            tip,
-            row[0] * math.sin(row[1]),
-            row[0] * math.cos(row[1]),
-            math.tan(row[3]),
-            math.tan(row[2]),
-            row[4] * math.cos(row[5]),
-            row[4] * math.sin(row[5]),
-            math.tan(row[6]),
-            math.tan(row[7]),
-        )
-        cs_cos, cs_sin = row[8] * math.sin(row[9]), row[8] * math.cos(row[9])
+        motion, cs_cos, cs_sin = motion_of_row(tip, row)
         _maxima(tip, motion, cs_cos, cs_sin, tan_alpha, row[10], work, highs[i], high_slopes[i])
         _minima(tip, motion, cs_cos, cs_sin, tan_alpha, row[10], work, lows[i], low_slopes[i])
 

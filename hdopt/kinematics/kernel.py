@@ -20,19 +20,16 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from hdopt.kinematics import closed_form
-
-# Division by zero gives an infinity that the comparisons below expect; sums keep their order, so that results do not
-# depend on how the compiler vectorizes.
-OPTIONS = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "afn"}}
-inlined = njit(inline="always", **OPTIONS)
-compiled = njit(**OPTIONS)
-
-rigid_motion = inlined(closed_form.rigid_motion)
-rim_constants = inlined(closed_form.rim_constants)
-motion_at = inlined(closed_form.motion_at)
-rim_depth = inlined(closed_form.rim_depth)
-tooth_deviation = inlined(closed_form.tooth_deviation)
+from hdopt.kinematics.compiled_closed_form import (
+    OPTIONS,
+    compiled,
+    inlined,
+    motion_at,
+    rigid_motion,
+    rim_constants,
+    rim_depth,
+    tooth_deviation,
+)
 
 REACH = 0.12
 """How far, in rad, an extreme may lie from its first-order place."""

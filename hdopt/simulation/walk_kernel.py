@@ -12,17 +12,16 @@ import math
 import numpy as np
 from numba import njit
 
-from hdopt.kinematics import closed_form
-
-OPTIONS = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "afn"}}
-inlined = njit(inline="always", **OPTIONS)
-compiled = njit(**OPTIONS)
-
-rigid_motion = inlined(closed_form.rigid_motion)
-rim_constants = inlined(closed_form.rim_constants)
-motion_at = inlined(closed_form.motion_at)
-rim_depth = inlined(closed_form.rim_depth)
-tooth_deviation = inlined(closed_form.tooth_deviation)
+from hdopt.kinematics.compiled_closed_form import (
+    OPTIONS,
+    compiled,
+    inlined,
+    motion_at,
+    motion_of_row,
+    rim_constants,
+    rim_depth,
+    tooth_deviation,
+)
 
 CANDIDATES = 40
 """Local extremes of the grid that are followed, on either side."""
@@ -252,18 +251,7 @@ def _walk(drive, per_turn, turns, zones, beside, grid, values):
 @compiled
 def _drive_of(tip, tan_alpha, advance, turns, scale, e):
     """All that the kinematic error at one angle needs; `e` (12) holds the errors as in ERROR_NAMES."""
-    motion = rigid_motion(
-        tip,
-        e[0] * math.sin(e[1]),
-        e[0] * math.cos(e[1]),
-        math.tan(e[3]),
-        math.tan(e[2]),
-        e[4] * math.cos(e[5]),
-        e[4] * math.sin(e[5]),
-        math.tan(e[6]),
-        math.tan(e[7]),
-    )
-    cs_cos, cs_sin = e[8] * math.sin(e[9]), e[8] * math.cos(e[9])
+    motion, cs_cos, cs_sin = motion_of_row(tip, e)
     return (rim_constants(tip), motion, cs_cos, cs_sin, tan_alpha, e[10], e[11], advance, scale, 2 * math.pi * turns)
 
 

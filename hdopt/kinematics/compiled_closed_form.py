@@ -1,0 +1,46 @@
+"""The closed form as compiled kernels call it: inlined, so that the code around it decides about rounding."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from numba import njit
+
+from hdopt.arrays import Array
+from hdopt.kinematics import closed_form
+from hdopt.kinematics.closed_form import RigidMotion, TipGeometry
+
+# Division by zero gives an infinity that the kernels' comparisons expect; sums keep their order, so that results do not
+# depend on how the compiler vectorizes.
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "afn"}}
+inlined = njit(inline="always", **OPTIONS)
+compiled = njit(**OPTIONS)
+
+rigid_motion = inlined(closed_form.rigid_motion)
+rim_constants = inlined(closed_form.rim_constants)
+motion_at = inlined(closed_form.motion_at)
+rim_depth = inlined(closed_form.rim_depth)
+tooth_deviation = inlined(closed_form.tooth_deviation)
+
+
+def _motion_of_row(tip: TipGeometry, row: Array) -> tuple[RigidMotion, float, float]:
+    """The rigid motion of one drive, and the cosine and sine part (mm of arc) of its CS tooth term.
+
+    `tip` has the wave generator's constants, `row` (12,) the errors in the order of ERROR_NAMES, mm and rad.
+    """
+    motion = rigid_motion(
+        tip,
+        row[0] * math.sin(row[1]),
+        row[0] * math.cos(row[1]),
+        math.tan(row[3]),
+        math.tan(row[2]),
+        row[4] * math.cos(row[5]),
+        row[4] * math.sin(row[5]),
+        math.tan(row[6]),
+        math.tan(row[7]),
+    )
+    return motion, row[8] * math.sin(row[9]), row[8] * math.cos(row[9])
+
+
+motion_of_row = inlined(_motion_of_row)
