@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import special
@@ -56,8 +56,9 @@ class Convergence:
 
 
 @dataclass(frozen=True)
-class Sobol:
-    """Sobol' indices of a response: by input, by group, and of pairs (`second`)."""
+class SampledResponse:
+    """What indices were taken from: `n` base points by `seed`, `evaluations` responses, their `mean` and `std` in
+    `unit`."""
 
     n: int
     evaluations: int
@@ -65,6 +66,22 @@ class Sobol:
     unit: str
     mean: float
     std: float
+
+    def sample_facts(self) -> dict[str, Any]:
+        """These facts as JSON has them, before the indices."""
+        return {
+            "n": self.n,
+            "evaluations": self.evaluations,
+            "seed": self.seed,
+            f"mean_{self.unit}": self.mean,
+            f"std_{self.unit}": self.std,
+        }
+
+
+@dataclass(frozen=True)
+class Sobol(SampledResponse):
+    """Sobol' indices of a response: by input, by group, and of pairs (`second`)."""
+
     inputs: dict[str, Index]
     groups: dict[str, Index]
     second: dict[tuple[str, str], IntervalEstimate]
@@ -74,11 +91,7 @@ class Sobol:
 
     def to_dict(self) -> dict:
         return {
-            "n": self.n,
-            "evaluations": self.evaluations,
-            "seed": self.seed,
-            f"mean_{self.unit}": self.mean,
-            f"std_{self.unit}": self.std,
+            **self.sample_facts(),
             "inputs": {name: index.to_dict() for name, index in self.inputs.items()},
             "groups": {name: index.to_dict() for name, index in self.groups.items()},
             "second_order": [{"inputs": list(pair), **estimate.to_dict()} for pair, estimate in self.second.items()],
@@ -259,29 +272,19 @@ def second_order_indices(y_a: Array, y_b: Array, y_ab: Array, y_ba: Array) -> Ar
 
 
 @dataclass(frozen=True)
-class Shapley:
+class Shapley(SampledResponse):
     """Shapley effects of the players (inputs or groups): shares of the variance that sum to 1, correlated or not.
 
     `indices` hold each player's S1 (variance of the mean given it) and ST (variance left when all others are known).
     """
 
-    n: int
-    evaluations: int
-    seed: int
-    unit: str
-    mean: float
-    std: float
     effects: dict[str, IntervalEstimate]
     indices: dict[str, Index]
     interval: str = ""
 
     def to_dict(self) -> dict:
         return {
-            "n": self.n,
-            "evaluations": self.evaluations,
-            "seed": self.seed,
-            f"mean_{self.unit}": self.mean,
-            f"std_{self.unit}": self.std,
+            **self.sample_facts(),
             "shapley": {name: effect.to_dict() for name, effect in self.effects.items()},
             "inputs": {name: index.to_dict() for name, index in self.indices.items()},
             "interval": self.interval,
