@@ -56,7 +56,11 @@ def curvature(profile: WaveGeneratorProfile, phi: ArrayLike) -> Array:
 
 
 def polar_curvature(r: Array, r1: Array, r2: Array) -> Array:
-    """Curvature of a polar curve from its radius and the radius' first two derivatives, 1/mm."""
+    """Curvature of a polar curve, 1/mm: (r^2 + 2 r'^2 - r r'')/(r^2 + r'^2)^1.5.
+
+    `r` is the radius, mm, `r1` (mm/rad) and `r2` (mm/rad^2) its derivatives over the angle; all of one shape. Above
+    zero where the curve bends around the centre; 1/r for a circle.
+    """
     return (r**2 + 2 * r1**2 - r * r2) / (r**2 + r1**2) ** 1.5
 
 
@@ -66,7 +70,10 @@ def tip_radius_of_curvature(profile: WaveGeneratorProfile) -> float:
 
 
 def perimeter_error(profile: WaveGeneratorProfile, flexspline_inner_radius: float) -> float:
-    """Perimeter less that of the undeformed FS inner wall, mm: above zero, the profile stretches the flexspline."""
+    """Perimeter of `profile` less that of the undeformed FS inner wall of `flexspline_inner_radius`, mm.
+
+    Above zero, the profile stretches the flexspline.
+    """
     return profile.perimeter() - 2 * math.pi * flexspline_inner_radius
 
 

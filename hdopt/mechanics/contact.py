@@ -19,20 +19,22 @@ from hdopt.errors import HdoptError, MissingValue
 def tip_overlap(geometry: DriveGeometry, profile: WaveGeneratorProfile, phi: ArrayLike) -> Array:
     """Radial overlap of FS tip curve and CS tip circle at angles `phi` (rad, from the major axis), mm; same shape.
 
-    FS tip: pitch radius m Z_FS/2, plus the deflection w(phi) of the profile, plus h_aF, radially. CS tip circle:
-    m Z_CS/2 - h_aC. Above zero the tips overlap. Jia 2021, Sec. 3 (physics of Table 4).
+    FS tip: pitch radius m Z_FS/2, plus the deflection w(phi) that `profile` gives the inner wall, plus h_aF, radially.
+    CS tip circle: m Z_CS/2 - h_aC; all sizes of `geometry`. Above zero the tips overlap. Jia 2021, Sec. 3 (physics of
+    Table 4). Raises `MissingValue` where an addendum is not given.
     """
-    _need_addenda(geometry)
+    flexspline_addendum, circular_spline_addendum = _addenda(geometry)
     deflection = profile.radius(phi) - geometry.flexspline_inner_radius
-    flexspline_tip = geometry.module * geometry.flexspline_teeth / 2 + deflection + geometry.flexspline_addendum
-    return flexspline_tip - (geometry.module * geometry.circular_spline_teeth / 2 - geometry.circular_spline_addendum)
+    flexspline_tip = geometry.module * geometry.flexspline_teeth / 2 + deflection + flexspline_addendum
+    return flexspline_tip - (geometry.module * geometry.circular_spline_teeth / 2 - circular_spline_addendum)
 
 
 def contact_angle(geometry: DriveGeometry, profile: WaveGeneratorProfile) -> float:
     """Half angle from the major axis to where the tips cease to overlap, rad (Jia 2021, Table 4).
 
-    Reproduces the published Resal and two-disk values within 0.03 deg. Raises `HdoptError` where the tips never
-    overlap, or overlap all round (the teeth would not clear each other on the minor axis).
+    The tips are those of `geometry`, the flexspline deflected by `profile` as in `tip_overlap`. Reproduces the
+    published Resal and two-disk values within 0.03 deg. Raises `HdoptError` where the tips never overlap, or overlap
+    all round (the teeth would not clear each other on the minor axis).
     """
     from scipy.optimize import brentq
 
@@ -51,14 +53,18 @@ def contact_angle(geometry: DriveGeometry, profile: WaveGeneratorProfile) -> flo
 
 
 def meshing_teeth(geometry: DriveGeometry, angle: float) -> float:
-    """Z_mp = Z_CS (contact angle)/(2 pi): teeth in mesh in one zone, one side counted, as Jia 2021, Eq. (13) does."""
+    """Z_mp = Z_CS angle/(2 pi): teeth in mesh in one zone, one side counted, as Jia 2021, Eq. (13) does.
+
+    Z_CS of `geometry`; `angle` is the half angle of contact, rad.
+    """
     return geometry.circular_spline_teeth * angle / (2 * math.pi)
 
 
 def homogenization_coefficient(teeth_in_mesh: float, base: float = 1.0) -> float:
     """k_e = k_B/sqrt(Z_mp): how far many teeth in mesh even out the error of one (Jia 2021, Eq. (13)).
 
-    `base` is k_B, 0.8 to 1.0. The square root is lost in common copies of the paper; it reproduces Table 4.
+    `teeth_in_mesh` is Z_mp, as `meshing_teeth` counts it; `base` is k_B, 0.8 to 1.0 (`HdoptError` outside). The square
+    root is lost in common copies of the paper; it reproduces Table 4.
     """
     if not 0.8 <= base <= 1.0:
         raise HdoptError(f"k_B is {base!r}; Jia 2021, Eq. (13) gives 0.8 to 1.0")
@@ -71,7 +77,8 @@ def mean_flank_pressure(drive: Drive, torque: float | None = None) -> float:
     The wear check of Shen and Ye, "Theory and design of harmonic gear drives" (1985): p = 2 T/(d b h z), load over
     engaged area, with pitch diameter d = m Z_FS, tooth face width b, and h z the summed depth of all engaged teeth,
     here the tip overlap summed over the approaching flank of both zones. Load and area are both per cos(alpha), which
-    cancels. Valid while all overlapped teeth share the load, a lower bound of the true pressure; load factor 1.
+    cancels. Valid while all overlapped teeth of the `drive` share the load, a lower bound of the true pressure; load
+    factor 1. Raises `MissingValue` where torque, face width or an addendum is not given.
     """
     geometry, load = drive.geometry, drive.load
     torque = load.torque if torque is None else torque
@@ -88,11 +95,10 @@ def mean_flank_pressure(drive: Drive, torque: float | None = None) -> float:
     return 2 * torque / (geometry.module * geometry.flexspline_teeth * load.tooth_face_width * summed_depth)
 
 
-def _need_addenda(geometry: DriveGeometry) -> None:
-    missing = [
-        f"drive.{name}_mm"
-        for name in ("flexspline_addendum", "circular_spline_addendum")
-        if getattr(geometry, name) is None
-    ]
-    if missing:
-        raise MissingValue("the contact angle", *missing)
+def _addenda(geometry: DriveGeometry) -> tuple[float, float]:
+    """Addenda of flexspline and circular spline, mm."""
+    flexspline, circular_spline = geometry.flexspline_addendum, geometry.circular_spline_addendum
+    if flexspline is None or circular_spline is None:
+        given = {"drive.flexspline_addendum_mm": flexspline, "drive.circular_spline_addendum_mm": circular_spline}
+        raise MissingValue("the contact angle", *(key for key, value in given.items() if value is None))
+    return flexspline, circular_spline

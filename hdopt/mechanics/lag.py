@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,7 +33,7 @@ class Lag:
     def interference(self) -> float:
         return float(np.mean(self.backlash_arcmin < 0))
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, Any]:
         """Mean, least and greatest lag, arcmin, and the same of each part."""
         parts = {"cross_slide": self.cross_slide_arcmin, "backlash": self.backlash_arcmin}
         return {
@@ -47,27 +48,20 @@ def _range(values: Array) -> dict[str, float]:
 
 
 def cross_slide_lag_arcmin(drive: Drive, errors: DriveErrors, theta: ArrayLike) -> Array:
-    """Output lag from the clearance e_b in the slots of the cross-slide, arcmin, at `theta` (rad).
+    """Output lag from the clearance e_b in the slots of the cross-slide, arcmin, at input angles `theta` (rad).
 
     Jia 2021, Eq. (33): e_b/(N r_i) for each slot i, with
     r_1 = sqrt((sqrt(R_w^2 - b1^2/4) + |e3 cos(beta - theta)|)^2 + b1^2/4), r_2 with b2 and the sine. The offset e3
-    between input axis and wave generator is the vector sum of both eccentricities. A one-way structure has the lag
-    of its one slot (r_1 for the major type, r_2 for the minor: assumed, the paper does not say); an integral one none.
+    between input axis and wave generator is the vector sum of both eccentricities of `errors` (one drive's). e_b, b1,
+    b2 and R_w are the `drive`'s clearances; `MissingValue` where its structure needs one that is not given. A one-way
+    structure has the lag of its one slot (r_1 for the major type, r_2 for the minor: assumed, the paper does not say);
+    an integral one none.
     """
     theta = np.asarray(theta, float)
-    slots = drive.wave_generator.structure.slots
     lag = np.zeros_like(theta)
-    if not slots:
+    slots = _cross_slide(drive)
+    if slots is None:
         return lag
-    clear = drive.clearances
-    names = {
-        "cross_slide": "clearances.cross_slide_clearance_mm",
-        "disc_radius": "clearances.disc_radius_mm",
-        **{f"slot_{slot}_width": f"clearances.slot_{slot}_width_mm" for slot in slots},
-    }
-    missing = [key for name, key in names.items() if getattr(clear, name) is None]
-    if missing:
-        raise MissingValue(f"the lag of the {drive.wave_generator.structure.value} structure", *missing)
     turned = errors.axis_eccentricity_direction - theta
     along = {
         1: errors.axis_eccentricity * np.cos(turned)
@@ -75,18 +69,47 @@ def cross_slide_lag_arcmin(drive: Drive, errors: DriveErrors, theta: ArrayLike) 
         2: errors.axis_eccentricity * np.sin(turned)
         + errors.wg_eccentricity * np.sin(errors.wg_eccentricity_direction),
     }
-    for slot in slots:
-        half_width = getattr(clear, f"slot_{slot}_width") / 2
-        reach = np.sqrt(clear.disc_radius**2 - half_width**2) + np.abs(along[slot])
-        lag = lag + clear.cross_slide / (drive.geometry.ratio * np.hypot(reach, half_width))
+    for slot, width in slots.widths.items():
+        half_width = width / 2
+        reach = np.sqrt(slots.disc_radius**2 - half_width**2) + np.abs(along[slot])
+        lag = lag + slots.clearance / (drive.geometry.ratio * np.hypot(reach, half_width))
     return lag / ARCMIN
+
+
+@dataclass(frozen=True)
+class _CrossSlide:
+    """The slots that have play, all given: clearance e_b, disc radius R_w and width of each slot by its number, mm."""
+
+    clearance: float
+    disc_radius: float
+    widths: dict[int, float]
+
+
+def _cross_slide(drive: Drive) -> _CrossSlide | None:
+    """The cross-slide of the drive's structure; None where that has no slots with play."""
+    structure, clear = drive.wave_generator.structure, drive.clearances
+    if not structure.slots:
+        return None
+    widths = {1: clear.slot_1_width, 2: clear.slot_2_width}
+    given = {
+        "clearances.cross_slide_clearance_mm": clear.cross_slide,
+        "clearances.disc_radius_mm": clear.disc_radius,
+        **{f"clearances.slot_{slot}_width_mm": widths[slot] for slot in structure.slots},
+    }
+    values = [value for value in given.values() if value is not None]
+    if len(values) < len(given):
+        missing = (key for key, value in given.items() if value is None)
+        raise MissingValue(f"the lag of the {structure.value} structure", *missing)
+    clearance, disc_radius, *slot_widths = values
+    return _CrossSlide(clearance, disc_radius, dict(zip(structure.slots, slot_widths, strict=True)))
 
 
 def backlash_lag_arcmin(drive: Drive, kinematic_error: ArrayLike) -> Array:
     """Output lag from the backlash e_t less the driving zone's deviation tau, arcmin (Jia 2021, Eqs. (34), (35)).
 
-    2 pi (e_t - tau)/l_FS, where 2 pi tau/l_FS is the `kinematic_error` of a single tooth pair (arcmin, k_e = 1).
-    Negative where tau exceeds e_t: interference, not clipped.
+    2 pi (e_t - tau)/l_FS, where 2 pi tau/l_FS is the `kinematic_error` of a single tooth pair (arcmin, k_e = 1); e_t
+    and l_FS are the `drive`'s. Negative where tau exceeds e_t: interference, not clipped. Raises `MissingValue` where
+    the drive has no backlash.
     """
     if drive.clearances.backlash is None:
         raise MissingValue("the lag", "clearances.backlash_mm")
@@ -94,6 +117,9 @@ def backlash_lag_arcmin(drive: Drive, kinematic_error: ArrayLike) -> Array:
 
 
 def lag(drive: Drive, errors: DriveErrors, theta: ArrayLike, kinematic_error: ArrayLike) -> Lag:
-    """Lag of one drive at reversal over input angles `theta`, rad, shape (n,), where its `kinematic_error` (arcmin,
-    k_e = 1, same shape) is known: the sum of the cross-slide's part and the tooth backlash's."""
+    """Lag of one `drive` with its `errors` at reversal over input angles `theta`, rad, shape (n,).
+
+    Its `kinematic_error` there (arcmin, k_e = 1, same shape) is known. The lag is the sum of the cross-slide's part and
+    the tooth backlash's; both raise `MissingValue` for a clearance that they need.
+    """
     return Lag(cross_slide_lag_arcmin(drive, errors, theta), backlash_lag_arcmin(drive, kinematic_error))

@@ -22,12 +22,13 @@ from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.drive.profiles import WaveGeneratorProfile, polar_curvature
 from hdopt.errors import HdoptError, MissingValue
+from hdopt.mechanics.bending import ring_wall
 from hdopt.mechanics.contact import contact_angle
 
 GRID = np.linspace(0.0, math.pi / 2, 91)
 """Where a profile is sampled with two derivatives: quintics between 1 deg steps keep 1e-13 mm of smooth profiles, and
 3e-9 mm where the two-disk profile's third derivative jumps."""
-CELL = GRID[1]
+CELL = float(GRID[1])
 NEWTON_STEPS = 12
 
 
@@ -109,19 +110,18 @@ class Mesh:
     def largest_curvature_change(self) -> float:
         """As `hdopt.mechanics.bending.max_curvature_change`, from `GRID` and the end of the wrap, where its kink is."""
         gear = self.geometry
-        if gear.flexspline_wall is None:
-            raise MissingValue("bending of the ring", "drive.flexspline_wall_mm")
-        neutral = gear.flexspline_inner_radius + gear.flexspline_wall / 2
+        half_wall = ring_wall(gear) / 2
+        neutral = gear.flexspline_inner_radius + half_wall
         w, slope, bend = self._sampled[:3]
         change = np.abs(polar_curvature(neutral + w, slope, bend) - 1 / neutral)
         wrap = getattr(self.profile, "wrap_angle", 0.0)
         radius, first, second = (self.profile.radius(wrap, derivative) for derivative in range(3))
-        kink = abs(float(polar_curvature(radius + gear.flexspline_wall / 2, first, second)) - 1 / neutral)
+        kink = abs(float(polar_curvature(radius + half_wall, first, second)) - 1 / neutral)
         return max(_peak(change), kink)
 
 
 @njit(cache=True)
-def _integrate(rows):
+def _integrate(rows: Array) -> None:
     """Fill row 3 with the integral of the quintics through rows 0 to 2."""
     h = CELL
     rows[3, 0] = 0.0
@@ -133,7 +133,7 @@ def _integrate(rows):
 
 
 @njit(cache=True)
-def _at(rows, psi):
+def _at(rows: Array, psi: float) -> tuple[float, float, float]:
     """w, w' and the integral of w at an angle: the quintic that takes w, w', w'' at both ends of the cell."""
     h = CELL
     i = min(max(int(psi / h), 0), rows.shape[1] - 2)
@@ -150,7 +150,7 @@ def _at(rows, psi):
 
 
 @njit(cache=True)
-def _falls_to(rows, level):
+def _falls_to(rows: Array, level: float) -> float:
     """Angle at which w first falls to `level`; NaN where it starts below, or never gets there."""
     if rows[0, 0] <= level:
         return math.nan
@@ -168,7 +168,8 @@ def _falls_to(rows, level):
 
 
 @njit(cache=True)
-def _free_angle(rows, module, tan_alpha, play):
+def _free_angle(rows: Array, module: float, tan_alpha: float, play: float) -> float:
+    """The angle of `Mesh.free_flank_angle`; `play` is half the backlash, mm."""
     for i in range(1, rows.shape[1]):
         shift = module * i * CELL - rows[3, i]
         if play + (rows[0, 0] - rows[0, i]) * tan_alpha - shift < 0:
@@ -186,7 +187,7 @@ def _free_angle(rows, module, tan_alpha, play):
 
 
 @njit(cache=True)
-def _least_trailing(rows, module, tan_alpha):
+def _least_trailing(rows: Array, module: float, tan_alpha: float) -> float:
     """Least of d tan(alpha) + t; 0 at the major axis itself."""
     least, at = 0.0, 0
     for i in range(1, rows.shape[1]):
@@ -205,14 +206,15 @@ def _least_trailing(rows, module, tan_alpha):
         else:
             high = psi
     w, slope, integral = _at(rows, high)
-    return min(least, (rows[0, 0] - w) * tan_alpha + module * high - integral)
+    last: float = (rows[0, 0] - w) * tan_alpha + module * high - integral
+    return min(least, last)
 
 
 @njit(cache=True)
-def _peak(values):
+def _peak(values: Array) -> float:
     """Largest of equally spaced values, and of the parabola through it and its neighbours."""
     at = int(np.argmax(values))
-    best = values[at]
+    best: float = values[at]
     if 0 < at < len(values) - 1:
         before, after = values[at - 1], values[at + 1]
         bend = before - 2 * best + after

@@ -52,7 +52,7 @@ class _LinearAlgebra:
     def hold(self) -> None:
         with self.lock:
             if not self.holders:
-                from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+                from threadpoolctl import threadpool_limits
 
                 self.limit = threadpool_limits(1, user_api="blas")
             self.holders += 1

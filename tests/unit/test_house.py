@@ -18,10 +18,8 @@ KERNELS: dict[str, str] = {}
 UNDESCRIBED = {
     "allocation": 15,
     "bench": 53,
-    "drive": 2,
     "geometry": 79,
     "kinematics": 20,
-    "mechanics": 16,
     "optimize": 11,
     "report": 51,
     "simulation": 3,
