@@ -17,7 +17,8 @@ UPPER_PERCENTILE = 0.99865
 def ppk(limit: float, median: float, upper_reference: float) -> float:
     """(U - X50)/(X99.865 - X50) for an upper limit U (ISO 22514-2); infinite where nothing varies and U is kept.
 
-    Raises `HdoptError` where the percentiles are in the wrong order.
+    `limit` is U, `median` X50 and `upper_reference` X99.865, the percentiles of one sample; all in one unit. Raises
+    `HdoptError` where the percentiles are in the wrong order.
     """
     if upper_reference < median:
         raise HdoptError(f"X99.865 is {upper_reference:g}, below the median {median:g}; give percentiles of one sample")

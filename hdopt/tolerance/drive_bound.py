@@ -30,26 +30,13 @@ import math
 
 import numpy as np
 
-from hdopt.arrays import Array
-from hdopt.drive.errors import ERROR_NAMES, DriveErrors
+from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.drive.profiles import WaveGeneratorProfile
 from hdopt.kinematics.exact import ZONE_HALF_WIDTH
 
 CONTOUR_POINTS = 20_001
 """Places of the contour within a zone where its slope is looked at; between them the second derivative limits it."""
-
-
-def widest_errors(response, lower: Array, upper: Array) -> DriveErrors:
-    """The largest absolute value of every error over a box of inputs (directions mean nothing here).
-
-    `response` is a `DriveResponse`, `lower` and `upper` of shape (d,).
-    """
-    errors = {name: abs(float(getattr(response.held, name))) for name in ERROR_NAMES}
-    largest = np.maximum(np.abs(lower), np.abs(upper))
-    for feed in response.feeds:
-        feed.widest(largest, errors)
-    return DriveErrors(**{name: float(np.squeeze(value)) for name, value in errors.items()})
 
 
 def peak_to_peak_bound_arcmin(drive: Drive, widest: DriveErrors) -> float | None:

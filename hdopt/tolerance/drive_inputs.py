@@ -44,10 +44,15 @@ class Direct:
 
     def fill(self, inputs: Array, errors: dict[str, Array]) -> None:
         values = inputs[:, self.column]
-        errors[self.error] = values if study_key(self.error).endswith("_mm") else values * (math.pi / 180)
+        errors[self.error] = values if self._is_length else values * (math.pi / 180)
 
     def widest(self, largest: Array, errors: dict[str, float]) -> None:
-        self.fill(largest[None, :], errors)
+        value = float(largest[self.column])
+        errors[self.error] = value if self._is_length else value * (math.pi / 180)
+
+    @property
+    def _is_length(self) -> bool:
+        return study_key(self.error).endswith("_mm")
 
 
 @dataclass(frozen=True)
@@ -61,7 +66,7 @@ class VectorSum:
     terms: tuple[tuple[int, int, float], ...]
 
     def fill(self, inputs: Array, errors: dict[str, Array]) -> None:
-        along = across = 0.0
+        along, across = np.zeros(len(inputs)), np.zeros(len(inputs))
         for value, direction, factor in self.terms:
             angle = inputs[:, direction] * (math.pi / 180)
             along = along + factor * inputs[:, value] * np.cos(angle)
@@ -73,7 +78,7 @@ class VectorSum:
             errors[first], errors[second] = np.hypot(along, across), np.arctan2(across, along)
 
     def widest(self, largest: Array, errors: dict[str, float]) -> None:
-        length = sum(factor * largest[value] for value, _, factor in self.terms)
+        length = float(sum(factor * largest[value] for value, _, factor in self.terms))
         kind, first, second = VECTORS[self.vector]
         # the wave generator turns under an axis tilt, so only that tilt's length counts; its own tilt turns with it
         errors[first], errors[second] = length, length if kind == TILT and self.vector == "wg_tilt" else 0.0
@@ -100,12 +105,23 @@ class DriveResponse:
 
     def upper_bound(self, lower: Array, upper: Array) -> float | None:
         """A proven bound of the response over the box, None where there is no proof; see `drive_bound`."""
-        from hdopt.tolerance.drive_bound import peak_to_peak_bound_arcmin, widest_errors
+        from hdopt.tolerance.drive_bound import peak_to_peak_bound_arcmin
 
         if not self.drive.wave_generator.profile.tip_is_smooth:
             return None
-        bound = peak_to_peak_bound_arcmin(self.drive, widest_errors(self, lower, upper))
+        bound = peak_to_peak_bound_arcmin(self.drive, self.widest_errors(lower, upper))
         return None if bound is None else self.homogenization * bound
+
+    def widest_errors(self, lower: Array, upper: Array) -> DriveErrors:
+        """The largest absolute value of every error over the box of inputs between `lower` and `upper`, (d,) each.
+
+        Directions mean nothing here.
+        """
+        errors = {name: abs(float(value)) for name, value in self.held.by_name().items()}
+        largest = np.maximum(np.abs(lower), np.abs(upper))
+        for feed in self.feeds:
+            feed.widest(largest, errors)
+        return DriveErrors(**errors)
 
     def matrix(self, inputs: Array) -> Array:
         """The same as rows of `DriveErrors.to_matrix`, without making twelve columns of what does not vary."""
@@ -138,7 +154,10 @@ class DriveProblem:
 
 
 def tolerance_of(error: str, distribution: Distribution) -> Tolerance:
-    """The tolerance of one drive error: a magnitude's upper bound, a tilt's half range, none of a direction."""
+    """The tolerance of the drive error `error` (a name of `ERROR_NAMES`) that spreads as `distribution`.
+
+    A magnitude's is its upper bound, a tilt's its half range; a direction has none.
+    """
     if error in TURNING:
         return Tolerance(distribution, None)
     return Tolerance.of_deviation(distribution) if error in TILTS else Tolerance.of_magnitude(distribution)
@@ -153,13 +172,12 @@ def drive_problem(
     correlations: Sequence[CorrelationGroup] = (),
     homogenization: float = 1.0,
 ) -> DriveProblem:
-    """The stack of a drive from the distributions of its errors by study key (mm, deg) and of its callouts (mm).
+    """The stack of a `drive` from the distributions of its errors and of its callouts.
 
-    An error that callouts feed is theirs alone. A direction or phase that is not given is free over the full turn where
-    its magnitude varies; what is given nowhere keeps its value in `held`. `correlations` group inputs that vary
-    together, `homogenization` is k_e. Raises `HdoptError` for a key that is not an error, and for a magnitude that
-    could
-    be negative.
+    `tolerances` are by study key (mm, deg), those of `contributors` by callout (mm). An error that callouts feed is
+    theirs alone. A direction or phase that is not given is free over the full turn where its magnitude varies; what is
+    given nowhere keeps its value in `held`. `correlations` group inputs that vary together, `homogenization` is k_e.
+    Raises `HdoptError` for a key that is not an error, and for a magnitude that could be negative.
     """
     contributors = contributors or {}
     tolerances, freed = with_free_directions(tolerances)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -17,13 +17,20 @@ BINS = 2**18
 class Empirical(Protocol):
     """An empirical distribution of `n` values."""
 
-    n: int
+    @property
+    def n(self) -> int: ...
 
     def ranked(self, rank: int) -> float:
         """The value of this rank, counted from 1."""
 
     def at_most(self, x: float) -> int:
         """How many values are at most x."""
+
+    def histogram(self, bins: int) -> tuple[Array, Array]:
+        """Edges (bins + 1,) and counts (bins,) of equal bins over the range of the values."""
+
+    def joined(self, others: Sequence[Self]) -> Self:
+        """All values of this distribution and of `others`, which are of the same kind."""
 
 
 class Collector(Protocol):
@@ -54,9 +61,8 @@ class SortedValues:
         edges = np.linspace(self.values[0], self.values[-1], bins + 1)
         return edges, np.diff(np.searchsorted(self.values, edges), append=0)[:bins]
 
-    @staticmethod
-    def merged(parts: Sequence[SortedValues]) -> SortedValues:
-        return SortedValues(np.sort(np.concatenate([part.values for part in parts]), kind="stable"))
+    def joined(self, others: Sequence[SortedValues]) -> SortedValues:
+        return SortedValues(np.sort(np.concatenate([self.values, *(part.values for part in others)]), kind="stable"))
 
 
 @dataclass(frozen=True)
@@ -116,10 +122,10 @@ class BinnedValues:
         centres = self.bins.low + self.bins.width * (np.arange(self.bins.count) + 0.5)
         return edges, np.histogram(centres, edges, weights=self.counts)[0]
 
-    @staticmethod
-    def merged(parts: Sequence[BinnedValues]) -> BinnedValues:
+    def joined(self, others: Sequence[BinnedValues]) -> BinnedValues:
+        parts = [self, *others]
         return BinnedValues(
-            parts[0].bins,
+            self.bins,
             np.sum([part.counts for part in parts], axis=0),
             np.sort(np.concatenate([part.below for part in parts])),
             np.sort(np.concatenate([part.above for part in parts])),
@@ -163,6 +169,6 @@ class CountInBins:
 
 
 def merge(parts: Iterable[Empirical]) -> Empirical:
-    """All replicates' values together."""
-    parts = list(parts)
-    return type(parts[0]).merged(parts)
+    """The values of all `parts` together; they are of one kind and there is at least one."""
+    first, *others = parts
+    return first.joined(others)

@@ -4,11 +4,13 @@ statistics for independent points."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import special
+
+from hdopt.arrays import Array
 
 CONFIDENCE = 0.95
 
@@ -26,23 +28,30 @@ class IntervalEstimate:
     def to_dict(self) -> dict[str, float]:
         return {"value": self.value, "low": self.low, "high": self.high}
 
-    def map(self, function) -> IntervalEstimate:
-        """The estimate of a monotone function of the value."""
+    def map(self, function: Callable[[float], float]) -> IntervalEstimate:
+        """The estimate of `function` of the value, which must rise or fall throughout the interval."""
         low, high = sorted((function(self.low), function(self.high)))
         return IntervalEstimate(function(self.value), low, high, self.interval, self.confidence)
 
 
-def student_half_width(replicates: Sequence[float], confidence: float = CONFIDENCE) -> float:
-    """Half the width of the t-interval of the mean of independent, equally weighted estimates, shape (R,), R >= 2."""
+def student_half_width(replicates: Sequence[float] | Array, confidence: float = CONFIDENCE) -> float:
+    """Half the width of the t-interval of the mean of independent, equally weighted estimates.
+
+    `replicates` (R,), R >= 2, are the estimates; `confidence` is the probability that the two-sided interval holds the
+    true mean where they are normal.
+    """
     count = len(replicates)
     quantile = float(special.stdtrit(count - 1, 0.5 + confidence / 2))
     return quantile * float(np.std(replicates, ddof=1)) / math.sqrt(count)
 
 
 def over_scramblings(
-    replicates: Sequence[float], value: float | None = None, confidence: float = CONFIDENCE
+    replicates: Sequence[float] | Array, value: float | None = None, confidence: float = CONFIDENCE
 ) -> IntervalEstimate:
-    """t-interval over scramblings; `value` is the estimate of all points together where that differs from the mean."""
+    """t-interval over scramblings, from one estimate of each (`replicates`, shape (R,), R >= 2) at `confidence`.
+
+    `value` is the estimate of all points together where that differs from the mean; the interval lies about it.
+    """
     half = student_half_width(replicates, confidence)
     value = float(np.mean(replicates)) if value is None else value
     return IntervalEstimate(
@@ -51,7 +60,10 @@ def over_scramblings(
 
 
 def clopper_pearson(hits: int, n: int, confidence: float = CONFIDENCE) -> IntervalEstimate:
-    """Share of `hits` in `n` independent trials with its exact interval (Clopper and Pearson 1934)."""
+    """Share of `hits` in `n` independent trials (n >= 1) with its exact interval (Clopper and Pearson 1934).
+
+    Either side misses the true share with a probability of at most (1 - `confidence`)/2, whatever that share is.
+    """
     tail = (1 - confidence) / 2
     low = 0.0 if hits == 0 else float(special.betaincinv(hits, n - hits + 1, tail))
     high = 1.0 if hits == n else float(special.betaincinv(hits + 1, n - hits, 1 - tail))

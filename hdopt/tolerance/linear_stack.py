@@ -29,7 +29,8 @@ class LinearResponse:
 
     def signed(self, inputs: Array) -> Array:
         """The deviation with its sign: a straight line, which the size of it is not."""
-        return inputs @ np.array(self.sensitivities)
+        deviation: Array = inputs @ np.array(self.sensitivities)
+        return deviation
 
     def __call__(self, inputs: Array) -> Array:
         return np.abs(self.signed(inputs))

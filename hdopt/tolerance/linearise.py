@@ -51,7 +51,8 @@ class Linearisation:
 
 
 def linearise(response: Response, space: InputSpace, seed: int) -> Linearisation:
-    """The straight line about the mean magnitudes; costs (2 k + 1) x 4096 responses for k magnitudes.
+    """The straight line of `response` over `space` about the mean magnitudes, averaged over the directions that `seed`
+    draws; costs (2 k + 1) x 4096 responses for k magnitudes.
 
     Slopes are central differences over half a standard deviation to either side: small against the response's
     curvature, large against its kinks, which the average over directions has already smoothed.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -17,8 +17,33 @@ class Response(Protocol):
     def __call__(self, inputs: Array) -> Array: ...
 
 
+@runtime_checkable
+class Bounded(Protocol):
+    """A response that knows a bound which no point of a box exceeds."""
+
+    def upper_bound(self, lower: Array, upper: Array) -> float | None:
+        """The bound over the box between `lower` and `upper`, (d,) each; None where there is no proof."""
+
+
+@runtime_checkable
+class Signed(Protocol):
+    """A response that is the size of a signed one, which is the straighter of both."""
+
+    def signed(self, inputs: Array) -> Array:
+        """The same as the response, with its sign: inputs (n, d) in, shape (n,) out."""
+
+
+def proven_bound(response: Response, lower: Array, upper: Array) -> float | None:
+    """What `response` proves of itself over the box between `lower` and `upper`, (d,) each; None where it does not."""
+    return response.upper_bound(lower, upper) if isinstance(response, Bounded) else None
+
+
 def evaluate(response: Response, inputs: Array, names: Sequence[str], where: str) -> Array:
-    """`response(inputs)`; a value that is not finite is refused with the inputs that gave it."""
+    """`response(inputs)` for `inputs` (n, d), shape (n,).
+
+    A value that is not finite is refused with the inputs that gave it (`HdoptError`): `names` (d,) are theirs, and
+    `where` says in the message which sample it was.
+    """
     values = np.asarray(response(inputs), float)
     if values.shape != (len(inputs),):
         raise HdoptError(

@@ -26,9 +26,14 @@ SOBOL_BITS = 30
 class Sampling(Protocol):
     """A way to draw points: `replicates` independent streams, and whether the points of one are independent."""
 
-    name: str
-    replicates: int
-    independent_points: bool
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def replicates(self) -> int: ...
+
+    @property
+    def independent_points(self) -> bool: ...
 
     def blocks(self, seed: int, replicate: int, n: int, dimension: int, start: int = 0) -> Iterator[Array]:
         """Points `start` to `n` of one replicate in blocks of shape (at most BLOCK, dimension), inside (0, 1).

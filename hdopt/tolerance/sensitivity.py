@@ -40,7 +40,7 @@ class Index:
     S1: IntervalEstimate
     ST: IntervalEstimate
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, dict[str, float]]:
         return {"S1": self.S1.to_dict(), "ST": self.ST.to_dict()}
 
 
@@ -89,7 +89,7 @@ class Sobol(SampledResponse):
     interval: str = ""
     estimator: str = ""
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, Any]:
         return {
             **self.sample_facts(),
             "inputs": {name: index.to_dict() for name, index in self.inputs.items()},
@@ -150,13 +150,15 @@ def run_sobol(
 ) -> Sobol:
     """First-order, total and second-order Sobol' indices (Saltelli et al. 2010, as in SALib) of independent inputs.
 
-    `n` base points in all, shared by the scramblings; n (2 d + 2 + groups) responses with second order. Raises
+    `response` is evaluated over `space`, d inputs wide. `n` base points in all, shared by the `scramblings` that `seed`
+    gives; n (2 d + 2 + groups) responses with `second_order`, n (d + 2 + groups) without. `engine` computes the
+    scramblings, the one in force if None; `unit` names the response's unit. Raises
     `HdoptError` for correlated inputs (their variance does not split: use `run_shapley`) and for too small an `n`.
     """
     if not space.copula.is_independent:
-        names = ", ".join(name for group in space.correlations for name in group.names)
+        correlated = ", ".join(name for group in space.correlations for name in group.names)
         raise HdoptError(
-            f"Sobol' indices split the variance of independent inputs; {names} are correlated: use Shapley"
+            f"Sobol' indices split the variance of independent inputs; {correlated} are correlated: use Shapley"
         )
     check_scramblings(n, scramblings)
     names = space.names
@@ -190,6 +192,7 @@ def run_sobol(
 
 
 def check_scramblings(n: int, scramblings: int) -> None:
+    """Raise `HdoptError` unless `n` points make at least two `scramblings` of 16 points each."""
     if scramblings < 2:
         raise HdoptError(f"{scramblings} scramblings are asked for; an interval needs at least 2, use 8 to 16")
     if n < scramblings * SMALLEST_PER_SCRAMBLING:
@@ -209,7 +212,8 @@ def _convergence(names: Sequence[str], first: Array, total: Array, n: int) -> Co
 
     def half_widths(values: Array) -> Array:
         quantile = float(special.stdtrit(len(values) - 1, 0.975))
-        return quantile * values.std(axis=0, ddof=1) / math.sqrt(len(values))
+        widths: Array = quantile * values.std(axis=0, ddof=1) / math.sqrt(len(values))
+        return widths
 
     return Convergence(
         tuple(_prefixes(n)),
@@ -221,7 +225,10 @@ def _convergence(names: Sequence[str], first: Array, total: Array, n: int) -> Co
 
 
 def run_sobol_replicate(task: SobolTask) -> SobolReplicate:
-    """Evaluate one scrambling of the A, B, AB, BA design and estimate its indices."""
+    """Evaluate the scrambling of `task`, an A, B, AB, BA design, and estimate its indices.
+
+    Raises `HdoptError` where the response does not vary, or is not finite.
+    """
     space, d = task.space, task.space.dimension
     u = np.concatenate(list(ScrambledSobol().blocks(task.seed, task.replicate, task.n, 2 * d)))
     a, b = space.sample(u[:, :d]), space.sample(u[:, d:])
@@ -262,13 +269,15 @@ def first_and_total(y_a: Array, y_b: Array, y_ab: Array) -> tuple[Array, Array]:
 def second_order_indices(y_a: Array, y_b: Array, y_ab: Array, y_ba: Array) -> Array:
     """Second-order indices (Saltelli 2002) of all pairs as SALib estimates them, in the order of `combinations`.
 
-    `y_ab`, `y_ba` of shape (d, n): responses at A with one column from B, and at B with one column from A.
+    `y_a`, `y_b` (n,) are the responses at A and B; `y_ab`, `y_ba` (d, n) those at A with one column from B, and at B
+    with one column from A. `run_sobol_replicate` standardizes the responses first, as SALib does.
     """
     variance, n = np.var(np.concatenate([y_a, y_b])), len(y_a)
     first = first_and_total(y_a, y_b, y_ab)[0]
     closed = (y_ba @ y_ab.T / n - y_a @ y_b / n) / variance
     pairs = np.triu_indices(len(y_ab), 1)
-    return (closed - first[:, None] - first)[pairs]
+    indices: Array = (closed - first[:, None] - first)[pairs]
+    return indices
 
 
 @dataclass(frozen=True)
@@ -282,7 +291,7 @@ class Shapley(SampledResponse):
     indices: dict[str, Index]
     interval: str = ""
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, Any]:
         return {
             **self.sample_facts(),
             "shapley": {name: effect.to_dict() for name, effect in self.effects.items()},
@@ -322,8 +331,10 @@ def run_shapley(
     engine: Engine | str | None = None,
     unit: str = "arcmin",
 ) -> Shapley:
-    """Shapley effects (Owen 2014; Song, Nelson and Staum 2016) of `players`, by default every input.
+    """Shapley effects (Owen 2014; Song, Nelson and Staum 2016) of `players`, by default every input of `space`.
 
+    `response` is evaluated on `n` points in all, shared by the `scramblings` that `seed` gives, `engine` computes them
+    (the one in force if None), and `unit` names the response's unit.
     For every subset J, E[Var(Y | X_-J)] = E (Y - Y')^2/2, where Y' shares X_-J and draws X_J anew from its exact
     conditional distribution. 2^players n responses. Raises `HdoptError` for more than 12 players.
     """
@@ -372,7 +383,10 @@ class ShapleyReplicate:
 
 
 def run_shapley_replicate(task: ShapleyTask) -> ShapleyReplicate:
-    """Go through all subsets of the players with one scrambling."""
+    """Go through all subsets of the players with the one scrambling of `task`.
+
+    Raises `HdoptError` where the response does not vary, or is not finite.
+    """
     space, d, count = task.space, task.space.dimension, len(task.players)
     u = np.concatenate(list(ScrambledSobol().blocks(task.seed, task.replicate, task.n, 2 * d)))
     noise = special.ndtri(u[:, d:])

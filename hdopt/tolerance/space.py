@@ -91,7 +91,8 @@ class InputSpace:
     @property
     def box(self) -> tuple[Array, Array]:
         """Lower and upper bounds of all inputs, infinite where there is none."""
-        return tuple(np.array(side) for side in zip(*(d.support for d in self.marginals), strict=True))
+        lower, upper = zip(*(marginal.support for marginal in self.marginals), strict=True)
+        return np.array(lower), np.array(upper)
 
     def sample(self, u: Array) -> Array:
         """Points of the unit cube, shape (n, d) in (0, 1), to values of the inputs, same shape, columns contiguous."""

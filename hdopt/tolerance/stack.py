@@ -17,7 +17,7 @@ from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 from hdopt.parallel.engine import Engine, engine_from
 from hdopt.tolerance import capability
-from hdopt.tolerance.empirical import Bins, CountInBins, Empirical, KeepAll, merge
+from hdopt.tolerance.empirical import Bins, Collector, CountInBins, Empirical, KeepAll, merge
 from hdopt.tolerance.intervals import (
     IntervalEstimate,
     clopper_pearson,
@@ -27,7 +27,7 @@ from hdopt.tolerance.intervals import (
     student_half_width,
 )
 from hdopt.tolerance.linearise import Linearisation, linearise
-from hdopt.tolerance.response import Response, evaluate
+from hdopt.tolerance.response import Response, Signed, evaluate
 from hdopt.tolerance.sampling import BLOCK, Sampling, ScrambledSobol, replicate_sizes
 from hdopt.tolerance.space import InputSpace
 
@@ -75,8 +75,11 @@ class Replicate:
 
 
 def run_replicate(task: ReplicateTask) -> Replicate:
-    """Sample one replicate block by block."""
-    collector = KeepAll() if task.bins is None else CountInBins(task.bins)
+    """Sample the replicate of `task`, or the part of it that the task asks for, block by block.
+
+    Raises `HdoptError` where a response is not finite.
+    """
+    collector: Collector = KeepAll() if task.bins is None else CountInBins(task.bins)
     count, mean, squares, above = 0, 0.0, 0.0, 0
     for u in task.sampling.blocks(task.seed, task.replicate, task.n, task.space.dimension, task.start):
         values = evaluate(
@@ -250,10 +253,9 @@ def run_stack(response: Response, space: InputSpace, request: StackRequest) -> S
         engine_from(request.engine),
     )
     pooled = merge(part.values for part in parts)
-    # a two-sided response is the size of a signed one, which is the straighter of both
-    signed = getattr(response, "signed", None)
-    line = linearise(signed or response, space, seed)
-    z = float(special.ndtri((1 + required) / 2 if signed else required))
+    two_sided = isinstance(response, Signed)
+    line = linearise(response.signed if isinstance(response, Signed) else response, space, seed)
+    z = float(special.ndtri((1 + required) / 2 if two_sided else required))
     performance, notes = _performance(parts, pooled, sampling, request.limit)
     return Stack(
         n=n,
@@ -301,8 +303,10 @@ def _pooled_std(parts: Sequence[Replicate]) -> float:
 
 
 def yield_estimate(parts: Sequence[Replicate], sampling: Sampling) -> IntervalEstimate:
-    """Share within the limit. Over scramblings by Student's t, unless hardly any point lies beyond the limit (or
-    within): then Clopper-Pearson as for independent points, which scrambled ones, being more even, keep."""
+    """Share within the limit, from the replicates `parts` of one sample drawn by `sampling`.
+
+    Over scramblings by Student's t, unless hardly any point lies beyond the limit (or within): then Clopper-Pearson as
+    for independent points, which scrambled ones, being more even, keep."""
     n = sum(part.n for part in parts)
     above = sum(part.above_limit for part in parts)
     if sampling.independent_points:
@@ -316,8 +320,11 @@ def yield_estimate(parts: Sequence[Replicate], sampling: Sampling) -> IntervalEs
 
 
 def quantile_estimate(parts: Sequence[Replicate], pooled: Empirical, q: float, sampling: Sampling) -> IntervalEstimate:
-    """Quantile of all values together. Over scramblings: the t-interval of the share below it, turned back into values
-    (Woodruff 1952), which is right for skewed tails. For independent points: order statistics."""
+    """Quantile `q` (0 to 1) of the values of all `parts` together, which are `pooled`, with its interval.
+
+    For `sampling` by scramblings: the t-interval of the share below it, turned back into values (Woodruff 1952), which
+    is right for skewed tails. For independent points, or where few lie beyond: order statistics.
+    """
     n = pooled.n
     value = pooled.ranked(_rank(q, n))
     beyond = n * min(q, 1 - q)

@@ -10,14 +10,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import special
 
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 from hdopt.tolerance.intervals import CONFIDENCE, clopper_pearson
-from hdopt.tolerance.response import Response, evaluate
+from hdopt.tolerance.response import Response, evaluate, proven_bound
 from hdopt.tolerance.space import InputSpace
 
 REPLICATES = 16
@@ -42,7 +44,7 @@ class Tail:
     note: str = ""
     replicates: tuple[float, ...] = ()
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, Any]:
         return {
             "limit": self.limit,
             "probability": self.probability,
@@ -63,8 +65,9 @@ def tail_probability(
     replicates: int = REPLICATES,
     level_size: int = LEVEL_SIZE,
 ) -> Tail:
-    """P(response > limit) with a 95 % interval over `replicates` independent subset simulations.
+    """P(`response` > `limit`) over `space`, with a 95 % interval over `replicates` independent subset simulations.
 
+    Each simulation has a stream of its own from `seed` and takes `level_size` points a level (Au and Beck 2001).
     Exactly zero where a proven bound of the response over its bounded inputs does not exceed the limit. Raises
     `HdoptError` for a limit that is not finite.
     """
@@ -104,11 +107,9 @@ def _interval(runs: list[float]) -> tuple[float, float]:
 
 
 def _proven_bound(response: Response, space: InputSpace) -> float | None:
-    upper_bound = getattr(response, "upper_bound", None)
+    """The response's own bound, where all inputs are bounded."""
     lower, upper = space.box
-    if upper_bound is None or not np.all(np.isfinite(lower) & np.isfinite(upper)):
-        return None
-    return upper_bound(lower, upper)
+    return proven_bound(response, lower, upper) if np.all(np.isfinite(lower) & np.isfinite(upper)) else None
 
 
 def _subset_simulation(
@@ -119,7 +120,7 @@ def _subset_simulation(
 
     correlations = space.copula
 
-    def values(sample) -> Array:
+    def values(sample: ArrayLike) -> Array:
         scores = np.asarray(sample, float)
         u = np.clip(special.ndtr(scores), 1e-300, 1 - 2.0**-53)
         inputs = space.sample(u) if correlations.is_independent else space.from_uniform(correlations.correlate(u))
