@@ -393,6 +393,9 @@ class VerdictSettings:
         1.4, "1", "choice: a base error over its prior from which the study's tolerances are left"
     )
     smallest_share: float = threshold(0.02, "1", "choice: share of the held-out power that is worth a name")
+    most_is_carried: float = threshold(
+        1.0, "1", "choice: held-out power that effects predict over what is left, from which they are named beside more"
+    )
     own_power: float = threshold(2.0, "1", "choice: the effects' own power over the gain that they must account for")
     high_share: float = threshold(0.01, "1", "choice: power over what else is explained that makes high orders count")
     momentary_share: float = threshold(0.5, "1", "choice: share of what is found from which an event is most of it")

@@ -91,7 +91,6 @@ def test_passes_hidden_from_the_tool_are_predicted(folder):
     assert rms[True] == pytest.approx(diagnosis.fit["heldout_rms_extended_arcmin"], rel=0.1)
 
 
-@pytest.mark.xfail(reason="the bound of noise leaves nothing named where windup and friction were")
 def test_planetary_stiffness(folder):
     """Torque against a locked input: the windup, softer in the middle than beyond its knee."""
     diagnosis = diagnose(folder / "planetary-7to1-stiffness.csv", ratio=PLANETARY, columns=STIFFNESS)
@@ -100,7 +99,6 @@ def test_planetary_stiffness(folder):
     assert parameters["stiffness_2"].value > parameters["stiffness_1"].value > 0
 
 
-@pytest.mark.xfail(reason="the bound of noise leaves nothing named where windup and friction were")
 def test_loop_of_the_stiffness_record_is_friction_ahead_of_the_spring(folder):
     """Windup with friction of some Nm leaves a fifth of what windup alone leaves, and is named: no single curve of the
     torque makes a loop."""

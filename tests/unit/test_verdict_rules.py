@@ -147,3 +147,23 @@ def test_a_drive_far_outside_its_tolerances_is_warned_of():
     errors[0] = 0.06
     (note,) = base_notes(SimpleNamespace(problem=problem, errors=errors))
     assert "axis eccentricity x 0.06 mm" in note
+
+
+@pytest.mark.parametrize(("own_gain", "named"), [(430.0, True), (0.5, False)])
+def test_effects_that_carry_most_are_said_beside_what_is_no_noise(monkeypatch, own_gain, named):
+    """Would catch windup and friction that explain 1808 of 1810 arcmin lost, as 87 are left; and a name for an effect
+    that carries less than it leaves."""
+    from hdopt.diagnosis.verdict import rules
+
+    monkeypatch.setattr(rules, "locate_remainder", lambda evidence: {"rms_arcmin": 80.0, "domain": "torque"})
+    evidence = SimpleNamespace(
+        neighbours_arcmin=1.0, sensor_arcmin=0.5, extended_held_out=SimpleNamespace(variance=87.0**2, rms=87.0)
+    )
+    facts = replace(NAMED, own_gain=own_gain, noise_over_neighbours=82.0)
+    windup = SimpleNamespace(id="torsional_windup", says="The gear winds up.")
+    findings = SimpleNamespace(evidence=evidence, facts=facts, effects=(windup,), pairs=())
+    conclusion = rule_for(facts).consequence(findings)
+    assert conclusion.verdict == "unknown"
+    assert conclusion.effects == ((windup,) if named else ())
+    assert ("winds up" in conclusion.says) == named
+    assert "82 times" in conclusion.says

@@ -112,7 +112,7 @@ def useful_columns(probe: FitProbe, inflation: float) -> tuple[Array, list[str]]
     white = white / norm
     gram, moment = white.T @ white, white.T @ probe.white_residual
     cost = np.log(max(len(probe.rows), 2))
-    line_cost = np.log(settings.line_trials * probe.rows.span_turns)
+    line_cost = np.log(max(settings.line_trials * probe.rows.span_turns, 1.0))
     left = [[i for i in group if alive[i]] for group in _groups(domains)]
     chosen: list[int] = []
     gain = 0.0

@@ -83,6 +83,11 @@ class Facts:
         """Whether there is any effect to name, high orders included."""
         return self.named or self.high
 
+    @property
+    def carry_most(self) -> bool:
+        """Whether the effects to name predict more of the held-out power than they leave."""
+        return self.said and self.own_gain > self.settings.most_is_carried
+
 
 @dataclass(frozen=True)
 class Findings:

@@ -100,20 +100,22 @@ def unknown(findings: Findings) -> Conclusion:
 
 
 def no_noise(findings: Findings) -> Conclusion:
-    """What is left is more than the sensors' noise, whatever it is. `findings` hold the facts and the evidence behind
-    them.
+    """What is left is more than the sensors' noise, whatever it is; effects that carry most of what was there are said
+    beside it. `findings` hold the facts and the evidence behind them.
     """
     evidence = findings.evidence
+    effects = findings.effects if findings.facts.carry_most else ()
     sensors = max(evidence.neighbours_arcmin, evidence.sensor_arcmin)
     rms = math.sqrt(max(evidence.extended_held_out.variance - sensors**2, 0.0))
     where = locate_remainder(evidence) | {"rms_arcmin": rms, "share_of_residual": 1.0}
-    says = (
+    says = "".join(f"{found.says} " for found in effects)
+    says += (
         f"What is left, {evidence.extended_held_out.rms:.2g} arcmin rms, is {findings.facts.noise_over_neighbours:.2g} "
         "times what neighbouring samples and the sensors' steps show: no sensor makes such noise, and the catalogue "
         "does not explain it."
     )
     test = "record the same motion again: what repeats is the drive's, what does not is the bench's"
-    return Conclusion("unknown", says, separating_test=test, where=where)
+    return Conclusion("unknown", says, effects, separating_test=test, where=where)
 
 
 def named_and_more(findings: Findings) -> Conclusion:
