@@ -2,7 +2,8 @@
 
 A field's origin begins with what kind it is: `theorem`, `paper`, `catalogue`, `measured` (by the injection study,
 `hdopt run studies/concealed-physics.toml`), or `choice`: of computing effort, of a grid, or of what an engineer would
-call small. `thresholds` lists them all (docs/diagnosis-thresholds.md); `moved` gives settings with one of them changed.
+call small. `thresholds` lists them all; `moved` gives settings with one of them changed;
+docs/diagnosis-thresholds.md, which `hdopt.studies.threshold_sensitivity` writes, says what such a move does.
 """
 
 from __future__ import annotations
