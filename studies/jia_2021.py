@@ -30,8 +30,15 @@ def _errors(**changes: float) -> Change:
     return lambda drive, errors: (drive, errors.with_(**changes))
 
 
-def _gear(**changes: float) -> Change:
-    return lambda drive, errors: (replace(drive, geometry=replace(drive.geometry, **changes)), errors)
+def _pressure_angle(angle_deg: float) -> Change:
+    return lambda drive, errors: (
+        replace(drive, geometry=replace(drive.geometry, pressure_angle=_deg(angle_deg))),
+        errors,
+    )
+
+
+def _module(module: float) -> Change:
+    return lambda drive, errors: (replace(drive, geometry=replace(drive.geometry, module=module)), errors)
 
 
 def _structure(structure: Structure) -> Change:
@@ -58,10 +65,10 @@ CASES = (
     PublishedCase("e1 = 0.012 mm", 1.38, _errors(axis_eccentricity=0.012)),
     PublishedCase("e2 = 0.003 mm", 1.29, _errors(wg_eccentricity=0.003)),
     PublishedCase("e2 = 0.007 mm", 1.36, _errors(wg_eccentricity=0.007)),
-    PublishedCase("alpha = 10 deg", 1.17, _gear(pressure_angle=_deg(10))),
-    PublishedCase("alpha = 14 deg", 1.50, _gear(pressure_angle=_deg(14))),
-    PublishedCase("m = 0.386 mm", 1.36, _gear(module=0.386)),
-    PublishedCase("m = 0.406 mm", 1.30, _gear(module=0.406)),
+    PublishedCase("alpha = 10 deg", 1.17, _pressure_angle(10)),
+    PublishedCase("alpha = 14 deg", 1.50, _pressure_angle(14)),
+    PublishedCase("m = 0.386 mm", 1.36, _module(0.386)),
+    PublishedCase("m = 0.406 mm", 1.30, _module(0.406)),
     PublishedCase("a_CS = 0.001 mm", 1.25, _errors(cs_tooth_amplitude=0.001)),
     PublishedCase("a_CS = 0.003 mm", 1.42, _errors(cs_tooth_amplitude=0.003)),
     PublishedCase("a_FS = 0.001 mm", 1.22, _errors(fs_tooth_amplitude=0.001)),

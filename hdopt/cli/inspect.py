@@ -38,12 +38,12 @@ def command(**options: Any) -> int:
     ROS bags, PHD2 guide logs, .mf4. Exit status 1 with --check where a limit is missed.
     """
     from hdopt.recordings.decision import parse_limits
+    from hdopt.workflow.requirement import required_limits
 
     source = source_of(options["drive"], options["ratio"], options["columns"], options["bench_file"])
     limits = parse_limits(options["limits"])
-    section: Any = None if source.study is None else source.study.sections.get("requirement")
-    if not limits and section is not None:
-        limits = {"peak_to_peak": float(section.peak_to_peak_arcmin)}
+    if not limits and source.study is not None:
+        limits = required_limits(source.study)
     if options["each"]:
         return _each(source, limits, options)
     return _one(source, limits, options)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.files import files_of_work
+from hdopt.study.base import Section
 from hdopt.study.document import (
     SET_ON_COMMAND_LINE,
     Document,
@@ -29,7 +31,8 @@ if TYPE_CHECKING:
     from hdopt.drive.geometry import Drive
     from hdopt.drive.teeth import MeasuredTeeth
     from hdopt.simulation import EffectValues, Operation
-    from hdopt.study.base import Section
+
+S = TypeVar("S", bound=Section)
 
 DEFAULT_STUDY = "csf-25-80"
 """What a command works on when it is told neither a study nor a drive."""
@@ -54,46 +57,76 @@ class Study:
     recipe: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     """The arguments of `load_study` that give this study again; {} for one that was made otherwise."""
 
-    def section(self, name: str, needed_by: str = "this") -> Section:
-        """The section `name`; a clear error where the study has none."""
-        if name not in self.sections:
+    def find(self, name: str, kind: type[S]) -> S | None:
+        """The section `name`, which is of this `kind` of model; None where the study has none."""
+        section = self.sections.get(name)
+        if section is not None and not isinstance(section, kind):
+            raise TypeError(f"[{name}] is a {type(section).__name__}, not a {kind.__name__}")
+        return section
+
+    def section(self, name: str, kind: type[S], needed_by: str = "this") -> S:
+        """The section `name`, which is of this `kind` of model; where the study has none, a message that says it is
+        `needed_by` what."""
+        found = self.find(name, kind)
+        if found is None:
             raise HdoptError(f"{needed_by} needs a [{name}] section, which {self.source} does not have; add it")
-        return self.sections[name]
+        return found
 
     @cached_property
     def drive(self) -> Drive:
         """The drive: geometry, wave generator, clearances, material, load."""
-        from hdopt.drive.geometry import Clearances, Drive, Load
-
-        geometry = self._built("drive")
-        wave_generator = self._built("wave_generator", geometry, self.folder)
-        return Drive(
-            geometry,
-            wave_generator,
-            self._built("clearances") if "clearances" in self.sections else Clearances(),
-            self._built("material") if "material" in self.sections else None,
-            self._built("load") if "load" in self.sections else Load(),
-            self._teeth("cs_teeth", geometry.circular_spline_teeth),
-            self._teeth("fs_teeth", geometry.flexspline_teeth),
+        from hdopt.drive.geometry import Drive
+        from hdopt.study.drive import (
+            ClearancesSection,
+            DriveSection,
+            LoadSection,
+            MaterialSection,
+            WaveGeneratorSection,
         )
 
+        with self._placed("drive"):
+            geometry = self.section("drive", DriveSection, "a drive").build()
+        with self._placed("wave_generator"):
+            wave_generator = self.section("wave_generator", WaveGeneratorSection, "a drive").build(
+                geometry, self.folder
+            )
+        with self._placed("clearances"):
+            clearances = (self.find("clearances", ClearancesSection) or ClearancesSection()).build()
+        with self._placed("material"):
+            given = self.find("material", MaterialSection)
+            material = None if given is None else given.build()
+        with self._placed("load"):
+            load = (self.find("load", LoadSection) or LoadSection()).build()
+        cs_teeth = self._teeth("cs_teeth", geometry.circular_spline_teeth)
+        fs_teeth = self._teeth("fs_teeth", geometry.flexspline_teeth)
+        return Drive(geometry, wave_generator, clearances, material, load, cs_teeth, fs_teeth)
+
     def _teeth(self, name: str, teeth: int) -> MeasuredTeeth | None:
-        built: MeasuredTeeth | None = self._built(name, teeth, self.folder) if name in self.sections else None
-        return built
+        from hdopt.study.drive import TeethSection
+
+        with self._placed(name):
+            section = self.find(name, TeethSection)
+            return None if section is None else section.build(teeth, self.folder)
 
     @property
     def measured_instead(self) -> tuple[str, ...]:
         """Names of the tooth amplitudes in [errors] and [tolerances] that measured teeth stand instead of."""
+        from hdopt.study.drive import TeethSection
+
+        measured = {spline: self.find(f"{spline}_teeth", TeethSection) for spline in ("cs", "fs")}
         return tuple(
             f"{spline}_tooth_amplitude"
-            for spline in ("cs", "fs")
-            if f"{spline}_teeth" in self.sections and self.sections[f"{spline}_teeth"].sine == "instead"
+            for spline, section in measured.items()
+            if section is not None and section.sine == "instead"
         )
 
     @cached_property
     def errors(self) -> DriveErrors:
         """The errors of the one drive in [errors]."""
-        errors: DriveErrors = self._built("errors")
+        from hdopt.study.drive import ErrorsSection
+
+        with self._placed("errors"):
+            errors = self.section("errors", ErrorsSection).build()
         return errors.with_(**dict.fromkeys(self.measured_instead, 0.0))
 
     @cached_property
@@ -116,7 +149,12 @@ class Study:
         """The operating condition in [operation]; forward motion and nothing else where the study does not say."""
         from hdopt.simulation import Operation
 
-        return self._built("operation") if "operation" in self.sections else Operation()
+        if "operation" not in self.sections:
+            return Operation()
+        from hdopt.study.effects import OperationSection
+
+        with self._placed("operation"):
+            return self.section("operation", OperationSection).build()
 
     @cached_property
     def sha256(self) -> str:
@@ -137,12 +175,16 @@ class Study:
 
     @property
     def title(self) -> str:
-        section = self.sections.get("study")
+        from hdopt.study.drive import StudySection
+
+        section = self.find("study", StudySection)
         return (section.title if section else None) or self.name
 
-    def _built(self, name: str, *context: Any) -> Any:
+    @contextmanager
+    def _placed(self, name: str) -> Iterator[None]:
+        """Messages of what is built from the section `name` say where in the file that section stands."""
         try:
-            return self.section(name, "a drive" if name in DRIVE_SECTIONS else "this").build(*context)
+            yield
         except HdoptError as error:
             raise HdoptError(f"{self.document.where((name,))}: {error}") from error
         except (ValueError, ArithmeticError) as error:
@@ -210,7 +252,9 @@ def load_study(source: str | Path | None = None, overrides: Sequence[str] = (), 
 
 
 def study_of(document: Document, name: str, folder: Path) -> Study:
-    """The study in a document whose shipped parts are merged in already."""
+    """The study called `name` in a `document` whose shipped parts are merged in already; file names in it are relative
+    to `folder`. Raises `HdoptError` with file, line and key for an unknown section or key and for values that no
+    study may have."""
     from hdopt.study.schema import check_sections
 
     study = Study(name, check_sections(document), document.data, folder, document.source, document)

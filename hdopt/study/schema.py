@@ -50,7 +50,8 @@ def step_sections() -> dict[str, str]:
 def section_model(name: str) -> type[Section]:
     """The model of the section `name`, imported now."""
     module, _, attribute = (SECTIONS.get(name) or step_sections()[name]).partition(":")
-    return getattr(import_module(module), attribute)
+    found: type[Section] = getattr(import_module(module), attribute)
+    return found
 
 
 def known_paths(data: Mapping[str, Any], without: Container[str] = ()) -> set[Keys]:
@@ -171,13 +172,13 @@ def _fault(fault: ErrorDetails, document: Document, section: str) -> str:
 def _known_keys(model: Any, path: Keys) -> tuple[str, ...]:
     """The keys that the table at `path` of a section may have; () where that depends on what else it says."""
     for part in path:
-        field = model.model_fields.get(part)
+        field = {field.alias or name: field for name, field in model.model_fields.items()}.get(part)
         choices = () if field is None else (field.annotation, *get_args(field.annotation))
         tables = [choice for choice in choices if isinstance(choice, type) and issubclass(choice, Section)]
         if len(tables) != 1:
             return ()
         model = tables[0]
-    return tuple(model.model_fields)
+    return tuple(field.alias or name for name, field in model.model_fields.items())
 
 
 def _path_in_file(location: tuple[Any, ...], content: Any) -> Keys:

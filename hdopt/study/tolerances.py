@@ -174,7 +174,7 @@ class TolerancesBase(Section):
     correlation: list[CorrelationRow] = Field(default_factory=list)
 
     @property
-    def rows(self) -> dict[str, Any]:
+    def rows(self) -> dict[str, AnyRow]:
         """The errors that vary, in the order of `STUDY_KEYS`."""
         return {key: row for key in STUDY_KEYS if (row := getattr(self, key)) is not None}
 
@@ -196,21 +196,19 @@ class TolerancesBase(Section):
         return {key: row.cost for key, row in self.rows.items() if row.cost is not None}
 
 
-TolerancesSection = create_model(
-    "TolerancesSection", __base__=TolerancesBase, **{key: (AnyRow | None, None) for key in STUDY_KEYS}
-)
+_ROWS: dict[str, Any] = {key: (AnyRow | None, None) for key in STUDY_KEYS}
+"""Fields as pydantic takes them; its types know no fields whose names are data."""
+TolerancesSection = create_model("TolerancesSection", __base__=TolerancesBase, **_ROWS)
 """[tolerances] with a field for every error, so that a misspelt one is refused with the nearest."""
 
-RequirementSection = create_model(
-    "RequirementSection",
-    __base__=Section,
-    __doc__="[requirement]: the largest peak-to-peak, the share of drives that must keep it, and whose k_e counts.",
-    **{
-        "peak_to_peak_arcmin": (Positive, ...),
-        "yield": (Annotated[float, Field(gt=0, lt=1)], 0.9973),
-        "homogenization": (Literal["single_tooth", "contact"], "single_tooth"),
-    },
-)
+
+class RequirementSection(Section):
+    """[requirement]: the largest peak-to-peak, the share of drives that must keep it, and whose k_e counts."""
+
+    peak_to_peak_arcmin: Positive
+    required_yield: float = Field(default=0.9973, gt=0, lt=1, alias="yield")
+    """`yield` in the file, which is no name that Python allows."""
+    homogenization: Literal["single_tooth", "contact"] = "single_tooth"
 
 
 class ContributorRow(Section):

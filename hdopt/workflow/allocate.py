@@ -45,8 +45,7 @@ def allocate(
     from hdopt.study.costs import AllocateSection
 
     study = as_study(study)
-    settings = study.sections.get("allocate") or AllocateSection()
-    assert isinstance(settings, AllocateSection)
+    settings = study.find("allocate", AllocateSection) or AllocateSection()
     rule = (rule or settings.rule).replace("-", "_")
     if rule not in RULES:
         raise HdoptError(unknown_name("allocation rule", rule, RULES))
@@ -68,9 +67,16 @@ def allocate(
 def items_of(study: Study, space: InputSpace) -> tuple[list[Item], dict[str, str]]:
     """The tolerances of `study` that have a cost, as items bounded in `space`, and where the costs come from."""
     from hdopt.allocation.convex import Item
+    from hdopt.study.tolerances import ContributorsSection, TolerancesBase
 
-    sections = [study.sections[name] for name in ("tolerances", "contributors") if name in study.sections]
-    rows = {name: cost for section in sections for name, cost in section.costs().items() if name in space.tolerances}
+    sections = (study.find("tolerances", TolerancesBase), study.find("contributors", ContributorsSection))
+    rows = {
+        name: cost
+        for section in sections
+        if section is not None
+        for name, cost in section.costs().items()
+        if name in space.tolerances
+    }
     if not rows:
         raise HdoptError(
             "allocate needs costs: give at least one tolerance or contributor a cost, such as "

@@ -96,8 +96,7 @@ def allocate_linear(study: Study, request: AllocationRequest) -> AllocateResult:
 
 
 def _problem(study: Study, request: AllocationRequest) -> LinearProblem:
-    section = study.section("linear_stack")
-    assert isinstance(section, LinearStackSection)
+    section = study.section("linear_stack", LinearStackSection)
     if request.rule == "yield":
         raise HdoptError("the yield rule is for drives; a linear stack takes the rule worst_case or rss")
     costs = {name: d.cost for name, d in section.dimensions.items() if d.cost is not None}

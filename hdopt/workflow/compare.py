@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from hdopt.errors import HdoptError, unknown_name
-from hdopt.files import write_text
+from hdopt.files import replacing_all
 from hdopt.geometry.compare import CamFit, fit_cam, read_cam, table_of
 from hdopt.geometry.contour import Contour
 from hdopt.geometry.dimensions import tolerance_bounds
@@ -111,10 +111,11 @@ def _nominal(job: Job, surface: Surface, part: str | None) -> tuple[str, Contour
 
 
 def write_measured_study(study: Study, result: CompareResult, path: Path) -> Path:
-    """Write the study with the measured cam in place of its profile, and the cam's table beside it.
+    """Write the `study` to `path` with the measured cam of `result` in place of its profile, and the cam's table beside
+    it; both files or neither.
 
     The table's name is the study file's with `-cam.csv` for its ending; it keeps the cam's own eccentricity about the
-    axis that it was measured from. Returns the table's path.
+    axis that it was measured from. Returns the table's path. Raises `HdoptError` where a file cannot be written.
     """
     import tomlkit
 
@@ -131,6 +132,7 @@ def write_measured_study(study: Study, result: CompareResult, path: Path) -> Pat
     noise = round(1e3 * result.fit.noise, 6)
     generator |= {"profile": "measured", "file": table.name, "surface": result.surface, "noise_um": noise}
     data["wave_generator"] = generator
-    write_text(table, text.getvalue())
-    write_text(path, tomlkit.dumps(data))
+    with replacing_all((table, path)) as (new_table, new_study):
+        new_table.write_bytes(text.getvalue().encode())
+        new_study.write_bytes(tomlkit.dumps(data).encode("utf-8", "surrogateescape"))
     return table

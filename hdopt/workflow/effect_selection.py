@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from hdopt.simulation import EffectValues, ExtendedModel
 from hdopt.study import Study
+from hdopt.study.effects import OperationSection
 
 CHOICES = {
     "all": ("drive", "bench"),
@@ -39,8 +40,8 @@ class Inclusion:
 
 
 def inclusion(study: Study, default: str) -> Inclusion:
-    """Which effects count: as [operation] includes, or by the command's `default` ('all', 'drive', 'none')."""
-    section = study.sections.get("operation")
+    """Which effects of a `study` count: as its [operation] includes, or by `default` ('all', 'drive' or 'none')."""
+    section = study.find("operation", OperationSection)
     asked = None if section is None else section.include
     choice = asked or default
     origins = CHOICES[choice]
@@ -53,7 +54,8 @@ def inclusion(study: Study, default: str) -> Inclusion:
 
 
 def extended_model(study: Study, default: str = "all") -> ExtendedModel:
-    """The extended model of the study's one drive, at its operating condition, with the effects that count."""
+    """The extended model of the one drive of a `study`, at its operating condition, with the effects that count: as
+    [operation] includes, or by `default` ('all', 'drive', 'none')."""
     return ExtendedModel(study.drive, study.errors, inclusion(study, default).counted, study.operation)
 
 

@@ -35,8 +35,12 @@ def effect_orders(model: ExtendedModel) -> tuple[ModelOrder, ...]:
 def effect_table(
     study: Study, model: ExtendedModel, chosen: Inclusion, whole: float, base: float
 ) -> tuple[dict[str, Any], ...]:
-    """A row an effect: where it comes from, whether it counts, its numbers, its own size, and what it adds (arcmin) to
-    the peak-to-peak of the others that count; `whole` is theirs together, `base` without any."""
+    """A row an effect of the `study`: id, origin, whether it is counted, its numbers by study key, and what it adds.
+
+    `model` has the effects that are counted, `chosen` says which those are. `whole` is the peak-to-peak of the model,
+    `base` that without any effect, arcmin. `adds_arcmin` is how much the peak-to-peak would fall if this effect alone
+    were taken out, arcmin; None where it is not counted.
+    """
     rows = []
     for effect in study.effects:
         counted = effect in chosen.counted
@@ -58,7 +62,7 @@ def effect_table(
 
 
 def remarks(model: ExtendedModel) -> list[str]:
-    """In plain words, what the operating condition or the grid keeps from showing."""
+    """In plain words, what the operating condition or the grid of the `model` keeps from showing; [] for nothing."""
     both_ways = len(model.operation.directions) > 1
     found = [said for effect in model.effects if (said := effect.remark(both_ways)) is not None]
     if model.too_fine:

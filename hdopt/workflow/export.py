@@ -29,5 +29,5 @@ def export(
 
 def export_options(study: Study) -> ExportOptions:
     """What the study's [export] section gives."""
-    section = study.sections.get("export")
-    return section.build() if isinstance(section, ExportSection) else ExportOptions()
+    section = study.find("export", ExportSection)
+    return ExportOptions() if section is None else section.build()

@@ -51,7 +51,8 @@ def inspect(
     `recordings` of one drive; `drive` None leaves out what needs a model (the beat of a short record, the origin of
     the orders). `limits` by name in arcmin (`hdopt.recordings.decision.LIMIT_NAMES`). `speed_rpm` of the input for
     the slope in time, by default the recording's own. `mountings` labels each recording for the gauge study. `serial`
-    and `conditions` go on the sheet. Raises `HdoptError` where there is nothing to inspect.
+    and `conditions` go on the sheet. `seed` starts the fit of the model and draws the interval of the beat. Raises
+    `HdoptError` where there is nothing to inspect.
     """
     if not recordings:
         raise HdoptError("no recordings were given; give at least one file")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hdopt.allocation.results import AllocateResult
     from hdopt.study import Study
+    from hdopt.study.tolerances import RequirementSection
     from hdopt.tolerance.results import StackResult
     from hdopt.workflow.kinematic_error import KinematicErrorResult
     from hdopt.workflow.run import RunResult
@@ -57,6 +58,18 @@ class Verdict:
         }
 
 
+def _requirement(study: Study) -> RequirementSection | None:
+    from hdopt.study.tolerances import RequirementSection
+
+    return study.find("requirement", RequirementSection)
+
+
+def required_limits(study: Study) -> dict[str, float]:
+    """The limit that [requirement] of a `study` puts on a recording, arcmin by the name of the figure; {} for none."""
+    section = _requirement(study)
+    return {} if section is None else {"peak_to_peak": section.peak_to_peak_arcmin}
+
+
 SOBOL_CHECK_N = 2**16
 """Drives that tell the yield beside Sobol' indices: known within about 0.001."""
 
@@ -67,7 +80,7 @@ def of_kinematic_error(study: Study, result: KinematicErrorResult) -> Verdict | 
     Compared is what the requirement speaks of: a single tooth pair, or with homogenization = "contact" the value evened
     out by the teeth in mesh.
     """
-    section: Any = study.sections.get("requirement")
+    section = _requirement(study)
     if section is None:
         return None
     evened = section.homogenization == "contact" and result.nonuniform_arcmin is not None
@@ -99,7 +112,7 @@ def of_allocation(result: AllocateResult) -> Verdict:
 
 def of_run(study: Study, run: RunResult) -> Verdict | None:
     """The requirement of `study` against what `run` found: the yield of its stack, else its drive's peak-to-peak."""
-    section: Any = study.sections.get("requirement")
+    section = _requirement(study)
     found: Any = {name: step.results for name, step in run.steps.items()}
     if "yield" in found.get("stack", {}):
         needed = found["stack"]["required_yield"]

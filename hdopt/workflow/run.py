@@ -17,6 +17,7 @@ from hdopt.parallel.engine import engine_from, engine_in_force
 from hdopt.parallel.kept import Kept
 from hdopt.report import REPORT_FILE, RESULTS_FILE, Report, Section, Text
 from hdopt.study import AnyStudy, Study, as_study
+from hdopt.study.drive import StudySection
 from hdopt.workflow.provenance import provenance
 from hdopt.workflow.run_folder import RunFolder, finish, run_folder
 from hdopt.workflow.steps import STEPS, Context, Step, StepResult, find_step
@@ -148,8 +149,8 @@ def _relocated(step: StepResult, old: Path, new: Path) -> StepResult:
 
 
 def steps_of(study: Study) -> tuple[bool, tuple[str, ...]]:
-    """Whether the study lists its steps, and the names of those it asks for."""
-    section = study.sections.get("study")
+    """Whether the `study` lists its steps, and the names of those it asks for."""
+    section = study.find("study", StudySection)
     asked = section.steps if section else None
     if asked == []:
         raise HdoptError(
@@ -164,8 +165,8 @@ def steps_of(study: Study) -> tuple[bool, tuple[str, ...]]:
 
 
 def description_of(study: Study) -> str:
-    """What the study says of itself, or failing that what drive it is about."""
-    section = study.sections.get("study")
+    """What the `study` says of itself, or failing that what drive it is about."""
+    section = study.find("study", StudySection)
     if section and section.description:
         return section.description
     if "drive" not in study.sections:

@@ -16,6 +16,7 @@ from hdopt.optimize.design_space import SIZE_RULES, Combination, DesignSpace, Va
 from hdopt.optimize.objectives import DesignConditions, find_quantity
 from hdopt.optimize.setup import LimitRule, SearchSettings, Setup
 from hdopt.study import Study
+from hdopt.study.drive import WaveGeneratorSection
 from hdopt.study.search import (
     DEFAULT_LIMITS,
     DEFAULT_VARIABLES,
@@ -35,7 +36,7 @@ DEFAULT_WRAP_DEG = 60.0
 def setup_of(study: Study, seed: int) -> Setup:
     """The search of a `study`; one without [search] gets the default variables and limits. `seed` is that of the drives
     which make a quantile."""
-    section = study.sections.get("search") or SearchSection()
+    section = study.find("search", SearchSection) or SearchSection()
     drive = study.drive
     if drive.has_measured_teeth:
         raise HdoptError(
@@ -47,7 +48,9 @@ def setup_of(study: Study, seed: int) -> Setup:
             f"the study's profile is {drive.wave_generator.profile.name!r}; a search starts from an ellipse, Resal or "
             "two-disk profile"
         )
-    wrap = getattr(study.sections.get("wave_generator"), "wrap_angle_deg", None) or DEFAULT_WRAP_DEG
+    generator = study.find("wave_generator", WaveGeneratorSection)
+    given_wrap = None if generator is None else generator.wrap_angle_deg
+    wrap = DEFAULT_WRAP_DEG if given_wrap is None else given_wrap
     size = SIZE_RULES[section.size]
     variables = []
     for name in type(section.variables or DEFAULT_VARIABLES).model_fields:
@@ -146,19 +149,12 @@ def _effects(study: Study, section: SearchSection, needs_sample: bool) -> Design
     return DesignEffects.of(study.drive, chosen, study.operation)
 
 
-def tolerance_problem(study: Study):
-    """The study's tolerances as (rows of inputs -> errors, random inputs)."""
-    from hdopt.workflow.stack import study_problem
-
-    problem = study_problem(study)
-    return problem.response, problem.space
-
-
 def sample_rows(study: Study, n: int, seed: int) -> Array:
     """`n` drives of the study's tolerances as rows of `DriveErrors.to_matrix`: one scrambling, by `seed`, of Sobol'
     points."""
     from hdopt.tolerance.sampling import ScrambledSobol
+    from hdopt.workflow.stack import drive_problem_of
 
-    response, space = tolerance_problem(study)
-    points = np.concatenate(list(ScrambledSobol(1).blocks(seed, 0, n, space.dimension)))
-    return response.errors(space.sample(points)).to_matrix()
+    problem = drive_problem_of(study)
+    points = np.concatenate(list(ScrambledSobol(1).blocks(seed, 0, n, problem.space.dimension)))
+    return problem.response.errors(problem.space.sample(points)).to_matrix()

@@ -11,7 +11,7 @@ from hdopt.drive.geometry import Drive
 from hdopt.kinematics.extremes import extremes_arcmin
 from hdopt.optimize.records import SearchResult, Verification
 from hdopt.study import Study
-from hdopt.workflow.search_setup import tolerance_problem
+from hdopt.workflow.stack import drive_problem_of
 
 if TYPE_CHECKING:
     from hdopt.optimize.design_effects import DesignEffects
@@ -57,7 +57,8 @@ def quantile_blocks(
     from hdopt.kinematics import peak_to_peak_arcmin
     from hdopt.tolerance.sampling import ScrambledSobol
 
-    response, space = tolerance_problem(study)
+    problem = drive_problem_of(study)
+    response, space = problem.response, problem.space
     sampling = ScrambledSobol(BLOCKS)
     values = []
     for replicate in range(BLOCKS):

@@ -11,8 +11,9 @@ from hdopt.kinematics.model_error import ModelError, model_error
 from hdopt.kinematics.waveform import CLOSED_FORM, EXACT
 from hdopt.parallel.engine import Engine
 from hdopt.study import AnyStudy, Study, as_study
+from hdopt.study.tolerances import ContributorsSection, LinearStackSection, RequirementSection, TolerancesBase
 from hdopt.tolerance.distributions import Distribution
-from hdopt.tolerance.drive_inputs import DriveResponse, drive_problem
+from hdopt.tolerance.drive_inputs import DriveProblem, DriveResponse, drive_problem
 from hdopt.tolerance.linear_stack import LinearResponse
 from hdopt.tolerance.response import Response
 from hdopt.tolerance.results import SobolResult, StackResult
@@ -44,28 +45,45 @@ class StudyProblem:
 
 
 def study_problem(study: AnyStudy) -> StudyProblem:
-    """Response, inputs and requirement of a study: its drive's, or those of its linear stack."""
+    """Response, inputs and requirement of a `study`, or of its name or path: its drive's, or those of its linear stack.
+
+    Raises `HdoptError` where it has no [tolerances] or no [requirement], and no [linear_stack].
+    """
     study = as_study(study)
     if "linear_stack" in study.sections:
         return _linear(study)
-    tolerances, requirement = study.section("tolerances", "a stack"), study.section("requirement", "a stack")
-    contributors = study.sections.get("contributors")
-    problem = drive_problem(
-        study.drive,
-        _not_measured(study, tolerances.distributions(study.folder)),
-        held=study.errors if "errors" in study.sections else None,
-        contributors=contributors.build() if contributors else None,
-        correlations=[row.build() for row in tolerances.correlation],
-        homogenization=_homogenization(study, requirement.homogenization),
-    )
+    problem, requirement = drive_problem_of(study), study.section("requirement", RequirementSection, "a stack")
     notes = []
     if problem.replaced:
         notes.append(f"callouts take the place of the tolerances of {', '.join(problem.replaced)}")
     if problem.freed:
         notes.append(f"[tolerances] does not give {', '.join(problem.freed)}: free over the full turn")
-    limit, required = requirement.peak_to_peak_arcmin, getattr(requirement, "yield")
     response, said = with_effects(study, problem.response)
-    return StudyProblem(study.name, response, problem.space, limit, required, "arcmin", (*notes, *said))
+    return StudyProblem(
+        study.name,
+        response,
+        problem.space,
+        requirement.peak_to_peak_arcmin,
+        requirement.required_yield,
+        "arcmin",
+        (*notes, *said),
+    )
+
+
+def drive_problem_of(study: Study) -> DriveProblem:
+    """The drives of a `study` under its [tolerances] and [contributors], without effects: their response, arcmin, and
+    their random inputs. Raises `HdoptError` where it has no [tolerances] or no [requirement]."""
+    tolerances = study.section("tolerances", TolerancesBase, "a stack")
+    requirement = study.section("requirement", RequirementSection, "a stack")
+    contributors = study.find("contributors", ContributorsSection)
+    return drive_problem(
+        study.drive,
+        _not_measured(study, tolerances.distributions(study.folder)),
+        held=study.errors if "errors" in study.sections else None,
+        contributors=None if contributors is None else contributors.build(),
+        correlations=[row.build() for row in tolerances.correlation],
+        homogenization=_homogenization(study, requirement.homogenization),
+    )
 
 
 def _not_measured(study: Study, distributions: dict[str, Distribution]) -> dict[str, Distribution]:
@@ -96,7 +114,7 @@ def with_effects(study: Study, response: DriveResponse) -> tuple[Response, tuple
 def _linear(study: Study) -> StudyProblem:
     from hdopt.tolerance.linear_stack import Dimension, linear_problem
 
-    section = study.section("linear_stack")
+    section = study.section("linear_stack", LinearStackSection)
     response, space = linear_problem(
         {name: Dimension(d.sensitivity, d.tolerance, d.sigmas) for name, d in section.dimensions.items()}
     )
@@ -165,10 +183,10 @@ def stack(
         from hdopt.tolerance.tail import tail_probability
 
         rare = tail_probability(problem.response, problem.space, tail, seed=seed)
-    method, error = _method(problem, seed)
-    if error is not None and error.says is not None:
-        notes.append(error.says)
-    return StackResult(problem.study, result, worst, rare, tuple(notes), method, error)
+    method, distance = _method(problem, seed)
+    if distance is not None and distance.says is not None:
+        notes.append(distance.says)
+    return StackResult(problem.study, result, worst, rare, tuple(notes), method, distance)
 
 
 def _method(problem: StudyProblem, seed: int) -> tuple[str | None, ModelError | None]:
@@ -204,17 +222,17 @@ def sobol(
     problem = study_problem(study)
     if shapley not in (None, "inputs", "groups"):
         raise HdoptError(unknown_name("set of Shapley players", shapley, ("inputs", "groups")))
-    options = {"n": n, "seed": seed, "engine": engine, "unit": problem.unit}
+    response, unit = problem.response, problem.unit
     space, notes, indices = problem.space, list(problem.notes), None
     if space.copula.is_independent:
-        indices = run_sobol(problem.response, space, second_order=second_order, **options)
+        indices = run_sobol(response, space, n=n, second_order=second_order, seed=seed, engine=engine, unit=unit)
     elif shapley is None:
         shapley = "inputs" if space.dimension <= SHAPLEY_INPUTS or not space.groups else "groups"
         notes.append("inputs are correlated: Shapley effects share the variance, Sobol' indices would not sum up")
     if shapley is None:
         return SobolResult(problem.study, indices, None, tuple(notes))
     players = None if shapley == "inputs" else space.groups
-    effects = run_shapley(problem.response, space, players=players, **options)
+    effects = run_shapley(response, space, n=n, players=players, seed=seed, engine=engine, unit=unit)
     return SobolResult(problem.study, indices, effects, tuple(notes))
 
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from hdopt.drive.profiles import TwoDisk
 from hdopt.errors import HdoptError
-from hdopt.optimize.design_space import OWN_VARIABLES
 from hdopt.optimize.records import SearchResult
 from hdopt.study import Study
 from hdopt.study.write import study_toml, with_moved_paths
@@ -37,14 +37,14 @@ def chosen_study_toml(study: Study, result: SearchResult) -> str:
     gear, generator = drive.geometry, drive.wave_generator
     if not isinstance(gear.flexspline_teeth, int):
         raise HdoptError(f"the chosen module gives {gear.flexspline_teeth:.3f} teeth; there is no such drive to write")
-    profile = {
+    profile: dict[str, Any] = {
         "profile": generator.profile.name,
         "structure": generator.structure.value,
         "width_mm": generator.width,
         "semi_major_mm": generator.profile.semi_major,
         "bearing_thickness_mm": generator.bearing_thickness,
     }
-    if generator.profile.name in OWN_VARIABLES:
+    if isinstance(generator.profile, TwoDisk):
         profile["wrap_angle_deg"] = math.degrees(generator.profile.wrap_angle)
     geometry = asdict(gear)
     sizes = {f"{k}_mm": v for k, v in geometry.items() if not k.endswith("_teeth") and k != "pressure_angle"}

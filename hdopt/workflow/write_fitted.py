@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 
 
 def write_study(diagnosis: Diagnosis, drive: str, path: Path) -> None:
-    """Write a study file that starts from `drive` and holds the extended model: the fitted errors of the base model,
-    each effect that was named as [effects.ID], and in [operation] the condition of the recordings.
+    """Write to `path` a study that starts from `drive`, a shipped drive's name or a study file, and holds the extended
+    model of the `diagnosis`: the fitted errors of the base model, each effect that was named as [effects.ID], and in
+    [operation] the condition of the recordings.
 
     Intervals, and what the recordings left open, stand as comments. Raises `HdoptError` where there was no
     harmonic-drive model to fit.

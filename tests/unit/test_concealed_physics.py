@@ -22,6 +22,6 @@ def test_small_part_of_the_blind_proof(tmp_path):
 
 def test_its_section_comes_with_the_step_and_not_with_the_general_schema():
     assert "concealed" not in SECTIONS and step_sections()["concealed"]
-    assert load_study("concealed-physics", ("concealed.seed=7",)).section("concealed", "this").seed == 7
+    assert load_study("concealed-physics", ("concealed.seed=7",)).sections["concealed"].seed == 7
     with pytest.raises(HdoptError, match=r"unknown key 'concealed.sede'; did you mean 'concealed.seed'"):
         load_study("concealed-physics", ("concealed.sede=7",))

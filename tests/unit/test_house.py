@@ -23,10 +23,8 @@ UNDESCRIBED = {
     "optimize": 11,
     "report": 51,
     "simulation": 3,
-    "studies": 13,
-    "study": 9,
+    "studies": 6,
     "tolerance": 2,
-    "workflow": 9,
 }
 """Public functions, by room, whose docstring does not name every argument; these numbers only fall. Commands do not
 count: their arguments are described by their options."""

@@ -11,8 +11,9 @@ from hdopt.optimize.robustness import constants_of, perturb
 from hdopt.report import Figure, Table
 from hdopt.study import load_study
 from hdopt.workflow.search import search
-from hdopt.workflow.search_setup import sample_rows, tolerance_problem
+from hdopt.workflow.search_setup import sample_rows
 from hdopt.workflow.search_verification import verify
+from hdopt.workflow.stack import drive_problem_of
 from hdopt.workflow.steps import Context, find_step
 from hdopt.workflow.write_design import chosen_study_toml
 
@@ -52,7 +53,7 @@ def test_the_quantile_is_that_of_the_sample(study, result):
     rows = result.setup.trade.sample
     assert rows.shape == (512, 12)
     assert np.array_equal(rows, sample_rows(study, 512, 1))
-    response, _ = tolerance_problem(study)
+    response = drive_problem_of(study).response
     drive = result.setup.space.design(result.chosen.combination, result.chosen.values).drive
     values = np.sort(peak_to_peak_arcmin(drive, type(response.held).from_matrix(rows)))
     # Harrell and Davis' weights spread over the few largest of 512 drives.

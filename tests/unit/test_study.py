@@ -7,6 +7,7 @@ import pytest
 from hdopt.drive.geometry import Structure
 from hdopt.errors import HdoptError
 from hdopt.study import load_study, shipped_drives, shipped_studies
+from hdopt.study.tolerances import RequirementSection
 
 OWN = """
 [drive]
@@ -62,6 +63,21 @@ def test_every_shipped_study_loads(name):
         assert study.drive
 
 
+def test_a_section_is_what_its_reader_takes_it_for():
+    study = load_study(overrides=["requirement.yield=0.99"])
+    assert study.section("requirement", RequirementSection).required_yield == 0.99
+    assert study.find("export", RequirementSection) is None
+    with pytest.raises(TypeError, match="tolerances.* is a TolerancesSection, not a RequirementSection"):
+        study.find("tolerances", RequirementSection)
+    with pytest.raises(HdoptError, match="a shop needs a .export. section, which csf-25-80.toml does not have; add it"):
+        study.section("export", RequirementSection, "a shop")
+
+
+def test_a_misspelt_key_in_a_file_is_answered_with_the_name_that_the_file_uses(write):
+    with pytest.raises(HdoptError, match="unknown key 'yeild'; did you mean 'yield'"):
+        load_study(write(OWN + "[requirement]\npeak_to_peak_arcmin = 1\nyeild = 0.9\n"))
+
+
 @pytest.mark.parametrize("name", shipped_drives())
 def test_every_shipped_drive_loads_by_name(name):
     assert load_study(drive=name).drive
@@ -106,6 +122,9 @@ def test_set_changes_a_key_by_last_name_or_path(override, read):
         ("width_mm=wide", "--set wave_generator.width_mm: is 'wide'; it must be a valid number"),
         ("width_mm=inf", "--set wave_generator.width_mm: is inf; it must be a finite number"),
         ("structure=floating", "is 'floating'; it must be 'integral', 'automatic'"),
+        ("requirement.yield=1", "--set requirement.yield: is 1; it must be less than 1"),
+        ("requirement.yeild=0.99", "did you mean 'requirement.yield'?"),
+        ("requirement.required_yield=0.99", "unknown key 'requirement.required_yield'"),
     ],
 )
 def test_set_refuses_what_it_cannot_do(override, message):

@@ -81,10 +81,13 @@ def find_step(name: str) -> Step:
     if name not in STEPS:
         raise HdoptError(unknown_name("step", name, STEPS))
     module, _, attribute = STEPS[name].place.partition(":")
-    return getattr(import_module(module), attribute)
+    step: Step = getattr(import_module(module), attribute)
+    return step
 
 
 def requirement_arcmin(study: Study) -> float | None:
-    """The largest peak-to-peak error the study allows, arcmin, where it says one."""
-    section = study.sections.get("requirement")
-    return None if section is None else getattr(section, "peak_to_peak_arcmin", None)
+    """The largest peak-to-peak error that the `study` allows, arcmin; None where it does not say."""
+    from hdopt.study.tolerances import RequirementSection
+
+    section = study.find("requirement", RequirementSection)
+    return None if section is None else section.peak_to_peak_arcmin

@@ -55,8 +55,8 @@ def sensitivities(study: Study, context: Context) -> StepResult:
         ("WG width", width, "mm", with_width),
     ):
         low, high = value * (1 - RELATIVE_CHANGE), value * (1 + RELATIVE_CHANGE)
-        result = [converged_peak_to_peak_arcmin(change(drive, end), errors) for end in (low, high)]
-        rows.append(_row(variable, f"{low:.3g} {unit}", f"{high:.3g} {unit}", *result))
+        at_low, at_high = (converged_peak_to_peak_arcmin(change(drive, end), errors) for end in (low, high))
+        rows.append(_row(variable, f"{low:.3g} {unit}", f"{high:.3g} {unit}", at_low, at_high))
     frame = pd.DataFrame(rows)
     by_variable = {row.pop("variable"): row for row in frame.to_dict("records")}
     return StepResult(
@@ -112,13 +112,17 @@ def _of_error(drive: Drive, errors: DriveErrors, name: str) -> dict[str, object]
         change = RELATIVE_CHANGE * abs(value)
         if change == 0:
             return None
-    ends = np.array([value - change, value + change])
+    ends = (value - change, value + change)
     low, high = (converged_peak_to_peak_arcmin(drive, errors.with_(**{name: end})) for end in ends)
+    first, last = (_written(name, end) for end in ends)
+    return _row(NAMES[name], first, last, low, high)
+
+
+def _written(name: str, value: float) -> str:
+    """The `value` of the error `name`, in mm or deg."""
     if name in AMPLITUDE_NAMES:
-        written = [f"{end:.3g} mm" for end in ends]
-    else:
-        written = [f"{math.degrees(end):.3g} deg".replace("-", "−") for end in ends]
-    return _row(NAMES[name], *written, float(low), float(high))
+        return f"{value:.3g} mm"
+    return f"{math.degrees(value):.3g} deg".replace("-", "−")
 
 
 def _row(variable: str, low: str, high: str, low_arcmin: float, high_arcmin: float) -> dict[str, object]:

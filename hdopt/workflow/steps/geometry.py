@@ -11,7 +11,8 @@ if TYPE_CHECKING:
 
 
 def geometry(study: Study, context: Context) -> StepResult:
-    """Export the wave generator into the study's folder: STEP, DXF, drawing, and a picture where it can be rendered."""
+    """Export the wave generator of the `study` into the folder of the `context`: STEP, DXF, drawing, and a picture
+    where it can be rendered."""
     from hdopt.geometry.check import CheckFailed
     from hdopt.geometry.picture import NoPicture
     from hdopt.report import Section, Text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from hdopt.mechanics.bending import curvature_change, max_bending_stress
 from hdopt.mechanics.contact import contact_angle, homogenization_coefficient, meshing_teeth
 from hdopt.report.sections.profiles import profiles_section
 from hdopt.study import Study
+from hdopt.study.drive import WaveGeneratorSection
 from hdopt.workflow.steps import Context, StepResult
 
 USUAL_WRAP_ANGLE_DEG = 60.0
@@ -27,7 +29,7 @@ def alternatives(study: Study) -> dict[str, WaveGeneratorProfile]:
     drive = study.drive
     own, radius = drive.wave_generator.profile, drive.geometry.flexspline_inner_radius
     deflection = own.semi_major - radius
-    given = getattr(study.section("wave_generator"), "wrap_angle_deg", None)
+    given = study.section("wave_generator", WaveGeneratorSection).wrap_angle_deg
     wrap = math.radians(USUAL_WRAP_ANGLE_DEG if given is None else given)
     offered = (
         Ellipse.of_equal_perimeter(radius, own.semi_major),
@@ -60,7 +62,7 @@ def profiles(study: Study, context: Context) -> StepResult:
 
 def _merits(drive: Drive, study: Study) -> dict[str, float]:
     profile = drive.wave_generator.profile
-    angle = _given(contact_angle, drive.geometry, profile)
+    angle = _given(lambda: contact_angle(drive.geometry, profile))
     k_e = homogenization_coefficient(meshing_teeth(drive.geometry, angle)) if math.isfinite(angle) else math.nan
     single = converged_peak_to_peak_arcmin(drive, study.errors)
     return {
@@ -68,14 +70,14 @@ def _merits(drive: Drive, study: Study) -> dict[str, float]:
         "homogenization_coefficient": k_e,
         "peak_to_peak_arcmin": single,
         "evened_out_arcmin": k_e * single,
-        "max_bending_stress_mpa": _given(max_bending_stress, drive),
+        "max_bending_stress_mpa": _given(lambda: max_bending_stress(drive)),
         "perimeter_error_um": 1000 * perimeter_error(profile, drive.geometry.flexspline_inner_radius),
     }
 
 
-def _given(function, *arguments) -> float:
+def _given(value: Callable[[], float]) -> float:
     """The value, or nan where it needs a number that the study does not give."""
     try:
-        return function(*arguments)
+        return value()
     except MissingValue:
         return math.nan

@@ -34,15 +34,14 @@ def search(study: Study, context: Context) -> StepResult:
         "perturbations": [item.to_dict() for item in perturbed],
         "chosen_study": file.name,
     }
-    sections = trade_sections(result, trade_views(result), checked, perturbed, file.name)
-    if result.notes:
-        notes = tuple(Text(f"{note[:1].upper()}{note[1:]}.") for note in result.notes)
-        sections = [replace(sections[0], items=(*notes, *sections[0].items)), *sections[1:]]
+    first, *others = trade_sections(result, trade_views(result), checked, perturbed, file.name)
+    notes = tuple(Text(f"{note[:1].upper()}{note[1:]}.") for note in result.notes)
+    sections = (replace(first, items=(*notes, *first.items)), *others)
     says = (
         f"chosen wave generator: {chosen_words(result)}",
         f"study file: {file}  (hdopt export {file} --step wg.step)",
     )
-    return StepResult(tuple(sections), results, (file,), says)
+    return StepResult(sections, results, (file,), says)
 
 
 def _no_design(study: Study, result: SearchResult) -> StepResult:

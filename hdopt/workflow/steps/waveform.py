@@ -25,7 +25,8 @@ PAPER_ORDERS = ("1/N", "1", "2", "2(1+1/2N)", "2(1+1/N)")
 
 
 def words_of(shown: WaveformResult, study: Study) -> str:
-    """What a section says of the waveform: nothing where `study` has no effects."""
+    """What a section says above the waveform `shown` of a `study`: which direction it is of, where both count; "" for
+    a study without effects."""
     if not study.effects:
         return ""
     says = f"With the effects that the base model leaves out; {WAYS[shown.direction]} motion is shown"
