@@ -11,11 +11,11 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from hdopt.allocation.cost import CostModel, GradeTable, Piecewise
+from hdopt.allocation.cost import ConvexCost, CostModel, Expression, GradeTable, Piecewise
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 
@@ -88,14 +88,22 @@ class Requirement:
 
 
 def worst_case_rule(sensitivities: Sequence[float], limit: float, fixed: Sequence[float] = ()) -> Requirement:
-    """Tolerances add in full: sum |s_i| t_i + sum |fixed| <= limit."""
+    """Tolerances add in full: sum |s_i| t_i + sum |fixed| <= limit.
+
+    `sensitivities` s (k,) are the response's slopes over the k tolerances that may change; `fixed` holds what each
+    other tolerance adds to it, in the unit of `limit`.
+    """
     magnitudes = np.abs(np.asarray(sensitivities, float))
     offset = float(np.abs(np.asarray(fixed, float)).sum())
     return Requirement(limit, magnitudes, np.zeros_like(magnitudes), offset, rule="worst case")
 
 
 def rss_rule(sensitivities: Sequence[float], limit: float, fixed: Sequence[float] = ()) -> Requirement:
-    """Tolerances add as independent spreads: sqrt(sum (s_i t_i)^2 + sum fixed^2) <= limit."""
+    """Tolerances add as independent spreads: sqrt(sum (s_i t_i)^2 + sum fixed^2) <= limit.
+
+    `sensitivities` s (k,) are the response's slopes over the k tolerances that may change; `fixed` holds what each
+    other tolerance adds to it, in the unit of `limit`.
+    """
     magnitudes = np.abs(np.asarray(sensitivities, float))
     rest = float(np.linalg.norm(np.asarray(fixed, float))) if len(fixed) else 0.0
     return Requirement(limit, np.zeros_like(magnitudes), magnitudes, rest=rest, rule="root sum square")
@@ -140,7 +148,8 @@ def solve(items: Sequence[Item], requirement: Requirement) -> Solution:
 
 
 def check_feasible(items: Sequence[Item], requirement: Requirement) -> None:
-    """Raise `Infeasible`, naming the bounds that make it so, unless the tightest tolerances meet the requirement."""
+    """Raise `Infeasible`, naming the bounds that make it so, unless the tightest tolerances of `items` meet the
+    `requirement`; `HdoptError` where an item's own bounds miss its cost data."""
     tightest = np.array([item.bounds[0] for item in items])
     for item in items:
         low, high = item.bounds
@@ -163,7 +172,15 @@ def check_feasible(items: Sequence[Item], requirement: Requirement) -> None:
     )
 
 
-def _finish(items: Sequence[Item], requirement: Requirement, tolerances: Array, **rest) -> Solution:
+def _finish(
+    items: Sequence[Item],
+    requirement: Requirement,
+    tolerances: Array,
+    *,
+    lower_bound: float,
+    marginal_cost: float | None,
+    solver: str,
+) -> Solution:
     costs = [float(item.cost.cost(t)) for item, t in zip(items, tolerances, strict=True)]
     slack = requirement.limit - requirement.value(tolerances)
     if slack < -FEASIBLE * abs(requirement.limit):
@@ -186,9 +203,11 @@ def _finish(items: Sequence[Item], requirement: Requirement, tolerances: Array, 
             if isinstance(item.cost, GradeTable)
         },
         total_cost=float(sum(costs)),
+        lower_bound=lower_bound,
+        marginal_cost=marginal_cost,
         slack=slack,
+        solver=solver,
         binding=binding,
-        **rest,
     )
 
 
@@ -199,6 +218,16 @@ def _scaled_bounds(items: Sequence[Item], scale: Array) -> tuple[Array, Array]:
 
 def _scales(items: Sequence[Item]) -> Array:
     return np.array([item.scale for item in items])
+
+
+def _smooth_cost(item: Item) -> ConvexCost:
+    """The item's cost where nothing is left to choose: one with a slope, and a form that the solver takes."""
+    if not isinstance(item.cost, ConvexCost):
+        raise HdoptError(
+            f"the cost of {item.name} is one of separate choices, where a curve is needed; give it a slope and an "
+            "expression, or call it discrete"
+        )
+    return item.cost
 
 
 def _solve_convex(items: Sequence[Item], requirement: Requirement) -> Solution:
@@ -218,8 +247,11 @@ def _solve_convex(items: Sequence[Item], requirement: Requirement) -> Solution:
     bounds = [t <= high]
     if np.any(low > 0):
         bounds.append(t >= low)
-    cost_unit = max(sum(abs(float(item.cost.slope(item.scale))) * item.scale for item in items), 1e-300)
-    cost = sum(item.cost.expression(t[i], item.scale) for i, item in enumerate(items)) / cost_unit
+    costs = [_smooth_cost(item) for item in items]
+    cost_unit = max(
+        sum(abs(float(cost.slope(item.scale))) * item.scale for item, cost in zip(items, costs, strict=True)), 1e-300
+    )
+    cost = sum(costs[i].expression(t[i], item.scale) for i, item in enumerate(items)) / cost_unit
     problem = cp.Problem(cp.Minimize(cost), [meets, *bounds])
     with warnings.catch_warnings():
         # asked for more digits than it may reach, the solver says so; slack and gap are computed anew below
@@ -271,7 +303,7 @@ def _lagrange_bound(items: Sequence[Item], requirement: Requirement, multiplier:
         low, high = item.bounds
         low, high = max(low, 1e-9 * t), min(high, 1e3 * t)
 
-        def lagrangian(log_t: float, item=item, s=s) -> float:
+        def lagrangian(log_t: float, item: Item = item, s: float = float(s)) -> float:
             return float(item.cost.cost(math.exp(log_t))) + multiplier * s * math.exp(log_t)
 
         found = minimize_scalar(
@@ -290,7 +322,7 @@ def _solve_with_choices(items: Sequence[Item], requirement: Requirement) -> Solu
     constraints, curved = _choices(items, t, cost, low, high)
     constraints.append(_requirement_tangent(requirement, scale, unit, t, np.clip(np.ones(len(items)), low, high)))
     best: tuple[float, Array, float | None] | None = None
-    bound, tried = -math.inf, set()
+    bound, tried = -math.inf, set[tuple[Choice, ...]]()
     for _ in range(ROUNDS):
         problem = cp.Problem(cp.Minimize(cp.sum(cost)), constraints)
         _solve(problem, cp.HIGHS, mip_rel_gap=1e-9, mip_abs_gap=1e-12)
@@ -332,12 +364,18 @@ def _solve_with_choices(items: Sequence[Item], requirement: Requirement) -> Solu
     )
 
 
-def _choices(items: Sequence[Item], t: Any, cost: Any, low: Array, high: Array) -> tuple[list[Any], list[int]]:
+Choice: TypeAlias = float | tuple[tuple[float, float], ...] | None
+"""What a master problem's solution chose for an item: a grade's tolerance, the ends of a segment, or nothing."""
+
+
+def _choices(
+    items: Sequence[Item], t: Expression, cost: Expression, low: Array, high: Array
+) -> tuple[list[Expression], list[int]]:
     """Constraints of the master problem: one grade or segment of each item that has some, first tangents below the
-    cost of the others; and which those others are. `t` and `cost` are CVXPY's variables, which have no types."""
+    cost of the others; and which those others are. `t` and `cost` are CVXPY's variables, one entry an item."""
     import cvxpy as cp
 
-    constraints: list[Any] = [t <= high, t >= low]
+    constraints: list[Expression] = [t <= high, t >= low]
     curved: list[int] = []
     for i, item in enumerate(items):
         if isinstance(item.cost, GradeTable):
@@ -347,15 +385,15 @@ def _choices(items: Sequence[Item], t: Any, cost: Any, low: Array, high: Array) 
             costs = np.array([g.cost for g in allowed])
             constraints += [cp.sum(pick) == 1, t[i] == tolerances @ pick, cost[i] == costs @ pick]
         elif isinstance(item.cost, Piecewise) and not item.cost.convex:
-            constraints += _piecewise_choice(item, t[i], cost[i])
+            constraints += _piecewise_choice(item.cost, item.scale, t[i], cost[i])
         else:
             curved.append(i)
             constraints += [_cost_tangent(items[i], t[i], cost[i], x) for x in _first_tangents(low[i], high[i])]
     return constraints, curved
 
 
-def _choice(item: Item, tolerance: float) -> float | tuple[tuple[float, float], ...] | None:
-    """What a master problem's solution chose for an item: a grade's tolerance, the ends of a segment, or nothing."""
+def _choice(item: Item, tolerance: float) -> Choice:
+    """What the item's `tolerance` in a master problem's solution means."""
     if isinstance(item.cost, GradeTable):
         return float(item.cost.nearest(tolerance).tolerance)
     if isinstance(item.cost, Piecewise) and not item.cost.convex:
@@ -364,7 +402,9 @@ def _choice(item: Item, tolerance: float) -> float | tuple[tuple[float, float], 
     return None
 
 
-def _solve_choice(items: Sequence[Item], requirement: Requirement, choice: tuple) -> tuple[Array, float | None] | None:
+def _solve_choice(
+    items: Sequence[Item], requirement: Requirement, choice: tuple[Choice, ...]
+) -> tuple[Array, float | None] | None:
     """Least-cost tolerances once all choices are made, with the marginal cost of what is left to choose; None where
     they leave no room."""
     chosen = np.array([c if isinstance(c, float) else 0.0 for c in choice])
@@ -379,7 +419,8 @@ def _solve_choice(items: Sequence[Item], requirement: Requirement, choice: tuple
         math.hypot(requirement.rest, float(np.linalg.norm(requirement.quadratic * chosen))),
         requirement.rule,
     )
-    convex = [items[i] if choice[i] is None else replace(items[i], cost=Piecewise(choice[i])) for i in free]
+    segments = [(items[i], choice[i]) for i in free]
+    convex = [replace(item, cost=Piecewise(ends)) if isinstance(ends, tuple) else item for item, ends in segments]
     try:
         check_feasible(convex, remaining)
     except Infeasible:
@@ -393,34 +434,35 @@ def _first_tangents(low: float, high: float) -> Array:
     return np.geomspace(max(low, 1e-2), min(max(high, 2e-2), 1e2), 12)
 
 
-def _cost_tangent(item: Item, t, cost, at: float):
-    value, slope = float(item.cost.cost(at * item.scale)), float(item.cost.slope(at * item.scale)) * item.scale
+def _cost_tangent(item: Item, t: Expression, cost: Expression, at: float) -> Expression:
+    smooth = _smooth_cost(item)
+    value, slope = float(smooth.cost(at * item.scale)), float(smooth.slope(at * item.scale)) * item.scale
     return cost >= value + slope * (t - at)
 
 
-def _requirement_tangent(requirement: Requirement, scale: Array, unit: float, t, at: Array):
+def _requirement_tangent(requirement: Requirement, scale: Array, unit: float, t: Expression, at: Array) -> Expression:
     slope = requirement.slope(at * scale) * scale
     return (requirement.value(at * scale) + slope @ (t - at)) / unit <= requirement.limit / unit
 
 
-def _piecewise_choice(item: Item, t, cost) -> list:
-    """One segment is chosen; the point lies on it."""
+def _piecewise_choice(lines: Piecewise, scale: float, t: Expression, cost: Expression) -> list[Expression]:
+    """One segment of `lines` is chosen; the point lies on it."""
     import cvxpy as cp
 
-    points = np.array(item.cost.points)
+    points = np.array(lines.points)
     segments = len(points) - 1
     pick, along = cp.Variable(segments, boolean=True), cp.Variable(segments, nonneg=True)
     steps = np.diff(points, axis=0)
     return [
         cp.sum(pick) == 1,
         along <= pick,
-        t * item.scale == points[:-1, 0] @ pick + steps[:, 0] @ along,
+        t * scale == points[:-1, 0] @ pick + steps[:, 0] @ along,
         cost == points[:-1, 1] @ pick + steps[:, 1] @ along,
     ]
 
 
 def cost_curve(items: Sequence[Item], requirement: Requirement, limits: Sequence[float]) -> list[tuple[float, float]]:
-    """Least cost at each limit; NaN where the limit cannot be met."""
+    """(limit, least cost) of the `items` under the `requirement` with each of `limits`; NaN where it cannot be met."""
     curve = []
     for limit in limits:
         try:
@@ -431,5 +473,5 @@ def cost_curve(items: Sequence[Item], requirement: Requirement, limits: Sequence
 
 
 def total_cost(items: Sequence[Item], tolerances: Mapping[str, float]) -> float:
-    """Cost of given tolerances."""
+    """Sum of what the given `tolerances`, by name, cost by the cost models of `items`."""
     return float(sum(float(item.cost.cost(tolerances[item.name])) for item in items))

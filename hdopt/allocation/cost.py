@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Protocol
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,11 +13,15 @@ from numpy.typing import ArrayLike
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 
+Expression: TypeAlias = Any
+"""A variable or expression of cvxpy, which has no types for them."""
+
 
 class CostModel(Protocol):
     """Cost of a tolerance, falling as the tolerance grows. `discrete` models offer a list of choices."""
 
-    discrete: bool
+    @property
+    def discrete(self) -> bool: ...
 
     def cost(self, tolerance: ArrayLike) -> Array: ...
 
@@ -26,13 +30,14 @@ class CostModel(Protocol):
         """Smallest and largest tolerance the model speaks of."""
 
 
+@runtime_checkable
 class ConvexCost(CostModel, Protocol):
     """A cost that a convex solver can take whole."""
 
     def slope(self, tolerance: ArrayLike) -> Array:
         """d cost/d tolerance."""
 
-    def expression(self, variable, scale: float):
+    def expression(self, variable: Expression, scale: float) -> Expression:
         """The cost as a cvxpy expression of tolerance = variable * scale."""
 
 
@@ -61,7 +66,7 @@ class Power:
     def slope(self, tolerance: ArrayLike) -> Array:
         return -self.k * self.b * np.asarray(tolerance, float) ** (-self.k - 1)
 
-    def expression(self, variable, scale: float):
+    def expression(self, variable: Expression, scale: float) -> Expression:
         import cvxpy as cp
 
         # k is a decimal such as 0.43899: the power cone of Clarabel takes it as it is, fractions would only come near
@@ -94,7 +99,7 @@ class Exponential:
     def slope(self, tolerance: ArrayLike) -> Array:
         return -self.a / self.b * np.exp(-np.asarray(tolerance, float) / self.b)
 
-    def expression(self, variable, scale: float):
+    def expression(self, variable: Expression, scale: float) -> Expression:
         import cvxpy as cp
 
         return self.fixed + self.a * cp.exp(-variable * (scale / self.b))
@@ -135,14 +140,15 @@ class Piecewise:
         return not self.convex
 
     def cost(self, tolerance: ArrayLike) -> Array:
-        return np.interp(tolerance, *np.transpose(self.points))
+        tolerances, costs = np.transpose(self.points)
+        return np.asarray(np.interp(np.asarray(tolerance, float), tolerances, costs))
 
     def slope(self, tolerance: ArrayLike) -> Array:
         slopes = np.array([slope for slope, _ in self.segments])
         index = np.searchsorted([t for t, _ in self.points[1:-1]], tolerance, side="right")
         return slopes[index]
 
-    def expression(self, variable, scale: float):
+    def expression(self, variable: Expression, scale: float) -> Expression:
         import cvxpy as cp
 
         return cp.maximum(*(slope * scale * variable + start for slope, start in self.segments), -1e300)
@@ -188,7 +194,8 @@ class GradeTable:
         return min(fitting, key=lambda grade: grade.cost)
 
     def cost(self, tolerance: ArrayLike) -> Array:
-        return np.vectorize(lambda t: self.at_most(t).cost, otypes=[float])(tolerance)
+        costs: Array = np.vectorize(lambda t: self.at_most(t).cost, otypes=[float])(tolerance)
+        return costs
 
 
 COST_MODELS: dict[str, type] = {

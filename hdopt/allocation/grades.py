@@ -36,7 +36,11 @@ IT_MICRONS: dict[str, tuple[float, ...]] = {
 
 
 def it_grade(grade: str, nominal_mm: float) -> GradeValue:
-    """Standard tolerance of an IT grade at a nominal size, mm (ISO 286-1:2010, Table 1; sizes up to 500 mm)."""
+    """Standard tolerance, mm, of an IT `grade` such as 'IT7' at the nominal size `nominal_mm` (ISO 286-1:2010, Table
+    1).
+
+    Raises `HdoptError` for a grade that the table does not hold (IT1 to IT11) and for sizes beyond 500 mm.
+    """
     if grade not in IT_MICRONS:
         raise HdoptError(unknown_name("IT grade", grade, IT_MICRONS))
     if not 0 < nominal_mm <= IT_SIZES_MM[-1]:
@@ -51,8 +55,12 @@ ISO_1328_CLASSES = range(1, 12)
 
 def iso_1328_pitch(grade: int, diameter_mm: float, module_mm: float) -> GradeValue:
     """Total cumulative pitch tolerance F_pT, mm, of a flank tolerance class of ISO 1328-1:2013:
-    (0.002 d + 0.55 sqrt(d) + 0.7 m + 12) sqrt(2)^(A - 5) um. The standard starts at module 0.5: below, and beyond its
-    classes 1 to 11, the value is extrapolated and says so."""
+    (0.002 d + 0.55 sqrt(d) + 0.7 m + 12) sqrt(2)^(A - 5) um.
+
+    `grade` is the class A, `diameter_mm` the pitch diameter d and `module_mm` the module m. The standard starts at
+    module 0.5: below, and beyond its classes 1 to 11, the value is extrapolated and says so. Raises `HdoptError` for a
+    gear without size.
+    """
     _check_gear(diameter_mm, module_mm)
     microns = (0.002 * diameter_mm + 0.55 * diameter_mm**0.5 + 0.7 * module_mm + 12) * 2 ** ((grade - 5) / 2)
     low, high = ISO_1328_MODULES
@@ -83,8 +91,12 @@ JIS_MODULES = (0.2, 25.0)
 
 
 def jis_1702_pitch(grade: int, diameter_mm: float, module_mm: float) -> GradeValue:
-    """Accumulated pitch error, mm, of a grade of JIS B 1702-1976 (fine pitch included, from module 0.2):
-    k W + c um with the tolerance unit W = d^(1/3) + 0.65 m."""
+    """Accumulated pitch error, mm, of a `grade` (0 to 8) of JIS B 1702-1976 (fine pitch included, from module 0.2):
+    k W + c um with the tolerance unit W = d^(1/3) + 0.65 m.
+
+    `diameter_mm` is the pitch diameter d, `module_mm` the module m; beyond the standard's modules the value is
+    extrapolated and says so. Raises `HdoptError` for another grade, and for a gear without size.
+    """
     _check_gear(diameter_mm, module_mm)
     if not 0 <= grade < len(JIS_PITCH_MICRONS):
         raise HdoptError(f"JIS B 1702 grade {grade} does not exist; its grades are 0 to {len(JIS_PITCH_MICRONS) - 1}")

@@ -63,7 +63,7 @@ class AllocationProblem:
     @property
     def current(self) -> Array:
         """Tolerances as they are."""
-        return np.array([self.space.tolerances[item.name].value for item in self.items])
+        return np.array([self.space.values[item.name] for item in self.items])
 
     def space_at(self, tolerances: Array) -> InputSpace:
         return self.space.with_tolerances(self.by_name(tolerances))
@@ -106,8 +106,10 @@ class _Constraint:
 def yield_margin(required_yield: float, design_n: int, verify_n: int, scramblings: int = 16) -> float:
     """By how much the design's yield must exceed the required one for a verification to pass with its lower bound.
 
-    Three standard deviations of the difference of both estimates, and the verification's own half width; both taken as
-    of independent points, which scrambled ones do not exceed.
+    The design is found on `design_n` points, verified on `verify_n` in so many `scramblings`; `required_yield` lies in
+    0 to 1. Three standard deviations of the difference of both estimates, and the verification's own half width; both
+    taken as of independent points, which scrambled ones do not exceed. Raises `HdoptError` where the margin leaves no
+    yield below 1 to aim at.
     """
     variance = required_yield * (1 - required_yield)
     half_width = float(special.stdtrit(scramblings - 1, 0.975)) * math.sqrt(variance / verify_n)
@@ -121,11 +123,12 @@ def yield_margin(required_yield: float, design_n: int, verify_n: int, scrambling
 
 
 def allocate_by_yield(problem: AllocationProblem, seed: int = 1, verify_n: int = DESIGN_POINTS) -> Allocation:
-    """Least cost under P(response <= limit) >= yield, with the margin of `yield_margin`.
+    """Least cost of the `problem`'s tolerances under P(response <= limit) >= yield, with the margin of `yield_margin`
+    for a verification by `verify_n` points.
 
-    Successive linear models of the quantile on one fixed sample, whose slope is the mean slope of the drives next to
-    the quantile; then the limit is corrected by what a larger sample says of the quantile. Raises `Infeasible` where
-    even the tightest tolerances do not.
+    `seed` draws the model's sample, `seed` + 1 the larger one. Successive linear models of the quantile on one fixed
+    sample, whose slope is the mean slope of the drives next to the quantile; then the limit is corrected by what a
+    larger sample says of the quantile. Raises `Infeasible` where even the tightest tolerances do not.
     """
     target = problem.required_yield + yield_margin(problem.required_yield, DESIGN_POINTS, verify_n)
     constraint = _quantile_constraint(problem, target, seed)
@@ -145,7 +148,11 @@ def allocate_by_yield(problem: AllocationProblem, seed: int = 1, verify_n: int =
 
 
 def allocate_by_worst_case(problem: AllocationProblem, seed: int = 1) -> Allocation:
-    """Least cost while the largest response over the tolerance box (as far as the search finds it) keeps the limit."""
+    """Least cost of the `problem`'s tolerances while the largest response over their box keeps the limit.
+
+    It is the largest as far as the search of `find_worst_case` with `seed` finds it. Raises `Infeasible` where even the
+    tightest tolerances do not keep the limit, `Unbounded` where an input is.
+    """
     space, items = problem.space, problem.items
     columns = [space.index(item.name) for item in items]
     centres = np.array([space.tolerances[item.name].centre for item in items])
@@ -174,7 +181,8 @@ def allocate_by_worst_case(problem: AllocationProblem, seed: int = 1) -> Allocat
 
 
 def allocate_by_rss(problem: AllocationProblem, seed: int = 1) -> Allocation:
-    """Least cost under the root-sum-square stack, its line drawn at the tolerances it leads to."""
+    """Least cost of the `problem`'s tolerances under the root-sum-square stack, its line drawn at the tolerances it
+    leads to; `seed` draws the directions that the line is averaged over. Raises `Infeasible` as `allocate_by_yield`."""
     z = float(special.ndtri(problem.required_yield))
     names = [item.name for item in problem.items]
 
@@ -202,7 +210,12 @@ def allocate_by_rss(problem: AllocationProblem, seed: int = 1) -> Allocation:
 
 
 def allocate_by_equal_scaling(problem: AllocationProblem, seed: int = 1) -> Allocation:
-    """All tolerances times one factor, the largest that meets the yield: no cost is looked at."""
+    """All tolerances of the `problem` times one factor (0.01 to 4), the largest that meets the yield on the sample that
+    `seed` draws: no cost is looked at.
+
+    Grades take the cheapest that keeps the scaled tolerance. Raises `Infeasible` where a hundredth of every tolerance
+    is still too much.
+    """
     from scipy.optimize import brentq
 
     constraint = _quantile_constraint(problem, problem.required_yield, seed)
@@ -216,7 +229,7 @@ def allocate_by_equal_scaling(problem: AllocationProblem, seed: int = 1) -> Allo
     grades = {}
     for i, item in enumerate(problem.items):
         low, high = item.bounds
-        if item.cost.discrete and hasattr(item.cost, "at_most"):
+        if isinstance(item.cost, GradeTable):
             grade = item.cost.at_most(max(tolerances[i], low))
             tolerances[i], grades[item.name] = grade.tolerance, grade.name
         else:
@@ -237,7 +250,8 @@ def allocate_by_equal_scaling(problem: AllocationProblem, seed: int = 1) -> Allo
 
 
 def verify(problem: AllocationProblem, tolerances: Mapping[str, float], seed: int, n: int) -> Stack:
-    """The one verification: a stack of the allocated tolerances with `n` fixed beforehand and a seed of its own."""
+    """The one verification: a stack of the `problem` with the allocated `tolerances` (by name), with `n` points fixed
+    beforehand and a `seed` of its own."""
     at = np.array([tolerances[item.name] for item in problem.items])
     return _judge(problem, at, n, seed)
 
@@ -412,8 +426,11 @@ def _allocation(
 
 
 def yield_cost_curve(problem: AllocationProblem, limits: Sequence[float], seed: int = 1) -> list[tuple[float, float]]:
-    """Least cost by the yield rule at each limit, NaN where it cannot be met; as the rule's models see it, with its
-    margin but without the correction by a larger sample (within about 1 % of the limit)."""
+    """(limit, least cost) of the `problem` by the yield rule at each of `limits`, NaN where it cannot be met.
+
+    As the rule's models see it on the sample that `seed` draws, with the rule's margin but without the correction by a
+    larger sample (within about 1 % of the limit).
+    """
     target = problem.required_yield + yield_margin(problem.required_yield, DESIGN_POINTS, DESIGN_POINTS)
     curve = []
     for limit in limits:

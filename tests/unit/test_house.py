@@ -16,7 +16,6 @@ KERNELS: dict[str, str] = {}
 """Compiled functions that may be longer, with the reason."""
 
 UNDESCRIBED = {
-    "allocation": 15,
     "bench": 53,
     "geometry": 79,
     "kinematics": 20,
