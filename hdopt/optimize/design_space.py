@@ -142,7 +142,7 @@ class DesignSpace:
     size: SizeRule
     variables: tuple[Variable, ...]
     combinations: tuple[Combination, ...]
-    _meshes: Callable = field(init=False, repr=False, compare=False)
+    _meshes: Callable[[str, float, float, float], Mesh] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_meshes", lru_cache(maxsize=512)(self._mesh))
@@ -168,7 +168,7 @@ class DesignSpace:
     def design(self, combination: Combination, values: Mapping[str, float]) -> Design:
         """The design with these values, the baseline's where one is not given. Raises `HdoptError` where impossible."""
         full = {**self.baseline_values, **values}
-        mesh = self._meshes(combination.profile, *(full[name] for name in MESH_VARIABLES))
+        mesh = self._meshes(combination.profile, full["module_mm"], full["deflection_ratio"], full["wrap_angle_deg"])
         geometry = replace(mesh.geometry, pressure_angle=math.radians(full["pressure_angle_deg"]))
         generator = replace(
             self.baseline.wave_generator,
@@ -193,6 +193,7 @@ def scaled_geometry(baseline: DriveGeometry, size: SizeRule, module: float) -> D
     says whether the teeth keep their number or the gear its diameter.
 
     R_b = m Z_FS/2 - h_fF - s: the baseline's own dedendum h_fF (what its pitch radius leaves below the wall) scales.
+    Tooth counts may lie between whole numbers while a search is under way; what it chooses has whole ones.
     """
     scale = module / baseline.module
     wall = baseline.flexspline_wall or 0.0
@@ -201,8 +202,8 @@ def scaled_geometry(baseline: DriveGeometry, size: SizeRule, module: float) -> D
     return replace(
         baseline,
         module=module,
-        flexspline_teeth=teeth,
-        circular_spline_teeth=teeth + TOOTH_DIFFERENCE,
+        flexspline_teeth=teeth,  # type: ignore[arg-type]  # see above: a count between whole numbers, for a while
+        circular_spline_teeth=teeth + TOOTH_DIFFERENCE,  # type: ignore[arg-type]  # the same
         flexspline_inner_radius=module * teeth / 2 - dedendum * scale - wall,
         flexspline_addendum=_times(baseline.flexspline_addendum, scale),
         circular_spline_addendum=_times(baseline.circular_spline_addendum, scale),

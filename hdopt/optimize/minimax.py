@@ -9,7 +9,17 @@ from __future__ import annotations
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.optimize.nlopt_adapter import NO_PROBLEM, Effort, Guard, MinimaxProblem, Outcome, find_algorithm, run
+from hdopt.optimize.nlopt_adapter import (
+    INTERRUPTED,
+    NO_PROBLEM,
+    Effort,
+    Guard,
+    MinimaxProblem,
+    Optimizer,
+    Outcome,
+    find_algorithm,
+    run,
+)
 
 LOCAL = "LD_SLSQP"
 """Fewest evaluations of all tried on the trade study, and none missed: `tests/benchmarks/test_search_methods.py`."""
@@ -35,18 +45,16 @@ def minimise(problem: MinimaxProblem, start: Array, algorithm: str = LOCAL, effo
         u, best = guard.best if guard.best else (start, None)
         return Outcome(u, best, guard.evaluations, guard.impossible, algorithm, NO_PROBLEM)
     if guard.failure is not None:
-        return run_nothing(guard, start, algorithm)
+        return run_nothing(guard, guard.failure, start, algorithm)
     scale = max(abs(first.objective), SMALL)
     return _epigraph(guard, start, scale, algorithm, effort)
 
 
-def run_nothing(guard: Guard, start: Array, algorithm: str) -> Outcome:
-    """The `start` itself failed before NLopt began: raise what `guard` caught, or after an interrupt hand back what
-    there is, as of `algorithm`."""
-    from hdopt.optimize.nlopt_adapter import INTERRUPTED
-
-    if not isinstance(guard.failure, KeyboardInterrupt):
-        raise guard.failure
+def run_nothing(guard: Guard, failure: BaseException, start: Array, algorithm: str) -> Outcome:
+    """The `start` itself failed before NLopt began: raise the `failure` that `guard` caught, or after an interrupt hand
+    back what there is, as of `algorithm`."""
+    if not isinstance(failure, KeyboardInterrupt):
+        raise failure
     u, best = guard.best if guard.best else (start, None)
     return Outcome(u, best, guard.evaluations, guard.impossible, algorithm, INTERRUPTED, True)
 
@@ -62,13 +70,13 @@ def _epigraph(guard: Guard, start: Array, scale: float, algorithm: str, effort: 
     optimizer.set_lower_bounds([*np.zeros(n), level - 100.0])
     optimizer.set_upper_bounds([*np.ones(n), level + 100.0])
 
-    def objective(x, grad):
+    def objective(x: Array, grad: Array) -> float:
         if grad.size:
             grad[:] = 0.0
             grad[n] = 1.0
         return float(x[n])
 
-    def constraints(result, x, grad):
+    def constraints(result: Array, x: Array, grad: Array) -> None:
         found = guard(x)
         result[: problem.pieces] = found.pieces / scale - x[n]
         result[problem.pieces :] = found.constraints
@@ -95,13 +103,15 @@ def explore(problem: MinimaxProblem, algorithm: str = GLOBAL, effort: Effort | N
     guard = Guard(problem, slopes=False)
     centre = np.full(problem.n, 0.5)
     first = guard(centre)
-    if problem.n == 0 or guard.failure is not None:
-        return minimise(problem, centre, effort=effort) if problem.n == 0 else run_nothing(guard, centre, algorithm)
+    if problem.n == 0:
+        return minimise(problem, centre, effort=effort)
+    if guard.failure is not None:
+        return run_nothing(guard, guard.failure, centre, algorithm)
     scale = max(abs(first.objective), SMALL)
     nlopt.srand(effort.seed)
     optimizer = _optimizer(algorithm, problem.n, effort)
 
-    def objective(x, grad):
+    def objective(x: Array, grad: Array) -> float:
         found = guard(x)
         return found.objective / scale + PENALTY * found.violation
 
@@ -109,7 +119,7 @@ def explore(problem: MinimaxProblem, algorithm: str = GLOBAL, effort: Effort | N
     return run(optimizer, guard, centre, algorithm)
 
 
-def _optimizer(algorithm: str, n: int, effort: Effort):
+def _optimizer(algorithm: str, n: int, effort: Effort) -> Optimizer:
     import nlopt
 
     optimizer = nlopt.opt(find_algorithm(algorithm), n)

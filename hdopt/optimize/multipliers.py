@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from hdopt.optimize.design_space import VARIABLES
+from hdopt.arrays import Array
+from hdopt.optimize.design_space import VARIABLES, Variable
 from hdopt.optimize.objectives import find_quantity
-from hdopt.optimize.problem import DesignProblem
+from hdopt.optimize.problem import DesignProblem, Limit
 
 ACTIVE = 1e-4
 """How near a limit (as a share of it) or a bound (of the range) counts as active."""
@@ -30,6 +31,10 @@ class Price:
         return dict(vars(self))
 
 
+Owner: TypeAlias = Limit | tuple[Variable, float]
+"""What is active: a limit, or a variable at its upper (+1) or lower (-1) bound."""
+
+
 def prices(problem: DesignProblem, values: dict[str, float]) -> tuple[list[Price], float]:
     """Active limits and bounds of `problem` at the optimum `values` with their prices, and the residual of the
     optimality conditions.
@@ -46,7 +51,8 @@ def prices(problem: DesignProblem, values: dict[str, float]) -> tuple[list[Price
     found = problem.evaluate(u)
     scale = max(abs(found.objective), 1e-12)
     top = np.flatnonzero(found.pieces >= found.objective - ACTIVE * scale)
-    columns, owners = [np.append(found.piece_slopes[i] / scale, 1.0) for i in top], [None] * len(top)
+    columns: list[Array] = [np.append(found.piece_slopes[i] / scale, 1.0) for i in top]
+    owners: list[Owner] = []
     names = [limit for limit in problem.limits for _ in range(len(_pieces(problem, limit.quantity, values)))]
     for i, limit in enumerate(names):
         if found.constraints[i] >= -ACTIVE:
@@ -65,14 +71,14 @@ def prices(problem: DesignProblem, values: dict[str, float]) -> tuple[list[Price
     mixed = matrix[:, : len(top)] @ multipliers[: len(top)]
     size = float(np.linalg.norm(mixed[:-1])) or 1.0
     residual = float(np.linalg.norm(matrix @ multipliers - target)) / size
-    return _named(owners[len(top) :], multipliers[len(top) :] * scale), residual
+    return _named(owners, multipliers[len(top) :] * scale), residual
 
 
-def _pieces(problem: DesignProblem, quantity: str, values: dict[str, float]):
+def _pieces(problem: DesignProblem, quantity: str, values: dict[str, float]) -> Array:
     return find_quantity(quantity).pieces(problem.point(values))[0]
 
 
-def _named(owners: list, multipliers) -> list[Price]:
+def _named(owners: list[Owner], multipliers: Array) -> list[Price]:
     found: dict[str, Price] = {}
     for owner, multiplier in zip(owners, multipliers, strict=True):
         if isinstance(owner, tuple):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
@@ -65,9 +65,14 @@ class Evaluation:
 class MinimaxProblem(Protocol):
     """Minimise the largest piece subject to constraints, over the unit cube of dimension `n`."""
 
-    n: int
-    pieces: int
-    constraints: int
+    @property
+    def n(self) -> int: ...
+
+    @property
+    def pieces(self) -> int: ...
+
+    @property
+    def constraints(self) -> int: ...
 
     def evaluate(self, u: Array, slopes: bool = True) -> Evaluation:
         """Raises `HdoptError` where `u` is no possible design: such a point is avoided, not an end.
@@ -175,10 +180,15 @@ def find_algorithm(name: str) -> int:
     known = [item for item in dir(nlopt) if item[:3] in ("LD_", "LN_", "GN_", "GD_")]
     if name not in known:
         raise HdoptError(unknown_name("NLopt algorithm", name, known))
-    return getattr(nlopt, name)
+    number: int = getattr(nlopt, name)
+    return number
 
 
-def run(optimizer, guard: Guard, start: Array, name: str) -> Outcome:
+Optimizer: TypeAlias = Any
+"""An `nlopt.opt`; NLopt has no types."""
+
+
+def run(optimizer: Optimizer, guard: Guard, start: Array, name: str) -> Outcome:
     """Run a prepared NLopt `optimizer` on `guard` from `start` in the unit cube (n,); its best point whatever happens.
 
     `name` is that of the algorithm, for the result. Errors of the problem are raised.

@@ -19,7 +19,7 @@ from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, MissingValue, unknown_name
 from hdopt.kinematics.closed_form import tip_geometry
-from hdopt.kinematics.gradients import extremes_of
+from hdopt.kinematics.gradients import Extremes, extremes_of
 from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin
 from hdopt.mechanics.bearing_life import (
     BearingConstants,
@@ -29,7 +29,7 @@ from hdopt.mechanics.bearing_life import (
     radial_force,
     ring_force,
 )
-from hdopt.mechanics.bending import bending_stress
+from hdopt.mechanics.bending import bending_stress, ring_wall
 from hdopt.mechanics.contact import homogenization_coefficient
 from hdopt.mechanics.lag import cross_slide_lag_arcmin
 from hdopt.optimize.design_space import Combination, Design, DesignSpace
@@ -70,7 +70,8 @@ class DesignConditions:
     """Effects that count beside the errors."""
 
     def needed(self, name: str, needed_by: str) -> float:
-        value = getattr(self, name)
+        """The condition `name`, such as 'torque'; where it is not given, `MissingValue` says what is `needed_by` it."""
+        value: float | None = getattr(self, name)
         if value is None:
             raise MissingValue(needed_by, _KEYS[name])
         return value
@@ -84,12 +85,15 @@ class DesignConditions:
         """Weights of the sorted sample in the quantile (Harrell and Davis 1982): it moves smoothly with the design."""
         from scipy.stats import beta
 
-        if self.sample is None:
-            raise MissingValue("a quantile of the peak-to-peak", "a [tolerances] section")
-
-        n = len(self.sample)
+        n = len(self.drawn())
         edges = beta.cdf(np.arange(n + 1) / n, (n + 1) * self.quantile, (n + 1) * (1 - self.quantile))
         return np.diff(edges)
+
+    def drawn(self) -> Array:
+        """The fixed sample of errors, rows of `DriveErrors.to_matrix`; `MissingValue` where there is none."""
+        if self.sample is None:
+            raise MissingValue("a quantile of the peak-to-peak", "a [tolerances] section")
+        return self.sample
 
 
 _KEYS = {
@@ -109,7 +113,7 @@ class Point:
     combination: Combination
     values: dict[str, float]
     free: tuple[tuple[str, float], ...] = ()
-    _pairs: dict = field(default_factory=dict, repr=False, compare=False)
+    _pairs: dict[int, tuple[Design, Design]] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def design(self) -> Design:
@@ -119,10 +123,11 @@ class Point:
         """The designs a step below and above in one free variable."""
         if index not in self._pairs:
             name, step = self.free[index]
-            self._pairs[index] = tuple(
+            below, above = (
                 self.space.design(self.combination, {**self.values, name: self.values[name] + sign * step})
                 for sign in (-1, 1)
             )
+            self._pairs[index] = below, above
         return self._pairs[index]
 
     def slopes(self, function: Callable[[Design], Array | float]) -> Array:
@@ -140,9 +145,14 @@ class Point:
 class Quantity(Protocol):
     """One figure of merit: title, unit, and whether small or large is good."""
 
-    title: str
-    unit: str
-    small_is_good: bool
+    @property
+    def title(self) -> str: ...
+
+    @property
+    def unit(self) -> str: ...
+
+    @property
+    def small_is_good(self) -> bool: ...
 
     def value(self, trade: DesignConditions, design: Design) -> float: ...
 
@@ -168,13 +178,14 @@ class Scalar:
 
 
 def tip_features(design: Design) -> Array:
-    """L_W, rho0, b/2, tan(alpha) and arcmin per mm of arc: all that the kinematic error knows of a design."""
+    """L_W, rho0, b/2 (mm), tan(alpha) and arcmin per mm of arc, shape (5,): all that the kinematic error knows of a
+    `design`."""
     tip, gear = tip_geometry(design.drive), design.drive.geometry
     tan_alpha = math.tan(gear.pressure_angle)
     return np.array([tip.semi_major, tip.tip_radius, tip.half_width, tan_alpha, gear.arcmin_per_mm])
 
 
-def _envelope(design: Design, rows: Array):
+def _envelope(design: Design, rows: Array) -> Extremes:
     return extremes_of(tip_geometry(design.drive), math.tan(design.drive.geometry.pressure_angle), rows)
 
 
@@ -220,9 +231,7 @@ class PeakToPeakQuantile:
     small_is_good: bool = True
 
     def _sample(self, trade: DesignConditions, design: Design) -> Array:
-        if trade.sample is None:
-            raise MissingValue("a quantile of the peak-to-peak", "a [tolerances] section")
-        return matrix_peak_to_peak_arcmin(design.drive, trade.sample)
+        return matrix_peak_to_peak_arcmin(design.drive, trade.drawn())
 
     def value(self, trade: DesignConditions, design: Design) -> float:
         weights = trade.weights
@@ -237,7 +246,7 @@ class PeakToPeakQuantile:
             return np.array([float(weights @ values[order])]), np.empty((1, 0))
         counts = weights > 2e-3 * weights.max()
         chosen, share = order[counts], weights[counts]
-        found, features = _envelope(point.design, trade.sample[chosen]), point.slopes(tip_features)
+        found, features = _envelope(point.design, trade.drawn()[chosen]), point.slopes(tip_features)
         n = np.arange(len(chosen))
         slopes = found.high_slopes[n, found.highs.argmax(axis=1)] - found.low_slopes[:, 0]
         scale = point.design.drive.geometry.arcmin_per_mm
@@ -272,49 +281,62 @@ class LargestLag:
 
 
 def carrying_angle(trade: DesignConditions, design: Design) -> float:
-    """Half angle over which flanks carry, rad."""
+    """Half angle over which the flanks of `design` carry under the backlash of `trade`, rad (`Mesh.carrying_angle`)."""
     backlash = trade.needed("backlash", "the carrying angle")
     return design.mesh.carrying_angle(design.drive.geometry.pressure_angle, backlash)
 
 
 def flank_pressure(trade: DesignConditions, design: Design) -> float:
+    """Mean pressure, N/mm^2, on the flanks of `design` that can carry under the torque, face width and backlash of
+    `trade` (`Mesh.flank_pressure`)."""
     torque, face = trade.needed("torque", "the flank pressure"), trade.needed("face_width", "the flank pressure")
     return design.mesh.flank_pressure(torque, face, carrying_angle(trade, design))
 
 
 def carrying_teeth(trade: DesignConditions, design: Design) -> float:
+    """Teeth of one zone of `design`, one side counted, within the `carrying_angle` that `trade` leaves."""
     return design.drive.geometry.circular_spline_teeth * carrying_angle(trade, design) / (2 * math.pi)
 
 
 def largest_bending_stress(trade: DesignConditions, design: Design) -> float:
+    """Largest bending stress of the ring of `design`, N/mm^2, as a free ring; it does not depend on `trade`."""
     if design.drive.material is None:
         raise MissingValue("bending stress", "material.modulus_mpa", "material.poisson")
     change = design.mesh.largest_curvature_change
-    return float(bending_stress(design.drive.material, design.drive.geometry.flexspline_wall, change))
+    return float(bending_stress(design.drive.material, ring_wall(design.drive.geometry), change))
 
 
 def bending_safety(trade: DesignConditions, design: Design) -> float:
-    """Endurance limit over notch factor times bending stress, which alternates: n = sigma_-1/(K_sigma sigma_a)."""
+    """Endurance limit over notch factor times bending stress, which alternates: n = sigma_-1/(K_sigma sigma_a).
+
+    K_sigma is the notch factor of `trade`, sigma_a the `largest_bending_stress` of `design`. Raises `MissingValue`
+    where the material has no endurance limit.
+    """
     if design.drive.material is None or design.drive.material.endurance is None:
         raise MissingValue("the safety against bending fatigue", "material.endurance_mpa")
     return design.drive.material.endurance / (trade.notch_factor * largest_bending_stress(trade, design))
 
 
 def trailing_flank_room(trade: DesignConditions, design: Design) -> float:
+    """Least room of the trailing flank of `design` under the backlash of `trade`, mm; below 0 the flanks jam."""
     backlash = trade.needed("backlash", "the room of the trailing flank")
     return design.mesh.trailing_flank_room(design.drive.geometry.pressure_angle, backlash)
 
 
 def largest_radial_force(trade: DesignConditions, design: Design) -> float:
+    """`radial_force` on the wave generator of `design` under the torque of `trade`, N."""
     return radial_force(design.drive.geometry, trade.needed("torque", "the radial force"))
 
 
 def largest_axial_force(trade: DesignConditions, design: Design) -> float:
+    """`axial_force` on the wave generator of `design` under the torque and friction of `trade`, N."""
     torque = trade.needed("torque", "the axial force")
     return axial_force(design.drive.geometry, torque, trade.bearing.friction)
 
 
 def life(trade: DesignConditions, design: Design) -> float:
+    """L10 of the wave generator's bearing of `design`, hours, under the torque and speed of `trade`, from the life that
+    the makers rate the reference drive of `trade` for (`bearing_life_h`)."""
     torque, speed = trade.needed("torque", "the bearing's life"), trade.needed("speed", "the bearing's life")
     constants, reference = trade.bearing, trade.reference
     load = bearing_load(design.drive.geometry, torque, constants.friction, ring_load(trade, design.drive))
@@ -324,7 +346,10 @@ def life(trade: DesignConditions, design: Design) -> float:
 
 
 def ring_load(trade: DesignConditions, drive: Drive) -> float:
-    """Force that bends the toothed ring; none where wall, face width or modulus is not given."""
+    """`ring_force` that bends the toothed ring of `drive`, N, over the face width of `trade`.
+
+    0 where wall, face width or modulus is not given.
+    """
     gear = drive.geometry
     if drive.material is None or gear.flexspline_wall is None or trade.face_width is None:
         return 0.0
@@ -333,6 +358,8 @@ def ring_load(trade: DesignConditions, drive: Drive) -> float:
 
 
 def evened_out(trade: DesignConditions, design: Design) -> float:
+    """Peak-to-peak of `design` with the errors of `trade`, times k_e of its teeth in mesh (Jia 2021, Eq. (13)),
+    arcmin."""
     teeth = design.drive.geometry.circular_spline_teeth * design.mesh.contact_angle / (2 * math.pi)
     k_e = homogenization_coefficient(teeth, trade.k_b)
     if trade.added is not None:

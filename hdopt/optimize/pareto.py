@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hdopt.arrays import Array
+from hdopt.arrays import Mask
 from hdopt.optimize.objectives import find_quantity
 from hdopt.optimize.problem import DesignProblem, Limit
 from hdopt.optimize.solve import Method, Solution, solve
@@ -47,7 +47,7 @@ def front(
     ]
     slack = abs(ends[1]) * KEPT_EQUAL * (1 if quantity.small_is_good else -1)
     found = [best]
-    for bound in np.linspace(*ends, points)[1:]:
+    for bound in np.linspace(ends[0], ends[1], points)[1:]:
         limit = Limit(second, float(bound) + slack, at_least=not quantity.small_is_good)
         limited = problem.with_limits(limit)
         solution = solve(limited, method, [found[-1].values])
@@ -65,19 +65,19 @@ def _with_objective(problem: DesignProblem, objective: str) -> DesignProblem:
     return replace(problem, objective=objective, limits=limits)
 
 
-def non_dominated(points: ArrayLike, slack: float = 0.0) -> Array:
+def non_dominated(points: ArrayLike, slack: float = 0.0) -> Mask:
     """Which rows of `points` (n, d), small is good, no other row beats in everything: boolean (n,).
 
     Of rows that are equal the first stays. With `slack`, a share of each value, a row is beaten by one that is better
     by more than it in one coordinate and worse by no more than it in the others: what only rounding tells apart.
     """
-    points = np.asarray(points, float)
-    kept = np.ones(len(points), bool)
-    for i, point in enumerate(points):
-        margin = slack * np.abs(point)
-        no_worse = (points <= point + margin).all(axis=1)
-        better = no_worse & (points < point - margin).any(axis=1)
-        equal_before = no_worse & (points == point).all(axis=1) & (np.arange(len(points)) < i)
+    rows = np.asarray(points, float)
+    kept = np.ones(len(rows), bool)
+    for i, row in enumerate(rows):
+        margin = slack * np.abs(row)
+        no_worse = (rows <= row + margin).all(axis=1)
+        better = no_worse & (rows < row - margin).any(axis=1)
+        equal_before = no_worse & (rows == row).all(axis=1) & (np.arange(len(rows)) < i)
         kept[i] = not (better.any() or equal_before.any())
     return kept
 
@@ -85,18 +85,18 @@ def non_dominated(points: ArrayLike, slack: float = 0.0) -> Array:
 def pareto(items: Iterable[T], points: Sequence[Sequence[float]], slack: float = 0.0) -> list[T]:
     """The non-dominated of `items`, sorted by the first coordinate of their `points`; one must be better by more than
     the share `slack` to dominate."""
-    items, points = list(items), np.asarray(points, float).reshape(-1, 2)
-    chosen = np.flatnonzero(non_dominated(points, slack))
-    return [items[i] for i in chosen[np.argsort(points[chosen, 0])]]
+    given, places = list(items), np.asarray(points, float).reshape(-1, 2)
+    chosen = np.flatnonzero(non_dominated(places, slack))
+    return [given[i] for i in chosen[np.argsort(places[chosen, 0])]]
 
 
 def hypervolume(points: ArrayLike, reference: Sequence[float]) -> float:
     """Area between the `points` (n, 2), small is good, and a `reference` point that is worse in both."""
-    points = np.asarray(points, float).reshape(-1, 2)
-    points = points[(points < np.asarray(reference)).all(axis=1)]
-    if len(points) == 0:
+    rows = np.asarray(points, float).reshape(-1, 2)
+    rows = rows[(rows < np.asarray(reference)).all(axis=1)]
+    if len(rows) == 0:
         return 0.0
-    points = points[non_dominated(points)]
-    points = points[np.argsort(points[:, 0])]
-    right = np.append(points[1:, 0], reference[0])
-    return float(np.sum((right - points[:, 0]) * (reference[1] - points[:, 1])))
+    rows = rows[non_dominated(rows)]
+    rows = rows[np.argsort(rows[:, 0])]
+    right = np.append(rows[1:, 0], reference[0])
+    return float(np.sum((right - rows[:, 0]) * (reference[1] - rows[:, 1])))

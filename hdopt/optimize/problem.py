@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from hdopt.optimize.objectives import STEP, DesignConditions, Point, find_quanti
 
 SMALL_SCALE = 1e-3
 """What a limit of zero is scaled with, in the quantity's unit."""
+Amount = TypeVar("Amount", float, Array)
+
 ROUNDING = 1e-12
 """A bound nearer to zero than this, in the quantity's unit, is zero but for rounding."""
 
@@ -31,8 +34,8 @@ class Limit:
     def scale(self) -> float:
         return abs(self.bound) if abs(self.bound) > ROUNDING else SMALL_SCALE
 
-    def excess(self, value: float | Array) -> float | Array:
-        """How far a value breaks the limit, as a share of the bound; below 0 it is kept."""
+    def excess(self, value: Amount) -> Amount:
+        """How far a `value`, or each of an array, breaks the limit, as a share of the bound; below 0 it is kept."""
         return (self.bound - value if self.at_least else value - self.bound) / self.scale
 
     def __str__(self) -> str:
@@ -64,10 +67,11 @@ class DesignProblem:
     @cached_property
     def _counts(self) -> tuple[int, int]:
         middle = self.point(self.values(np.full(self.n, 0.5)))
-        return tuple(
-            sum(len(find_quantity(key).pieces(middle)[0]) for key in keys)
-            for keys in ((self.objective,), [limit.quantity for limit in self.limits])
-        )
+
+        def count(key: str) -> int:
+            return len(find_quantity(key).pieces(middle)[0])
+
+        return count(self.objective), sum(count(limit.quantity) for limit in self.limits)
 
     @property
     def pieces(self) -> int:
@@ -79,7 +83,8 @@ class DesignProblem:
 
     @cached_property
     def _ranges(self) -> tuple[Array, Array]:
-        return tuple(np.array([(v.lower, v.upper - v.lower) for v in self.variables]).reshape(-1, 2).T)
+        lower, spread = np.array([(v.lower, v.upper - v.lower) for v in self.variables]).reshape(-1, 2).T
+        return lower, spread
 
     def values(self, u: Array) -> dict[str, float]:
         """Values of all variables at a point of the unit cube."""
@@ -103,7 +108,8 @@ class DesignProblem:
         if not slopes:
             found = {key: (values, np.zeros((len(values), self.n))) for key, (values, _) in found.items()}
         values, rates = found[self.objective]
-        bounded, bounded_rates = [np.empty(0)], [np.empty((0, self.n))]
+        bounded: list[Array] = [np.empty(0)]
+        bounded_rates: list[Array] = [np.empty((0, self.n))]
         for limit in self.limits:
             pieces, piece_rates = found[limit.quantity]
             bounded.append(limit.excess(pieces))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 
 import numpy as np
 
@@ -72,13 +73,13 @@ def solve(problem: DesignProblem, method: Method, starts: Sequence[dict[str, flo
         if found.interrupted:
             return Solution(problem, problem.values(found.u), found, spent)
         places = [found.u, problem.place(problem.space.baseline_values)]
-    best: Outcome | None = None
+    outcomes: list[Outcome] = []
     for place in places:
-        outcome = minimise(problem, place, method.local_algorithm, local)
-        spent += outcome.evaluations
-        best = outcome if outcome.better_than(best) else best
-        if outcome.interrupted:
+        outcomes.append(minimise(problem, place, method.local_algorithm, local))
+        spent += outcomes[-1].evaluations
+        if outcomes[-1].interrupted:
             break
+    best = reduce(lambda one, other: other if other.better_than(one) else one, outcomes)
     stepped = [variable for variable in problem.variables if variable.values]
     if not stepped or best.interrupted:
         return Solution(problem, problem.values(best.u), best, spent)
@@ -94,16 +95,16 @@ def _on_steps(
     problem: DesignProblem, method: Method, values: dict[str, float], stepped: list[Variable], spent: int
 ) -> Solution:
     for reach in (1, 2, 4):
-        best: Solution | None = None
+        found: list[Solution] = []
         for chosen in itertools.product(*(_neighbours(v, values[v.name], reach) for v in stepped)):
             narrowed = problem.with_fixed(**{v.name: x for v, x in zip(stepped, chosen, strict=True)})
             outcome = minimise(narrowed, narrowed.place(values), method.local_algorithm, method.local)
             spent += outcome.evaluations
-            if best is None or outcome.better_than(best.outcome):
-                best = Solution(narrowed, narrowed.values(outcome.u), outcome, spent)
+            found.append(Solution(narrowed, narrowed.values(outcome.u), outcome, spent))
             if outcome.interrupted:
-                return replace(best, evaluations=spent)
-        if best.feasible:
+                break
+        best = reduce(lambda one, other: other if other.outcome.better_than(one.outcome) else one, found)
+        if best.feasible or found[-1].outcome.interrupted:
             break
     return replace(best, evaluations=spent)
 

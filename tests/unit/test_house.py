@@ -19,7 +19,6 @@ UNDESCRIBED = {
     "bench": 53,
     "geometry": 79,
     "kinematics": 20,
-    "optimize": 11,
     "report": 51,
     "simulation": 3,
     "studies": 6,
