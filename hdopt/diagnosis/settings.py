@@ -131,6 +131,14 @@ class NuisanceSettings:
         15.0, "deg", "theorem: beyond it the first order in the warp is off by a sixth at order 4"
     )
     slope_step_rad: float = threshold(1e-3, "rad", "choice: step of the slope by the input angle")
+    slope_turns: float = threshold(2.0, "input turns", "choice: a ratio or gain needs a slope over some turns")
+    slope_arcmin: float = threshold(
+        3.0, "arcmin", "choice: drift over a record, beyond what drives and benches do, that is taken out first"
+    )
+    slope_share: float = threshold(0.8, "1", "choice: share of all that varies that such a drift is")
+    slope_axis: float = threshold(
+        0.3, "1", "choice: log of the power left from which the input angle is what is counted wrongly"
+    )
 
 
 @dataclass(frozen=True)
@@ -216,6 +224,7 @@ class AlternativeSettings:
     speed_levels: float = threshold(0.05, "1", "choice: spread of speed over the largest from which it varies")
     scale_turns: float = threshold(2.0, "input turns", "choice: a ratio or gain needs a slope over some turns")
     scale_odds: float = threshold(-1.0, "1", "choice: log prior odds of a ratio or gain that is off, about 1 in 3")
+    skew_odds: float = threshold(-3.0, "1", "choice: log prior odds of two clocks that run apart, 1 in 20")
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from hdopt.diagnosis.inference.base_fit import fit_base
-from hdopt.diagnosis.inference.catalogue import STRAIN_WAVE_ONLY
+from hdopt.diagnosis.inference.catalogue import SCALE, STRAIN_WAVE_ONLY
+from hdopt.diagnosis.inference.common_slope import TakenSlope, common_slope, input_is_off
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.generic_basis import generic_columns
 from hdopt.diagnosis.inference.noise import Noise
@@ -39,15 +40,43 @@ def begin(
 ) -> State:
     """The first state: rows of all `recordings`, nuisances asked for by name (`nuisance`), a first guess of the
     noise, and the `base` model (None for a gear without one) fitted from random drives drawn with `seed`.
-    `settings` are the thresholds.
+    `settings` are the thresholds. A large slope of the error by the angle is taken out first.
     """
     rng = np.random.default_rng(seed)
     # Offsets of thousands of arcmin are zeros of encoders; without them the numbers keep their digits.
     middle = float(np.median(recordings[0].error_arcmin))
     recordings = tuple(replace(r, error_arcmin=r.error_arcmin - middle) for r in recordings)
+    taken = common_slope(recordings, settings.nuisance)
+    if taken is None:
+        return first_fit(recordings, base, rng, settings, nuisance)
+    as_output = first_fit(taken.take_out(recordings), base, rng, settings, nuisance, taken)
+    if base is None:
+        return as_output
+    of_input = taken.of_input(recordings[0].ratio)
+    as_input = first_fit(of_input.take_out(recordings), base, rng, settings, nuisance, of_input)
+    # Physics that is not the base's own stands in both: smooth columns beside them soak most of it up.
+    clean = [fit_clean_base(one.problem, rng) for one in (as_output, as_input)]
+    left = [beside_smooth(fit).objective for fit in clean if fit is not None]
+    return as_input if input_is_off(left[0], left[1], settings.nuisance) else as_output
+
+
+def first_fit(
+    recordings: Sequence[Recording],
+    base: CartesianModel | None,
+    rng: np.random.Generator,
+    settings: DiagnosisSettings,
+    nuisance: Sequence[str] = (),
+    taken: TakenSlope | None = None,
+) -> State:
+    """The first state on `recordings` freed of the slope `taken` (None: of none), with the nuisances asked for by name
+    (`nuisance`): the `base` fitted from random drives drawn by `rng`. `settings` are the thresholds.
+    """
+    recordings = tuple(recordings)
     rows = gather(recordings, neighbours_for(recordings))
-    nuisances = nuisances_for(rows, base, nuisance, settings.nuisance)
+    nuisances = replace(nuisances_for(rows, base, nuisance, settings.nuisance), taken=taken)
     ruled_out = (*nuisances.hidden, *(STRAIN_WAVE_ONLY if base is None else ()))
+    if taken is not None:
+        ruled_out = (*ruled_out, SCALE)
     problem = FitProblem(rows, base, nuisances.columns(rows), Noise.white(rows), settings=settings)
     offsets = problem.nuisance @ np.linalg.lstsq(problem.nuisance, rows.error, rcond=None)[0]
     size = float(np.std(rows.error - offsets))
@@ -145,8 +174,11 @@ def begin_turned(state: State) -> State:
     """`state` before its noise was measured, on its recordings turned round."""
     seed = int(state.draws().integers(np.iinfo(np.int64).max))
     asked = ("drift",) if state.nuisances.drift else ()
-    start = begin(turn_round(state.recordings), state.problem.base, seed, state.settings, asked)
-    return set_strong_ripple_aside(start)
+    taken = None if state.nuisances.taken is None else state.nuisances.taken.turned
+    rng = np.random.default_rng(seed)
+    return set_strong_ripple_aside(
+        first_fit(turn_round(state.recordings), state.problem.base, rng, state.settings, asked, taken)
+    )
 
 
 def beside_smooth(clean: Fit) -> Fit:

@@ -238,21 +238,21 @@ def test_the_whole_search_names_the_hidden_effect(explored):
 
 
 def test_a_gain_that_is_off_is_found_as_a_scale(study):
-    """An output encoder that counts 1.0005 turns a turn: no physics of the drive, and told as what it is."""
+    """An output encoder that counts 1.0002 turns a turn: no physics of the drive, and told as what it is."""
     theta = np.arange(TURNS * RATE) * TURN / RATE
-    slope = -0.0005 * theta / RATIO / ARCMIN
-    recording = recorded(study, lambda theta: -0.0005 * theta / RATIO / ARCMIN)
+    slope = -0.0002 * theta / RATIO / ARCMIN
+    recording = recorded(study, lambda theta: -0.0002 * theta / RATIO / ARCMIN)
     state = search_effects(fit_base_in_noise(begin([recording], CartesianModel.of(study.drive), 3, DEFAULT)))
     assert np.ptp(slope) > 5 * HIDDEN
     assert state.selection.best.effects == ("_scale",)
-    scale = fitted_scale(state.selection.best.fit)
+    scale = fitted_scale(state.selection.best.fit, state.nuisances)
     assert scale.found
-    assert scale.low < 1.0005 < scale.high
+    assert scale.low < 1.0002 < scale.high
     assert scale.high - scale.low < 1e-4
 
 
 def test_a_scale_that_is_right_is_one(in_noise):
-    scale = fitted_scale(in_noise.base)
+    scale = fitted_scale(in_noise.base, in_noise.nuisances)
     assert not scale.found
     assert scale.gain == pytest.approx(1.0, abs=2e-5)
     assert scale.ratio == pytest.approx(RATIO, rel=2e-5)

@@ -94,7 +94,7 @@ def assess(state: State) -> Evidence:
         generic_out = held_out(base, useful_columns(FitProbe(base), inflation)[0], folds)
     probe = FitProbe(base)
     strange = STRAIN_WAVE_ONLY if base.problem.base is None else ()
-    pool = search_terms(probe, skip=(*state.nuisances.hidden, *strange))
+    pool = search_terms(probe, skip=state.ruled_out)
     scale = scale_of(base.problem, inflation)
     penalties = [penalty([term], 0.0, scale) for term in pool]
     observed = max(
@@ -127,7 +127,7 @@ def assess(state: State) -> Evidence:
         orientation=state.orientation,
         neighbours_arcmin=noise_between_neighbours(state.recordings),
         sensor_arcmin=max(one.quantum_arcmin for one in state.recordings),
-        scale=fitted_scale(best),
+        scale=fitted_scale(best, state.nuisances),
     )
 
 

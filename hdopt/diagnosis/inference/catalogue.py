@@ -22,7 +22,11 @@ def explanations(settings: AlternativeSettings = DEFAULT.alternatives) -> Mappin
 
 SCALE = "_scale"
 """The instruments' own explanation: a ratio or an encoder's gain that is off."""
-OUTSIDE = frozenset(explanations()) - frozenset(EFFECTS) - {SCALE}
+SKEW = "_skew"
+"""The instruments' own too: two clocks that run apart."""
+INSTRUMENTS = frozenset({SCALE, SKEW})
+"""Ids of what the instruments may do without any physics of the drive: told, never named."""
+OUTSIDE = frozenset(explanations()) - frozenset(EFFECTS) - INSTRUMENTS
 """Ids of the descriptions without physics."""
 
 

@@ -306,6 +306,31 @@ class Scale(Alternative):
         return Term(self.id, {}, columns=columns, odds=self.settings.scale_odds)
 
 
+class Skew(Alternative):
+    """Two clocks that run apart: a delay between the channels that grows with time. Where it does not grow it is an
+    effect, `channel_delay`; at one speed one way it is a scale.
+    """
+
+    id = "_skew"
+    domain = "time"
+    exact_shape = True
+
+    def lacks(self, samples: Conditions) -> str | None:
+        if samples.locked or samples.speed is None or samples.time is None:
+            return "time and speed"
+        varies = float(np.std(samples.speed)) >= self.settings.speed_levels * float(np.max(np.abs(samples.speed)))
+        return None if varies else "speed that varies"
+
+    def search(self, probe: Probe) -> list[Term]:
+        return [self.term(probe.samples, {})]
+
+    def term(self, samples: Conditions, shape: Mapping[str, float], base_value: Array | None = None) -> Term:
+        """The column is in arcmin for a delay that grows by one second a second."""
+        time = samples.known_time
+        columns = ((time - time[0]) * samples.known_speed / samples.ratio / ARCMIN)[:, None]
+        return Term(self.id, {}, columns=columns, odds=self.settings.skew_odds)
+
+
 ALTERNATIVES: tuple[type[Alternative], ...] = (
     AnyOrder,
     AnyFrequency,
@@ -315,6 +340,7 @@ ALTERNATIVES: tuple[type[Alternative], ...] = (
     EvenLoad,
     EvenSpeed,
     Scale,
+    Skew,
 )
 
 

@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdopt.arrays import Array, Mask
+from hdopt.diagnosis.inference.common_slope import TakenSlope
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.settings import DEFAULT, NuisanceSettings
 from hdopt.effects.estimate import FitEstimate, Parameter
@@ -37,8 +38,9 @@ NUISANCES = ("drift", "time-warp")
 @dataclass(frozen=True)
 class Nuisances:
     """Which columns are always free: one zero or one for each recording, `drift`, a curve of the `angle` between two
-    angles (rad) with so many knots, whole `orders`, and, where a time warp was asked for (`warps`), the warp, once the
-    `slope` of the error by the input angle (arcmin/rad, a function of rad) is known.
+    angles (rad) with so many knots, whole `orders`, what is left of a slope that was `taken` out of the errors, and,
+    where a time warp was asked for (`warps`), the warp, once the `slope` of the error by the input angle (arcmin/rad, a
+    function of rad) is known.
     """
 
     separate_zeros: bool
@@ -47,6 +49,7 @@ class Nuisances:
     orders: tuple[int, ...] = ()
     slope: Callable[[Array], Array] | None = None
     warps: bool = False
+    taken: TakenSlope | None = None
     settings: NuisanceSettings = DEFAULT.nuisance
 
     @property
@@ -55,7 +58,9 @@ class Nuisances:
         return ("thermal_drift",) if self.drift else ()
 
     def blocks(self, rows: Rows) -> dict[str, Array]:
-        """Columns (n, q) in arcmin by kind: zero, drift, angle, orders, time-warp."""
+        """Columns (n, q) in arcmin by kind: zero, drift, angle, orders, scale, time-warp. `rows` are those of the
+        recordings.
+        """
         n = len(rows)
         own = rows.record[:, None] == np.arange(rows.records)
         blocks = {"zero": own.astype(float) if self.separate_zeros else np.ones((n, 1))}
@@ -65,6 +70,8 @@ class Nuisances:
             blocks["angle"] = hats(rows.theta, *self.angle)
         if self.orders:
             blocks["orders"] = sine_columns(rows.theta, self.orders)
+        if self.taken is not None:
+            blocks["scale"] = self.taken.columns(rows.theta)
         if self.slope is not None:
             blocks["time-warp"] = self.slope(rows.theta)[:, None] * warp_shapes(rows, self.settings)
         return blocks

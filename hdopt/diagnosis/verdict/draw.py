@@ -9,7 +9,7 @@ import numpy as np
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.localization import locate
 from hdopt.diagnosis.inference.base_fit import base_estimate, beat_warning
-from hdopt.diagnosis.inference.catalogue import is_effect
+from hdopt.diagnosis.inference.catalogue import SKEW, is_effect
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.nuisance import estimated, notes
 from hdopt.diagnosis.inference.residual_gains import FitProbe
@@ -22,6 +22,8 @@ from hdopt.effects import EFFECTS
 from hdopt.effects.declared import Quantity
 from hdopt.kinematics.cartesian import CARTESIAN_NAMES
 
+MICRO = 1e6
+"""Millionths in one."""
 LOCATE_SEED = 0
 """Seed of the sign flips that say where a residual lives."""
 
@@ -51,6 +53,7 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
             *notes(model, evidence.nuisances),
             *orientation_notes(evidence.orientation),
             *scale_notes(evidence),
+            *skew_notes(evidence),
             *base_notes(model),
             *prior_notes(conclusion.effects),
             *beat_notes(evidence),
@@ -101,9 +104,26 @@ def scale_notes(evidence: Evidence) -> tuple[str, ...]:
     scale = evidence.scale
     if scale is None or not scale.found:
         return ()
+    if scale.input_gain != 1:
+        return (
+            f"the input angle counts {scale.input_gain:.6g} times too far: the error grows with it, and the drive's "
+            "own error fits only where the angle is corrected; it was corrected, check the input encoder's counts and "
+            "any gear before it",
+        )
     return (
         f"the error grows with the angle as if the ratio were {scale.ratio:.6g} in place of {evidence.rows.ratio:g}, "
         f"or the output encoder's gain {scale.gain:.6g}; check both (a slow warming at one speed would look the same)",
+    )
+
+
+def skew_notes(evidence: Evidence) -> tuple[str, ...]:
+    """What the `evidence` says of two clocks that run apart."""
+    fit = evidence.selection.best.fit
+    rates = [float(c[0]) for term, c in zip(fit.terms, fit.coefficients, strict=True) if term.effect == SKEW]
+    return tuple(
+        f"the output's clock runs {rate * MICRO:.3g} millionths {'slow' if rate > 0 else 'fast'} against the input's: "
+        "the delay between them grows steadily; sample both by one clock"
+        for rate in rates
     )
 
 

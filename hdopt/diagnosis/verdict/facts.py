@@ -9,7 +9,7 @@ import numpy as np
 
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding
-from hdopt.diagnosis.inference.catalogue import SCALE
+from hdopt.diagnosis.inference.catalogue import INSTRUMENTS
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.settings import VerdictSettings
@@ -122,7 +122,7 @@ def find(evidence: Evidence) -> Findings:
     facts = Facts(
         settings=settings,
         turns_suffice=suffice,
-        explained=any(name != SCALE for name in best.effects),
+        explained=any(name not in INSTRUMENTS for name in best.effects),
         false_alarm_p=evidence.false_alarm_p,
         own_gain=own_gain(evidence),
         high=high is not None,
@@ -152,9 +152,9 @@ def find(evidence: Evidence) -> Findings:
 
 
 def effect_powers(candidate: Candidate) -> list[float]:
-    """Power (arcmin^2) of each term of `candidate` but a scale that is off."""
+    """Power (arcmin^2) of each term of `candidate` but a scale or clock that is off."""
     powers = term_powers(candidate.fit)
-    return [power for power, name in zip(powers, candidate.effects, strict=True) if name != SCALE]
+    return [power for power, name in zip(powers, candidate.effects, strict=True) if name not in INSTRUMENTS]
 
 
 def resolution(evidence: Evidence) -> float:

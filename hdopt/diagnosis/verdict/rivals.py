@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding, confounded_with
-from hdopt.diagnosis.inference.catalogue import SCALE, is_effect
+from hdopt.diagnosis.inference.catalogue import INSTRUMENTS, is_effect
 from hdopt.diagnosis.inference.cross_validation import paired_t
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.high_order import ripple_orders
@@ -35,9 +35,11 @@ def rivals(evidence: Evidence, high: Candidate | None) -> Sets:
 
 
 def scale_is_as_good(evidence: Evidence) -> bool:
-    """Whether a ratio or gain that is off, without any effect, explains as well as the best set of the `evidence`."""
+    """Whether a ratio, gain or clock that is off, without any effect, explains as well as the best set of the
+    `evidence`.
+    """
     best = evidence.selection.best
-    alone = (one for one in evidence.selection.candidates if one.effects == (SCALE,))
+    alone = (one for one in evidence.selection.candidates if one.effects and INSTRUMENTS.issuperset(one.effects))
     tie = evidence.settings.verdict.tie
     return any(best.log_bayes_factor - one.log_bayes_factor <= tie for one in alone)
 

@@ -179,11 +179,17 @@ def insufficient(findings: Findings) -> Conclusion:
 
 
 def adequate(findings: Findings) -> Conclusion:
-    """The base explains the record. `findings` hold the facts and the evidence behind them."""
-    if findings.evidence.selection.base.problem.base is None:
-        return Conclusion("adequate", "Nothing shows above the noise.")
+    """The base explains the record, beside a scale that is off. `findings` hold the facts and the evidence behind
+    them.
+    """
+    evidence = findings.evidence
+    off = evidence.scale is not None and evidence.scale.found
+    beside = " once a ratio or gain that is off is taken out (see the warnings)" if off else ""
+    if evidence.selection.base.problem.base is None:
+        return Conclusion("adequate", f"Nothing shows above the noise{beside}.")
     return Conclusion(
-        "adequate", "The kinematic-error model explains the recording; nothing else shows above the noise."
+        "adequate",
+        f"The kinematic-error model explains the recording{beside}; nothing else shows above the noise.",
     )
 
 
