@@ -1,4 +1,4 @@
-"""The csf-25-80 drive of the bench, from exact rotated contours and per-tooth arrays (Jia 2021, Eqs. (16)-(32)).
+"""The drives of the bench, from exact rotated contours and per-tooth arrays (Jia 2021, Eqs. (16)-(32)).
 
 Angles are in rad and count clockwise from +y, lengths in mm. The two rim curves of the wave generator are moved by the
 full rotation matrices; on a rim the squared radius is a trigonometric polynomial of the contour parameter, whose
@@ -9,13 +9,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-FS_TEETH, CS_TEETH = 160, 162
-RATIO = FS_TEETH / (CS_TEETH - FS_TEETH)
-MODULE_MM = 0.396
-PRESSURE_ANGLE = np.deg2rad(12.0)
-SEMI_MAJOR_MM, SEMI_MINOR_MM, WIDTH_MM = 31.046, 30.318, 9.0
-PITCH_LENGTH_MM = np.pi * MODULE_MM * FS_TEETH
-RAD_PER_MM = 2 * np.pi / PITCH_LENGTH_MM
+from hdopt.bench.gears import CSF, PRESSURE_ANGLE
+
+FS_TEETH, CS_TEETH, RATIO = CSF.fs_teeth, CSF.cs_teeth, CSF.ratio
 ARCMIN = np.pi / 10800
 
 
@@ -103,8 +99,8 @@ class Zones:
     fs_angle: np.ndarray
 
 
-def find_zones(errors, theta):
-    """Deepest point of each zone, over both rims, at wave-generator angles `theta` (rad, unwrapped)."""
+def find_zones(errors, theta, gear=CSF):
+    """Deepest point of each zone, over both rims, at wave-generator angles `theta` (rad, unwrapped) of `gear`."""
     theta = np.asarray(theta, dtype=float)
     sin, cos = np.sin(theta), np.cos(theta)
     axis_frame = _tilt_frame(errors.axis_tilt_y, errors.axis_tilt_x)
@@ -114,41 +110,49 @@ def find_zones(errors, theta):
         turned = np.stack([cos * vector[0] + sin * vector[1], cos * vector[1] - sin * vector[0]])
         return axis_frame[:2, :2] @ turned + axis_frame[:2, 2:] * vector[2]
 
-    minor = to_ground(SEMI_MINOR_MM * wg_frame[:, 0])
-    major = to_ground(SEMI_MAJOR_MM * wg_frame[:, 1])
+    minor = to_ground(wg_frame[:, 0])
+    major = to_ground(wg_frame[:, 1])
     centre = to_ground(np.array([errors.wg_x_mm, errors.wg_y_mm, 0.0]))
     centre += np.array([[errors.axis_x_mm], [errors.axis_y_mm]])
-    half = to_ground(0.5 * WIDTH_MM * wg_frame[:, 2])
+    # A cross-slide takes the eccentricity along its slot away.
+    along = 0.0 if gear.floats_major else centre[0] * sin + centre[1] * cos
+    across = 0.0 if gear.floats_minor else centre[0] * cos - centre[1] * sin
+    centre = np.stack([along * sin + across * cos, along * cos - across * sin])
+    half = to_ground(0.5 * gear.width_mm * wg_frame[:, 2])
 
     depth, cs_angle, fs_angle = (np.full((2, theta.size), -np.inf) for _ in range(3))
-    for zone, sign in enumerate((1.0, -1.0)):
+    for zone, tip in enumerate((0.0, np.pi)):
         for rim in (1.0, -1.0):
             rim_centre = centre + rim * half
-            u = np.zeros(theta.size)
+            u = np.full(theta.size, tip)
             for _ in range(5):  # quadratic from a start within 0.1 rad: rounding after four steps
-                s, c = np.sin(u), np.cos(u)
-                point = rim_centre + sign * (s * minor + c * major)
-                slope = sign * (c * minor - s * major)
-                bend = rim_centre - point
+                (across, along), (across_1, along_1), (across_2, along_2) = gear.contour(u)
+                point = rim_centre + across * minor + along * major
+                slope = across_1 * minor + along_1 * major
+                bend = across_2 * minor + along_2 * major
                 step = (point * slope).sum(0) / ((slope * slope).sum(0) + (point * bend).sum(0))
                 u -= step
-            point = rim_centre + sign * (np.sin(u) * minor + np.cos(u) * major)
-            here = np.hypot(point[0], point[1]) - SEMI_MAJOR_MM
+            across, along = gear.contour(u)[0]
+            point = rim_centre + across * minor + along * major
+            here = np.hypot(point[0], point[1]) - gear.semi_major_mm
             deeper = here > depth[zone]
             arm = point - rim_centre
             depth[zone] = np.where(deeper, here, depth[zone])
             cs_angle[zone] = np.where(deeper, np.arctan2(point[0], point[1]), cs_angle[zone])
-            fs_angle[zone] = np.where(deeper, np.arctan2(arm[0], arm[1]) + theta / RATIO, fs_angle[zone])
+            fs_angle[zone] = np.where(deeper, np.arctan2(arm[0], arm[1]) + theta / gear.ratio, fs_angle[zone])
     return Zones(depth, cs_angle, fs_angle)
 
 
-def base_teeth(errors):
-    """Per-tooth tangential deviations (mm) of circular spline and flexspline: one sine over each circumference."""
-    cs = 2 * np.pi * np.arange(CS_TEETH) / CS_TEETH
-    fs = 2 * np.pi * np.arange(FS_TEETH) / FS_TEETH
+def base_teeth(errors, gear=CSF):
+    """Per-tooth tangential deviations (mm) of both splines of `gear` with `errors`: circular spline, flexspline.
+
+    One sine over each circumference, and the pitch errors that the gear was built with.
+    """
+    cs = 2 * np.pi * np.arange(gear.cs_teeth) / gear.cs_teeth
+    fs = 2 * np.pi * np.arange(gear.fs_teeth) / gear.fs_teeth
     return (
-        errors.cs_sin_mm * np.sin(cs) + errors.cs_cos_mm * np.cos(cs),
-        errors.fs_sin_mm * np.sin(fs) + errors.fs_cos_mm * np.cos(fs),
+        errors.cs_sin_mm * np.sin(cs) + errors.cs_cos_mm * np.cos(cs) + np.array(gear.cs_pitch_mm or 0.0),
+        errors.fs_sin_mm * np.sin(fs) + errors.fs_cos_mm * np.cos(fs) + np.array(gear.fs_pitch_mm or 0.0),
     )
 
 
@@ -168,7 +172,8 @@ def zone_deviation_mm(zones, cs_teeth_mm, fs_teeth_mm, extra_depth_mm=0.0):
     return depth + at_angle(cs_teeth_mm, zones.cs_angle) + at_angle(fs_teeth_mm, zones.fs_angle)
 
 
-def kinematic_error(errors, theta):
-    """Kinematic error (rad at the output, k_e = 1) of the base drive: the zone that deviates more drives."""
-    zones = find_zones(errors, theta)
-    return RAD_PER_MM * zone_deviation_mm(zones, *base_teeth(errors)).max(axis=0)
+def kinematic_error(errors, theta, gear=CSF):
+    """Kinematic error (rad at the output) of the base drive `gear` with `errors` at `theta` (rad): the zone that
+    deviates more drives."""
+    zones = find_zones(errors, theta, gear)
+    return gear.rad_per_mm(theta) * zone_deviation_mm(zones, *base_teeth(errors, gear)).max(axis=0)

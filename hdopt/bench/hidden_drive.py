@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdopt.bench.geometry import CS_TEETH, FS_TEETH, RATIO, at_angle
+from hdopt.bench.gears import CSF
+from hdopt.bench.geometry import at_angle
 from hdopt.bench.motion import TURN
 from hdopt.bench.signal_chain import Hidden, Parameter
 
@@ -43,9 +44,9 @@ class LongWave(Hidden):
     scale: float = 1.0  # um rms
 
     @classmethod
-    def draw(cls, rng, on):
+    def draw(cls, rng, on, gear=CSF):
         kind = str(rng.choice(LONG_WAVE))
-        teeth = CS_TEETH if on == "cs" else FS_TEETH
+        teeth = gear.cs_teeth if on == "cs" else gear.fs_teeth
         return cls(f"{on}_tooth_harmonics", kind, tuple(long_wave_array(rng, teeth, kind)))
 
     def teeth(self, cs_mm, fs_mm):
@@ -72,17 +73,18 @@ class ToothMesh(Hidden):
     needs = frozenset({"dense"})
 
     @classmethod
-    def draw(cls, rng):
-        size = 1 + rng.uniform(0.05, 0.4) * rng.standard_normal(CS_TEETH)
+    def draw(cls, rng, gear=CSF):
+        teeth = gear.cs_teeth
+        size = 1 + rng.uniform(0.05, 0.4) * rng.standard_normal(teeth)
         if rng.random() < 0.5:
-            size *= 1 + rng.uniform(0.1, 0.5) * np.sin(TURN * np.arange(CS_TEETH) / CS_TEETH + rng.uniform(0, TURN))
+            size *= 1 + rng.uniform(0.1, 0.5) * np.sin(TURN * np.arange(teeth) / teeth + rng.uniform(0, TURN))
         return cls(tuple(size), rng.uniform(-0.3, 0.3))
 
     def depth_mm(self, run, zones):
-        place = zones.cs_angle * CS_TEETH / TURN
+        place = zones.cs_angle * len(self.size) / TURN
         part = place - np.floor(place)
         form = np.sin(np.pi * part) ** 2 + self.skew * np.sin(TURN * part)
-        tooth = np.array(self.size)[np.floor(place).astype(np.int64) % CS_TEETH]
+        tooth = np.array(self.size)[np.floor(place).astype(np.int64) % len(self.size)]
         return self.scale * 1e-3 * tooth * form
 
     def truth(self):
@@ -97,15 +99,16 @@ class LocalDefect(Hidden):
     tooth: int
     sign: float
     scale: float = 5.0  # um
+    teeth_round: int = 0  # of that spline; 0 for csf-25-80
     id = "local_tooth_defect"
     needs = frozenset({"fine"})
 
     @classmethod
-    def draw(cls, rng):
+    def draw(cls, rng, gear=CSF):
         on = str(rng.choice(["cs", "fs"]))
-        teeth = CS_TEETH if on == "cs" else FS_TEETH
+        teeth = gear.cs_teeth if on == "cs" else gear.fs_teeth
         # A raised flank carries whenever it passes; a worn one only hands over to the other zone.
-        return cls(on, int(rng.integers(teeth)), 1.0 if rng.random() < 0.8 else -1.0)
+        return cls(on, int(rng.integers(teeth)), 1.0 if rng.random() < 0.8 else -1.0, teeth_round=teeth)
 
     def teeth(self, cs_mm, fs_mm):
         array = (cs_mm if self.variant == "cs" else fs_mm).copy()
@@ -114,7 +117,7 @@ class LocalDefect(Hidden):
         return (array, fs_mm) if self.variant == "cs" else (cs_mm, array)
 
     def truth(self):
-        teeth = CS_TEETH if self.variant == "cs" else FS_TEETH
+        teeth = self.teeth_round or (CSF.cs_teeth if self.variant == "cs" else CSF.fs_teeth)
         return {
             "angle_deg": Parameter(360 * self.tooth / teeth, "deg"),
             "height": Parameter(self.sign * self.scale, "um"),
@@ -132,7 +135,7 @@ class Lobing(Hidden):
     variant = "lobes"
 
     @classmethod
-    def draw(cls, rng):
+    def draw(cls, rng, gear=CSF):
         return cls(int(rng.choice([3, 4, 5, 6, 8])), rng.uniform(0, TURN))
 
     def depth_mm(self, run, zones):
@@ -158,7 +161,7 @@ class BearingPass(Hidden):
     id = "bearing_pass"
 
     @classmethod
-    def draw(cls, rng):
+    def draw(cls, rng, gear=CSF):
         kind = str(rng.choice(["diameters", "pitch"]))
         balls = int(rng.integers(19, 28))
         diameter = 0.15 * rng.standard_normal(balls)
@@ -169,7 +172,7 @@ class BearingPass(Hidden):
 
     def depth_mm(self, run, zones):
         r = self.ball_to_pitch
-        cage = run.theta * ((1 - r) / 2 - (1 + r) / (2 * RATIO)) + self.start
+        cage = run.theta * ((1 - r) / 2 - (1 + r) / (2 * run.ratio)) + self.start
         # A ball lifts the rim when it stands at an end; between two balls the rim sags ("pitch").
         balls = np.arange(self.balls)
         height = np.array(self.diameter) + (1.0 if self.variant == "pitch" else 0.0)

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
 from hdopt.bench import loops
-from hdopt.bench.geometry import ARCMIN, RATIO
+from hdopt.bench.gears import CSF
+from hdopt.bench.geometry import ARCMIN
 from hdopt.bench.motion import TURN
 from hdopt.bench.signal_chain import Hidden, Parameter
 
@@ -28,7 +29,7 @@ class Windup(Hidden):
     needs = frozenset({"torque"})
 
     @classmethod
-    def draw(cls, rng):
+    def draw(cls, rng, gear=CSF):
         kind = str(rng.choice(["three slopes", "cubic", "angle"], p=[0.5, 0.25, 0.25]))
         size = rng.uniform(0.75, 1.3)
         stiffness = tuple(size * k * rng.uniform(0.95, 1.05) for k in (3.1e4, 5.0e4, 5.7e4))
@@ -83,7 +84,7 @@ class Hysteresis(Hidden):
     needs = frozenset({"reversal"})
 
     @classmethod
-    def draw(cls, rng):
+    def draw(cls, rng, gear=CSF):
         length = np.deg2rad(np.exp(rng.uniform(np.log(0.15), np.log(2.0))))
         if rng.random() < 0.5:
             slip = 0.5 * length * np.geomspace(0.2, rng.uniform(1.5, 3), rng.integers(5, 13))
@@ -97,7 +98,7 @@ class Hysteresis(Hidden):
         return loops.maxwell_slip(position, np.array(self.slip), np.array(self.weight))
 
     def lag(self, run, ke):
-        return self.scale * ARCMIN * self.force(run.theta / RATIO)
+        return self.scale * ARCMIN * self.force(run.theta / run.ratio)
 
     def scale_for(self, rms, speed):
         """Scale that gives `rms` (rad) in a test back and forth."""
@@ -133,7 +134,7 @@ class LostMotion(Hidden):
     needs = frozenset({"reversal"})
 
     @classmethod
-    def draw(cls, rng):
+    def draw(cls, rng, gear=CSF):
         cross = rng.random() < 0.5
         slots = tuple(rng.uniform(5, 8, 2))
         return cls(
@@ -165,7 +166,7 @@ class LostMotion(Hidden):
         return self.scale * ARCMIN * (share + (1 - share) * self.slots(theta) / mean)
 
     def lag(self, run, ke):
-        position = run.theta / RATIO
+        position = run.theta / run.ratio
         return position - loops.play(position, self.gap(run.theta))
 
     def truth(self):
@@ -183,7 +184,7 @@ class ThermalDrift(Hidden):
     id = "thermal_drift"
 
     @classmethod
-    def draw(cls, rng):
+    def draw(cls, rng, gear=CSF):
         return cls(str(rng.choice(["logged", "warm-up"])), rng.choice([-1, 1]) * 0.02)
 
     @property
@@ -223,7 +224,7 @@ class Resonance(Hidden):
     scale_range = (2e-3, 1.0)
 
     @classmethod
-    def draw(cls, rng):
+    def draw(cls, rng, gear=CSF):
         return cls(np.exp(rng.uniform(np.log(0.02), np.log(0.12))), bool(rng.random() < 0.5))
 
     def for_plans(self, plans):
@@ -240,7 +241,7 @@ class Resonance(Hidden):
         rise, fall, _ = cont2discrete((rising, [1, damping, w * w]), run.step, method="foh")
         rise = np.ravel(rise)
         # The output is at -foot where the foot is at input/N - KE; counted like the error, from where it starts.
-        foot = ke - (run.theta - run.theta[0]) / RATIO if self.whole_motion else ke
+        foot = ke - (run.theta - run.theta[0]) / run.ratio if self.whole_motion else ke
         settled = lfilter_zi(rise, fall) * foot[0]
         return lfilter(rise, fall, foot, zi=settled)[0] - foot
 

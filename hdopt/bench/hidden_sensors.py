@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from hdopt.bench.geometry import ARCMIN, RATIO
+from hdopt.bench.gears import CSF
+from hdopt.bench.geometry import ARCMIN
 from hdopt.bench.motion import TURN
 from hdopt.bench.signal_chain import Hidden, Parameter
 
@@ -40,7 +41,7 @@ class Eccentricity(Hidden):
     scale: float = 0.1  # amplitude in the kinematic error, arcmin
 
     @classmethod
-    def draw(cls, rng, on):
+    def draw(cls, rng, on, gear=CSF):
         oval = on == "output" and rng.random() < 0.3
         share = rng.uniform(0.3, 0.8) if oval else 0.0
         name = f"encoder_{on}_eccentricity"
@@ -53,7 +54,7 @@ class Eccentricity(Hidden):
     def read_input(self, angle, run):
         if not self._at_input:
             return angle
-        return off_centre_reading(angle, self.scale * ARCMIN * RATIO, self.direction)
+        return off_centre_reading(angle, self.scale * ARCMIN * run.ratio, self.direction)
 
     def read_output(self, angle, run):
         if self._at_input:
@@ -81,7 +82,7 @@ class Interpolation(Hidden):
     needs = frozenset({"fine"})
 
     @classmethod
-    def draw(cls, rng):
+    def draw(cls, rng, gear=CSF):
         on = str(rng.choice(["input", "output"]))
         lines = rng.choice([8, 16, 20, 32]) if on == "input" else rng.choice([500, 720, 1000, 1024, 2048, 2500])
         return cls(on, int(lines), tuple(rng.uniform(-1, 1, 2)), rng.uniform(-1, 1), rng.uniform(-1, 1))
@@ -109,12 +110,13 @@ class Coupling(Hidden):
     variant: str  # "input" or "output"
     direction: float
     scale: float = 1.0  # bend, deg, squared
+    ratio: float = CSF.ratio
     id = "output_coupling"
     scale_range = (1e-4, 15.0**2)
 
     @classmethod
-    def draw(cls, rng):
-        return cls(str(rng.choice(["input", "output"], p=[0.25, 0.75])), rng.uniform(0, TURN))
+    def draw(cls, rng, gear=CSF):
+        return cls(str(rng.choice(["input", "output"], p=[0.25, 0.75])), rng.uniform(0, TURN), ratio=gear.ratio)
 
     @property
     def bend(self):
@@ -131,7 +133,7 @@ class Coupling(Hidden):
         return self.read(angle) if self.variant == "output" else angle
 
     def truth(self):
-        amplitude = np.tan(self.bend / 2) ** 2 / ARCMIN / (RATIO if self.variant == "input" else 1)
+        amplitude = np.tan(self.bend / 2) ** 2 / ARCMIN / (self.ratio if self.variant == "input" else 1)
         return {
             "amplitude_arcmin": Parameter(float(amplitude), "arcmin"),
             "bend_deg": Parameter(float(np.rad2deg(self.bend)), "deg"),
@@ -149,12 +151,12 @@ class ChannelDelay(Hidden):
     scale_range = (1e-7, 1.0)
 
     @classmethod
-    def draw(cls, rng):
+    def draw(cls, rng, gear=CSF):
         return cls(str(rng.choice(["output late", "input late"])))
 
     def scale_for(self, rms, speed):
-        """Scale that gives `rms` (rad) in a test back and forth at `speed` (rad/s)."""
-        return rms * RATIO / speed
+        """Scale that gives `rms` (rad) in a test back and forth at `speed` (rad/s) of the output."""
+        return rms / speed
 
     def clock(self, time, input_angle, output_angle):
         late = time - self.scale

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from hdopt.bench import loops
-from hdopt.bench.geometry import ARCMIN, RATIO
+from hdopt.bench.geometry import ARCMIN
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def record(instrument, rank, plan, run, angles, torque, rng):
     true_output = np.rad2deg(output_angle)
     zero = instrument.output_zero_deg[rank]
     read_output = _quantised(
-        true_output + np.rad2deg(noise + skew * run.speed / RATIO) + zero, instrument.output_step_deg
+        true_output + np.rad2deg(noise + skew * run.speed / run.ratio) + zero, instrument.output_step_deg
     )
     columns = {"time_s": np.round(run.time, 7), "input_angle_deg": read_input, "output_angle_deg": read_output}
     if plan.torque is not None:
@@ -72,7 +72,7 @@ def record(instrument, rank, plan, run, angles, torque, rng):
     if plan.log_temperature:
         measured = 21 + run.body_k + instrument.temperature_noise_k * rng.standard_normal(n)
         columns["temperature_C"] = np.round(measured, 3)
-    error = np.deg2rad((read_input - np.rad2deg(input_angle)) / RATIO - (read_output - true_output))
+    error = np.deg2rad((read_input - np.rad2deg(input_angle)) / run.ratio - (read_output - true_output))
     return _with_gaps(instrument, pd.DataFrame(columns), rng), error - error.mean()
 
 

@@ -47,6 +47,7 @@ class Plan:
     torque: Torque | None
     heat: Heat | None
     log_temperature: bool
+    speed_steps: tuple[float, ...] = ()  # shares of the set speed, one after another
 
 
 @dataclass(frozen=True)
@@ -58,17 +59,22 @@ class Run:
     speed: np.ndarray
     torque: np.ndarray
     body_k: np.ndarray
+    ratio: float = RATIO
 
     @property
     def step(self):
         return (self.time[-1] - self.time[0]) / (self.time.size - 1)
 
 
-def run(plan, jitter, rng):
-    """Drive one plan. `jitter` is the clock's random error in units of the sampling step, equal for both channels."""
+def run(plan, jitter, rng, ratio=RATIO):
+    """Drive one `plan` of a gear of `ratio`; chance comes from `rng`.
+
+    `jitter` is the clock's random error in units of the sampling step, equal for both channels.
+    """
     top = max(rpm for _, rpm in plan.legs) * TURN / 60
     step = TURN / top / plan.samples_per_turn
     speed = np.concatenate([_leg(turns, rpm, plan.ramp_turns, step) for turns, rpm in plan.legs])
+    speed = speed * _stepped(plan.speed_steps, speed.size)
     nominal = _integral(speed, step)
     ripple = sum(a * np.cos(order * nominal + phase) for order, a, phase in plan.ripple)
     speed = speed * (1 + ripple)
@@ -76,7 +82,16 @@ def run(plan, jitter, rng):
     time = np.arange(speed.size) * step
     error = jitter * step * np.clip(rng.standard_normal(speed.size), -3, 3)
     theta = theta + error * (speed + 0.5 * error * np.gradient(speed, step))
-    return Run(time, theta, speed, _torque(plan, time, theta), _body(plan, time))
+    return Run(time, theta, speed, _torque(plan, time, theta / ratio), _body(plan, time), ratio)
+
+
+def _stepped(levels, samples):
+    """Share of the set speed at every sample: `levels` of equal length, each reached within a fortieth of it."""
+    if not levels:
+        return 1.0
+    place = np.linspace(0, len(levels), samples)
+    edges = np.repeat(np.arange(1, len(levels)), 2) + np.tile([-0.0125, 0.0125], len(levels) - 1)
+    return np.interp(place, edges, np.repeat(levels, 2)[1:-1])
 
 
 def _leg(turns, rpm, ramp_turns, step):
@@ -92,7 +107,7 @@ def _integral(values, step):
     return np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))]) * step
 
 
-def _torque(plan, time, theta):
+def _torque(plan, time, output):
     load = plan.torque
     if load is None:
         return np.zeros_like(time)
@@ -100,7 +115,7 @@ def _torque(plan, time, theta):
     if load.shape == "sweep":
         wave = 4 * np.abs(cycles % 1 - 0.5) - 1
     elif load.shape == "pendulum":
-        wave = np.sin(theta / RATIO + load.phase)
+        wave = np.sin(output + load.phase)
     else:
         levels = np.random.default_rng(int(1e6 * load.phase)).uniform(-1, 1, int(cycles[-1] * 2) + 3)
         rank = np.floor(2 * cycles).astype(int)
@@ -118,24 +133,25 @@ def _body(plan, time):
     return lfilter([1 - keep], [1, -keep], power)
 
 
-def _draw_samples_per_turn(rng, needs, size, several):
+def _draw_samples_per_turn(rng, needs, size, several, ratio):
+    teeth = max(1.0, ratio / RATIO)  # more teeth a turn than the shipped drive's take more samples
     if "dense" in needs:
-        return rng.uniform(390, 420)
+        return rng.uniform(390, 420) * teeth
     if "fine" in needs:
-        return rng.uniform(230, 300)
+        return rng.uniform(230, 300) * teeth
     samples = rng.uniform(100, 120 if several or size == "small" else 200)
     return {"brief": BRIEF_SAMPLES, "long": LONG_SAMPLES}.get(size, samples)
 
 
-def draw_plans(rng, needs=frozenset(), size="full"):
-    """Plans (a tuple, one a recording) of one case.
+def draw_plans(rng, needs=frozenset(), size="full", ratio=RATIO, turns=0.0):
+    """Plans (a tuple, one a recording) of one case, drawn by `rng`; of `turns` input turns, where these are given.
 
     `needs` is what the physics demands of the record; everything else is drawn at random.
 
     needs: "reversal", "speeds" (several, with reversals), "fast", "torque", "warm-up" (constant power), "temperature"
     (logged), "dense" (400 samples a turn), "fine" (220 or more), "one way" (no reversal, one speed).
-    size: "full" (at least one output turn forward), "short" (8 to 20 turns), "small" (for cases in large numbers),
-    "brief" (few rows, for tests that answer many cases) or "long" (100 turns of 1000 samples).
+    size: "full" (at least one output turn of a gear of `ratio` forward), "short" (8 to 20 turns), "small" (for cases in
+    large numbers), "brief" (few rows, for tests that answer many cases) or "long" (100 turns of 1000 samples).
     """
     closely = bool({"dense", "fine"} & needs)  # many samples a turn leave room for fewer turns
     several = "speeds" in needs or (rng.random() < 0.2 and not {"one way", "dense"} & needs)
@@ -149,14 +165,15 @@ def draw_plans(rng, needs=frozenset(), size="full"):
         rpms = rpms[: 3 if "fast" in needs else 2 if closely else rng.integers(2, 4)]
     else:
         rpms = np.array([rpm])
-    turns = {
+    drawn = {
         "full": rng.uniform(42, 44 if closely else 60) if several else rng.uniform(80, 85 if closely else 120),
         "small": rng.uniform(40, 46) if several else rng.uniform(80, 90),
         "short": rng.uniform(8, 20),
         "brief": BRIEF_DENSE_TURNS if "dense" in needs else BRIEF_FINE_TURNS if closely else 30 if several else 82,
         "long": LONG_TURNS,
     }[size]
-    samples = _draw_samples_per_turn(rng, needs, size, several)
+    samples = _draw_samples_per_turn(rng, needs, size, several, ratio)
+    turns = turns or (drawn * ratio / RATIO if size in ("full", "small") else drawn)
     if reversal and not several:
         turns *= 0.75 if size == "full" else 0.6
     ramp = rng.uniform(0.1, 0.4)

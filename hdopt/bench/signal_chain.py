@@ -4,15 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hdopt.bench.geometry import (
-    RAD_PER_MM,
-    RATIO,
-    BaseErrors,
-    Zones,
-    base_teeth,
-    find_zones,
-    zone_deviation_mm,
-)
+from hdopt.bench.gears import CSF, Gear
+from hdopt.bench.geometry import BaseErrors, Zones, base_teeth, find_zones, zone_deviation_mm
 from hdopt.bench.motion import Run
 
 
@@ -75,10 +68,12 @@ class Setup:
     run: Run
     zones: Zones
     errors: BaseErrors
+    gear: Gear = CSF
 
 
-def set_up(errors, run):
-    return Setup(run, find_zones(errors, run.theta), errors)
+def set_up(errors, run, gear=CSF):
+    """One recording's `run` with the zones of `gear` with `errors` along it."""
+    return Setup(run, find_zones(errors, run.theta, gear), errors, gear)
 
 
 def read_angles(setup, hidden=()):
@@ -86,13 +81,13 @@ def read_angles(setup, hidden=()):
     run = setup.run
     gain = np.prod([physics.torque_gain for physics in hidden])
     run = replace(run, torque=run.torque * gain)
-    cs_mm, fs_mm = base_teeth(setup.errors)
+    cs_mm, fs_mm = base_teeth(setup.errors, setup.gear)
     extra = 0.0
     for physics in hidden:
         cs_mm, fs_mm = physics.teeth(cs_mm, fs_mm)
         extra = extra + physics.depth_mm(run, setup.zones)
-    ke = RAD_PER_MM * zone_deviation_mm(setup.zones, cs_mm, fs_mm, extra).max(axis=0)
-    output_angle = run.theta / RATIO - ke - sum(physics.lag(run, ke) for physics in hidden)
+    ke = setup.gear.rad_per_mm(run.theta) * zone_deviation_mm(setup.zones, cs_mm, fs_mm, extra).max(axis=0)
+    output_angle = run.theta / run.ratio - ke - sum(physics.lag(run, ke) for physics in hidden)
     input_angle = run.theta
     for physics in hidden:
         input_angle = physics.read_input(input_angle, run)
@@ -105,7 +100,7 @@ def read_angles(setup, hidden=()):
 def read_error(setup, hidden=()):
     """Kinematic error (rad) of the ideal readings: input/N - output."""
     input_angle, output_angle = read_angles(setup, hidden)
-    return input_angle / RATIO - output_angle
+    return input_angle / setup.run.ratio - output_angle
 
 
 def hidden_wave(setup, hidden):

@@ -7,10 +7,11 @@ hide that instead of what its key says.
 import numpy as np
 import pytest
 
-import hdopt
+from hdopt.bench.gears import GEARS, study_text
 from hdopt.bench.geometry import ARCMIN, BaseErrors, draw_errors, kinematic_error
 from hdopt.drive.errors import DriveErrors
 from hdopt.kinematics import kinematic_error_arcmin
+from hdopt.study import load_study
 
 
 def as_hdopt(errors: BaseErrors):
@@ -35,15 +36,27 @@ def as_hdopt(errors: BaseErrors):
     )
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_base_waveform_is_hdopts(seed):
+@pytest.mark.parametrize("gear", GEARS.values(), ids=str)
+@pytest.mark.parametrize("seed", range(4))
+def test_base_waveform_is_hdopts(gear, seed, tmp_path):
+    """Catches a study file that describes another drive, a contour, a structure or a rim that is another."""
     errors = draw_errors(np.random.default_rng(seed))
-    drive = hdopt.load_study("csf-25-80").drive
+    (tmp_path / "drive.toml").write_text(study_text(gear))
+    drive = load_study(tmp_path / "drive.toml").drive
     theta = np.linspace(-30.0, 300.0, 20011)
-    ours = kinematic_error(errors, theta) / ARCMIN
+    ours = kinematic_error(errors, theta, gear) / ARCMIN
     theirs = kinematic_error_arcmin(drive, as_hdopt(errors), theta)
     difference = np.abs(ours - theirs)
-    # Closed form 1e-4 arcmin, interpolation between teeth 2e-4 of 0.33 arcmin at most for each spline.
-    assert np.quantile(difference, 0.98) < 3e-4
+    # Closed form 1e-4 arcmin; interpolation between z teeth, a straight line between two points of a sine: (2 pi/z)^2/8
+    # of 0.33 arcmin at most for each spline.
+    pitches = sum((2 * np.pi / z) ** 2 / 8 for z in (gear.fs_teeth, gear.cs_teeth))
+    assert np.quantile(difference, 0.98) < 1e-4 + 0.33 * pitches
     # Where the deepest rim changes, both are right on either side of a small step.
     assert difference.max() < 0.02
+
+
+def test_the_shipped_drive_is_the_first_gear():
+    shipped, ours = load_study(drive="csf-25-80").drive, GEARS["csf-25-80"]
+    assert shipped.geometry.ratio == ours.ratio and shipped.geometry.module == ours.module_mm
+    profile = shipped.wave_generator.profile
+    assert (profile.semi_major, profile.semi_minor) == (ours.semi_major_mm, ours.semi_minor_mm)
