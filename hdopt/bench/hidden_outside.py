@@ -5,25 +5,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from hdopt.bench.geometry import ARCMIN, RATIO
+from hdopt.bench.geometry import ARCMIN
 from hdopt.bench.motion import TURN
+from hdopt.bench.outside_forms import FORMS, Scene, foreign_order
 from hdopt.bench.signal_chain import Hidden
-
-# Orders that no bearing of a plausible size (ball/pitch 0.05-0.2), no encoder and no tooth has.
-FOREIGN_ORDERS = ((0.17, 0.35), (0.66, 0.94), (1.28, 1.9), (2.08, 2.92), (3.08, 3.92), (5.1, 5.9))
-
-
-def foreign_order(rng):
-    low, high = FOREIGN_ORDERS[rng.integers(len(FOREIGN_ORDERS))]
-    order = rng.uniform(low, high)
-    while abs(order * RATIO - round(order * RATIO)) < 0.35:  # not a multiple of the output's turn either
-        order = rng.uniform(low, high)
-    return order
 
 
 @dataclass(frozen=True)
 class Outside(Hidden):
-    """A wave (arcmin per unit of scale) of one of the kinds below.
+    """A wave (arcmin per unit of scale) of one of the kinds below, or of the forms of `outside_forms`.
 
     What belongs to the machine (an order, a frequency) is the same in every recording, what is chance differs.
     """
@@ -36,7 +26,14 @@ class Outside(Hidden):
 
     @classmethod
     def draw(cls, rng, kind=None):
-        return cls(kind or str(rng.choice(list(KINDS))), int(rng.integers(2**31)))
+        kind = kind or str(rng.choice(list(KINDS)))
+        if kind not in KINDS and kind not in FORMS:
+            raise ValueError(f"no such physics: {kind!r}; the bench knows {', '.join((*KINDS, *FORMS))}")
+        return cls(kind, int(rng.integers(2**31)))
+
+    @property
+    def needs(self):
+        return FORMS[self.variant].needs if self.variant in FORMS else frozenset()
 
     def for_plans(self, plans):
         return replace(self, turn_hz=max(rpm for plan in plans for _, rpm in plan.legs) / 60)
@@ -44,6 +41,8 @@ class Outside(Hidden):
     def lag(self, run, ke):
         machine = np.random.default_rng(self.seed)
         chance = np.random.default_rng([self.seed, run.time.size])
+        if self.variant in FORMS:
+            return self.scale * ARCMIN * FORMS[self.variant].wave(Scene(run, ke, self.turn_hz), machine, chance)
         return self.scale * ARCMIN * KINDS[self.variant](run, self.turn_hz, machine, chance)
 
 
@@ -53,13 +52,13 @@ def _samples_per_turn(run):
 
 def belt_order(run, turn_hz, machine, chance):
     """A belt stage ahead of the input: its tooth-count ratio gives an order locked to nothing in the drive."""
-    order, harmonics = foreign_order(machine), machine.integers(1, 4)
+    order, harmonics = foreign_order(machine, run.ratio), machine.integers(1, 4)
     return sum(np.cos(k * order * run.theta + machine.uniform(0, TURN)) / k**1.5 for k in range(1, harmonics + 1))
 
 
 def auxiliary_gear(run, turn_hz, machine, chance):
     """A gear pair between output and its encoder: run-out of the second gear, and its pitch cut in two settings."""
-    shaft = foreign_order(machine) * run.theta
+    shaft = foreign_order(machine, run.ratio) * run.theta
     return np.cos(shaft + machine.uniform(0, TURN)) + np.abs(np.sin(shaft / 2 + machine.uniform(0, TURN)))
 
 
@@ -83,7 +82,7 @@ def one_off_bump(run, turn_hz, machine, chance):
 
 def modulated_order(run, turn_hz, machine, chance):
     """A motor's cogging behind a slipping clutch: an order whose amplitude and phase wander."""
-    order = foreign_order(machine) * run.theta
+    order = foreign_order(machine, run.ratio) * run.theta
     wander = gaussian_filter1d(chance.standard_normal((2, run.time.size)), 3 * _samples_per_turn(run), axis=1)
     wander /= wander.std(axis=1, keepdims=True)
     return wander[0] * np.cos(order) + wander[1] * np.sin(order)
@@ -134,3 +133,6 @@ KINDS = {
     "slow wave": slow_wave,
     "stick-slip": stick_slip,
 }
+
+ALL_KINDS = (*KINDS, *FORMS)
+"""Every form from which a proof draws what is outside the catalogue."""

@@ -9,7 +9,7 @@ from hdopt.bench.cases import CATALOGUE
 from hdopt.bench.geometry import ARCMIN, RATIO, BaseErrors
 from hdopt.bench.hidden_drive import BearingPass, Lobing, LocalDefect
 from hdopt.bench.hidden_load import Hysteresis, LostMotion, Resonance, ThermalDrift, Windup
-from hdopt.bench.hidden_outside import KINDS, Outside
+from hdopt.bench.hidden_outside import ALL_KINDS, Outside
 from hdopt.bench.hidden_sensors import ChannelDelay, Coupling, Eccentricity, Interpolation
 from hdopt.bench.motion import TURN, Heat, Plan, Torque, run
 from hdopt.bench.signal_chain import hidden_wave, joint_rms, read_error, set_up
@@ -39,12 +39,41 @@ def test_no_size_no_effect(effect):
         assert np.abs(wave).max() < 1e-5 * ARCMIN
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ALL_KINDS)
 def test_outside_kinds_scale(kind):
-    setup, plan = setup_for([(20, 60)])
+    """Every form is finite, is there, and grows in proportion: the severity of a case rests on it."""
+    setup, plan = setup_for(
+        [(20, 60), (-20, 60), (8, 25)], torque=Torque("sweep", 10, 0, 0.2, 0.3), heat=Heat(5, 3, 0, 1)
+    )
     physics = Outside.draw(np.random.default_rng(1), kind).for_plans((plan,))
     one, two = (joint_rms([hidden_wave(setup, [physics.scaled(s)])]) for s in (0.1, 0.2))
     assert two == pytest.approx(2 * one, rel=1e-6) and one > 0.01 * ARCMIN
+
+
+def closest(wave, column):
+    """Share of `wave` that a free factor of `column` explains."""
+    wave, column = wave - wave.mean(), column - column.mean()
+    return (wave @ column) ** 2 / (wave @ wave) / (column @ column)
+
+
+def test_forms_are_what_their_names_say():
+    """Catches a form that is a catalogue effect under another name, or no law at all."""
+    setup, plan = setup_for([(20, 60), (-20, 60), (20, 15)], torque=Torque("sweep", 10, 0, 0.2, 0.3))
+    speed = setup.run.speed / TURN
+
+    def wave(kind, seed=3):
+        return hidden_wave(setup, [Outside.draw(np.random.default_rng(seed), kind).for_plans((plan,))])
+
+    drag = wave("drag by a root of speed")
+    assert closest(drag, np.sign(speed) * np.sqrt(np.abs(speed))) > 0.98 > closest(drag, speed)
+    size = wave("size of torque")
+    assert abs(size[np.argmax(setup.run.torque)] - size[np.argmin(setup.run.torque)]) < 0.02 * np.ptp(size)
+    creep = wave("creep after a reversal")
+    back = np.flatnonzero(np.diff(np.sign(speed)) < 0)[0] + 5
+    later = creep[back : back + 1500 : 500]
+    assert abs(later[1] - later[0]) > abs(later[2] - later[1])  # ever slower
+    other = wave("wandering pulse", seed=4)
+    assert closest(wave("wandering pulse"), other) < 0.5  # parameters are drawn
 
 
 def test_play_leaves_its_full_step_at_a_reversal():
