@@ -9,13 +9,11 @@ from hdopt.study.base import Section
 
 class ConcealedSection(Section):
     """`[concealed]`: size of a blind proof of the diagnosis. `share` below 1 keeps that part of every family of cases,
-    `families` only these."""
+    `families` only these (empty: all)."""
 
     seed: int = Field(1, ge=0)
     share: float = Field(1.0, gt=0, le=1)
-    families: list[str] = Field(
-        ["nothing", "single", "knee", "pair", "decoy", "unknown", "orientation", "scale", "long", "coarse", "swing"]
-    )
+    families: list[str] = Field([])
 
 
 class ResidualsSection(Section):

@@ -1,28 +1,33 @@
 """Have every case answered by the command line: `python -m hdopt.bench.answer --dir DIR -- hdopt diagnose`.
 
 `COMMAND REC... --drive NAME --json FILE` writes each answer to DIR/answers/<id>.json; answers that exist are kept, so
-that a run can be continued. Nothing here opens DIR/sealed.
+that a run can be continued. With `--minutes` no case is begun after that time. DIR/answers.json says how many were
+begun, how long it took and which program answered. Nothing here opens DIR/sealed.
 """
 
 import argparse
 import json
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from hdopt.bench.registry import hashes
+
 
 def answer(folder, out, command, limit_s=300):
-    """Run `command` on the case in `folder`; returns "" or why there is no answer."""
+    """Run `command` on the case in `folder`, for `limit_s` at most, its answer into `out`; "" or why there is none."""
     case = json.loads((folder / "case.json").read_text())
     target = out / f"{case['id']}.json"
     if target.exists():
         return ""
     draft = target.with_suffix(".part")
     files = [str(folder / name) for name in case["recordings"]]
+    drive = str(folder / case["drive"]) if (folder / case["drive"]).exists() else case["drive"]
     try:
         done = subprocess.run(
-            [*command, *files, "--drive", case["drive"], "--json", str(draft)],
+            [*command, *files, "--drive", drive, "--json", str(draft)],
             capture_output=True,
             text=True,
             timeout=limit_s,
@@ -37,19 +42,35 @@ def answer(folder, out, command, limit_s=300):
 
 
 def main(arguments=None):
+    """Answer the cases that `arguments` name; status 1 where one that was begun has no answer."""
     parser = argparse.ArgumentParser(prog="python -m hdopt.bench.answer", description=__doc__)
     parser.add_argument("--dir", required=True, type=Path)
     parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=float("inf"), help="begin no case after this time")
+    parser.add_argument("--limit", type=float, default=300.0, help="seconds for one case")
     parser.add_argument("command", nargs="+", help="after --")
     options = parser.parse_args(arguments)
     out = options.dir / "answers"
     out.mkdir(exist_ok=True)
     folders = sorted(path.parent for path in (options.dir / "cases").glob("*/case.json"))
+    begun_at, program = time.monotonic(), hashes()["program"]
+
+    def in_time(folder):
+        if time.monotonic() - begun_at > 60 * options.minutes:
+            return None
+        return answer(folder, out, options.command, options.limit)
+
     with ThreadPoolExecutor(options.workers) as pool:
-        problems = [p for p in pool.map(lambda f: answer(f, out, options.command), folders) if p]
+        said = [problem for problem in pool.map(in_time, folders) if problem is not None]
+    if hashes()["program"] != program:
+        print("the program changed while it answered: these answers are of no single program", file=sys.stderr)
+        return 1
+    told = {"begun": len(said), "seconds": time.monotonic() - begun_at, "program": program}
+    (options.dir / "answers.json").write_text(json.dumps(told) + "\n")
+    problems = [problem for problem in said if problem]
     for problem in problems:
         print(problem, file=sys.stderr)
-    print(f"{len(folders) - len(problems)} of {len(folders)} cases answered in {out}")
+    print(f"{len(said) - len(problems)} of {len(said)} cases answered in {out}")
     return 1 if problems else 0
 
 

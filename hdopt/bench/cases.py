@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 
 from hdopt.bench.evidence import Witness
-from hdopt.bench.geometry import ARCMIN, draw_errors
+from hdopt.bench.gears import CSF, GEARS, as_built
+from hdopt.bench.geometry import ARCMIN, draw_errors, find_zones
 from hdopt.bench.hidden_drive import BearingPass, Lobing, LocalDefect, LongWave, ToothMesh
 from hdopt.bench.hidden_load import Hysteresis, LostMotion, Resonance, ThermalDrift, Windup
 from hdopt.bench.hidden_outside import Outside
@@ -44,11 +45,8 @@ ONE_IN_THE_OTHER = (
     {"encoder_output_eccentricity", "output_coupling"},
 )
 
-# From this severity on, a case whose own records cannot show the physics is drawn anew: it would test nothing.
-MUST_SHOW = 0.25
-# From this severity on, conditions under which the physics could also be another are drawn anew, as a test engineer
-# would choose them; after some draws the confusion is taken as the physics' own.
-SHOULD_SEPARATE, SEPARATION_DRAWS = 0.5, 5
+# Draws until physics can be as large as asked for: an encoder's error, a swing have a largest size. No case is drawn
+# anew for any other reason; `Key.redrawn` says how often, and the last draw is taken as large as it can be.
 ATTEMPTS = 14
 
 
@@ -65,6 +63,11 @@ class Spec:
     size: str = ""  # of the record, as in `draw_plans`; by the family where empty
     reading: str = ""  # of `readings`: how the bench counts and samples
     whole_motion: bool = False  # a resonance swings with all of its foot's motion, not with the error alone
+    gear: str = CSF.name  # of `gears.GEARS`
+    built: str = ""  # of `gears.BUILT`: what the drive has as it is built
+    turns: float = 0.0  # input turns of a stroke, where the size does not say
+    hum: float = 0.0  # 50 Hz mains in the output's reading, rms in units of the noise's
+    speed_steps: bool = False
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,13 @@ class Key:
     rivals: tuple[str, ...]
     parameters: dict  # id -> name -> {value, unit, identifiable}
     conditions: dict
+    gear: str = CSF.name
+    built: str = ""
+    margin: float | None = None  # evidence against the closest rival, or the base, in units of what decides
+    beside_rms_arcmin: float = 0.0  # of what the drive and the bench have besides: as built, hum
+    beside_detectable: bool = False
+    beside_true: tuple[str, ...] = ()  # names of the catalogue that would be true of it
+    redrawn: int = 0
 
     def to_dict(self):
         return asdict(self)
@@ -104,18 +114,20 @@ class Case:
 
 
 def generate(spec, name="case"):
-    """Case and key of `spec`; the same seed gives the same numbers."""
+    """Case and key of `spec`, called `name`; the same seed gives the same numbers."""
     for effect in spec.effects:
         if effect not in CATALOGUE:
             raise ValueError(f"unknown effect {effect!r}; the bench knows {', '.join(CATALOGUE)}")
     if spec.reading not in READINGS:
         raise ValueError(f"unknown reading {spec.reading!r}; the bench knows {', '.join(filter(None, READINGS))}")
+    if spec.gear not in GEARS:
+        raise ValueError(f"unknown gear {spec.gear!r}; the bench knows {', '.join(GEARS)}")
     rng = _generator(spec)
     for attempt in range(ATTEMPTS):
-        case, key = _attempt(spec, name, rng)
-        if case is not None and _fair(spec, key, attempt):
-            return case, key
-    raise RuntimeError(f"no fair case in {ATTEMPTS} draws for {spec}")
+        drawn = _simulate(spec, rng, last=attempt == ATTEMPTS - 1)
+        if drawn is not None:
+            return Case(name, drawn.tables), replace(_key(spec, name, drawn, rng), redrawn=attempt)
+    raise AssertionError("the last draw is taken as it is")
 
 
 def _generator(spec):
@@ -125,16 +137,6 @@ def _generator(spec):
 def simulate(spec):
     """The first draw of `spec`, without a key: a `Simulated`, or None where the physics cannot be so large in it."""
     return _simulate(spec, _generator(spec))
-
-
-def _fair(spec, key, attempt):
-    if spec.family == "unknown":
-        return key.detectable and not key.rivals
-    if spec.family in ("single", "pair") and spec.severity >= MUST_SHOW:
-        own = {name for pair in ONE_IN_THE_OTHER if pair & set(key.effects) for name in pair}
-        confused = spec.severity >= SHOULD_SEPARATE and not set(key.rivals) <= own
-        return key.detectable and not (confused and attempt < SEPARATION_DRAWS)
-    return True
 
 
 @dataclass(frozen=True)
@@ -150,6 +152,7 @@ class Simulated:
     noise_rms: float
     base_rms: float
     torque_gain: float
+    beside: list  # waves of what the drive and the bench have besides, one array a recording
 
     def parameters(self):
         """True parameters of the catalogue's physics in it: id -> name -> {value, unit, identifiable}."""
@@ -157,9 +160,10 @@ class Simulated:
         return {physics.id: _parameters(physics, top) for physics in self.hidden if physics.id}
 
 
-def _simulate(spec, rng):
+def _simulate(spec, rng, last=False):
+    gear = GEARS[spec.gear]
     errors = draw_errors(rng)
-    hidden = [CATALOGUE[effect](rng) for effect in spec.effects]
+    hidden = [CATALOGUE[effect](rng, gear=gear) for effect in spec.effects]
     if spec.outside:
         hidden.append(Outside.draw(rng, spec.outside))
     plans = _plans(spec, hidden, rng)
@@ -167,39 +171,55 @@ def _simulate(spec, rng):
     if spec.whole_motion:
         hidden = [replace(h, whole_motion=True) if h.id == "resonance" else h for h in hidden]
     instrument = through(spec.reading, draw_instrument(rng, len(plans), frozenset([spec.trouble])))
-    setups = [set_up(errors, run(plan, instrument.jitter, rng)) for plan in plans]
+    real = as_built(gear, spec.built, rng) if spec.built else gear
+    setups = [set_up(errors, run(plan, instrument.jitter, rng, gear.ratio), real) for plan in plans]
     base_rms = joint_rms([read_error(s) for s in setups])
-    deaf = {"reversal", "speeds"} if spec.trouble == "one way" else set()
-    target = spec.severity * base_rms
-    sized = [
-        (_as_if_reversed if physics.needs & deaf and hasattr(physics, "scale_for") else scaled_to)(
-            physics, setups, target
-        )
-        for physics in (hidden if target else [])
-    ]
+    sized = _sized(spec, hidden, setups, base_rms, last)
     if None in sized:
         return None
     hidden, waves = [physics for physics, _ in sized], [waves for _, waves in sized]
+    beside, hum = _beside(spec, setups, errors, gear, instrument)
     gain = float(np.prod([physics.torque_gain for physics in hidden]))
     tables, noises = zip(
         *[
-            record(instrument, rank, plan, s.run, read_angles(s, hidden), gain * s.run.torque, rng)
+            record(instrument, rank, plan, s.run, read_angles(s, [*hidden, *hum]), gain * s.run.torque, rng)
             for rank, (plan, s) in enumerate(zip(plans, setups, strict=True))
         ],
         strict=True,
     )
     tables = tuple(as_read(spec.reading, table, rng) for table in tables)
-    return Simulated(plans, setups, hidden, waves, instrument, tables, joint_rms(noises), base_rms, gain)
+    return Simulated(plans, setups, hidden, waves, instrument, tables, joint_rms(noises), base_rms, gain, beside)
 
 
-def _attempt(spec, name, rng):
-    drawn = _simulate(spec, rng)
-    if drawn is None:
-        return None, None
+def _sized(spec, hidden, setups, base_rms, as_it_is):
+    """Hidden physics as large as `spec` asks for, each with its waves; where it cannot be, None or `as_it_is`."""
+    deaf = {"reversal", "speeds"} if spec.trouble == "one way" else set()
+    target = spec.severity * base_rms
+    return [
+        _as_if_reversed(physics, setups, target)
+        if physics.needs & deaf and hasattr(physics, "scale_for")
+        else scaled_to(physics, setups, target, as_it_is)
+        for physics in (hidden if target else [])
+    ]
+
+
+def _beside(spec, setups, errors, gear, instrument):
+    """Waves of what the drive as built and the bench have besides, one a recording, and the hum among it."""
+    hum = []
+    if spec.hum:
+        # Two tones, the third harmonic at 0.6 at most: rms 0.7 to 0.8 of the scale.
+        hum = [Outside("mains", spec.seed, scale=spec.hum * instrument.noise_arcmin / 0.75)]
+    waves = []
+    for s in setups:
+        nominal = replace(s, gear=gear, zones=find_zones(errors, s.run.theta, gear)) if spec.built else s
+        waves.append(read_error(s, hum) - read_error(nominal))
+    return (waves if spec.built or spec.hum else []), hum
+
+
+def _key(spec, name, drawn, rng):
     hidden, setups, waves = drawn.hidden, drawn.setups, drawn.waves
     together = [hidden_wave(s, hidden) for s in setups] if len(hidden) != 1 else waves[0]
-    finding = _weigh(drawn, together, rng)
-    key = Key(
+    return Key(
         id=name,
         family=spec.family,
         seed=spec.seed,
@@ -215,9 +235,11 @@ def _attempt(spec, name, rng):
         noise_rms_arcmin=drawn.noise_rms / ARCMIN,
         parameters=drawn.parameters(),
         conditions=_conditions(drawn.plans, setups),
-        **finding,
+        gear=spec.gear,
+        built=spec.built,
+        **_weigh(drawn, together, rng),
+        **_weigh_beside(spec, drawn, rng),
     )
-    return Case(name, drawn.tables), key
 
 
 def _plans(spec, hidden, rng):
@@ -227,14 +249,19 @@ def _plans(spec, hidden, rng):
         needs = needs - {"reversal", "speeds"} | {"one way"}
     if spec.trouble == "short":
         size = "short"
-    plans = draw_plans(rng, needs, size)
+    plans = draw_plans(rng, needs, size, GEARS[spec.gear].ratio, spec.turns)
+    if spec.speed_steps:
+        plans = tuple(replace(p, speed_steps=tuple(rng.permutation([0.3, 0.5, 0.75, 1.0]))) for p in plans)
     if spec.trouble == "ripple":
         plans = tuple(replace(p, ripple=draw_ripple(rng, rng.uniform(0.05, 0.2))) for p in plans)
     return plans
 
 
-def scaled_to(physics, setups, target):
-    """`physics` scaled to an rms of `target` (rad), and its waves; None where it cannot be so large."""
+def scaled_to(physics, setups, target, as_it_is=False):
+    """`physics` scaled to an rms of `target` (rad) over `setups`, and its waves.
+
+    Where it cannot be so large: None, or with `as_it_is` as large as it can be.
+    """
     scale = physics.scale
     for _ in range(25):
         physics = physics.scaled(scale)
@@ -246,19 +273,19 @@ def scaled_to(physics, setups, target):
         step = np.clip(target / rms, 0.01, 100) if rms else 10.0
         step = step if abs(np.log(step)) > 0.1 else np.sqrt(step)
         scale = float(np.clip(scale * step, *physics.scale_range))
-    return (physics, waves) if abs(rms / target - 1) < 0.02 else None
+    return (physics, waves) if as_it_is or abs(rms / target - 1) < 0.02 else None
 
 
 def _as_if_reversed(physics, setups, target):
     """Physics in a test without the reversal that it needs: as large as would give `target` with one."""
-    physics = physics.scaled(physics.scale_for(target, max(np.abs(s.run.speed).max() for s in setups)))
+    physics = physics.scaled(physics.scale_for(target, max(np.abs(s.run.speed).max() / s.run.ratio for s in setups)))
     return physics, [hidden_wave(s, [physics]) for s in setups]
 
 
 def _weigh(drawn, together, rng):
     hidden = drawn.hidden
     if not hidden:
-        return {"unexplained_rms_arcmin": 0.0, "detectable": False, "separable": False, "rivals": ()}
+        return {"unexplained_rms_arcmin": 0.0, "detectable": False, "separable": False, "rivals": (), "margin": None}
     witness = Witness(drawn.setups, drawn.plans, rng)
 
     def sampled(parts):
@@ -266,7 +293,7 @@ def _weigh(drawn, together, rng):
 
     share = drawn.instrument.effective(1.0)
     parts = [sampled(wave) for wave in drawn.waves]
-    detectable, rivals = True, set()
+    detectable, rivals, margin = True, set(), np.inf
     for rank, physics in enumerate(hidden):
         # A second physics is free to take up what it can of the first, so all its columns stand beside its wave.
         others = [other for other in range(len(hidden)) if other != rank]
@@ -274,11 +301,30 @@ def _weigh(drawn, together, rng):
         evidence = witness.weigh(parts[rank], physics.id, drawn.noise_rms, share, beside)
         detectable &= evidence.detectable
         rivals |= set(evidence.rivals)
+        margin = min(margin, evidence.margin)
     return {
         "unexplained_rms_arcmin": witness.refit(sampled(together)) / ARCMIN,
         "detectable": bool(detectable),
         "separable": not rivals,
         "rivals": tuple(sorted(rivals)),
+        "margin": margin,
+    }
+
+
+TRUE_OF_BUILT = {"pitch errors": ("cs_tooth_harmonics", "fs_tooth_harmonics")}
+"""Names of the catalogue that are true of a drive as built: each tooth's own error has waves of every length."""
+
+
+def _weigh_beside(spec, drawn, rng):
+    if not drawn.beside:
+        return {}
+    witness = Witness(drawn.setups, drawn.plans, rng)
+    wave = np.concatenate([wave[pick] for wave, pick in zip(drawn.beside, witness.pick, strict=True)])
+    evidence = witness.weigh(wave, "", drawn.noise_rms, drawn.instrument.effective(1.0))
+    return {
+        "beside_rms_arcmin": joint_rms(drawn.beside) / ARCMIN,
+        "beside_detectable": bool(evidence.detectable),
+        "beside_true": TRUE_OF_BUILT.get(spec.built, ()),
     }
 
 

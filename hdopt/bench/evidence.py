@@ -12,12 +12,8 @@ from scipy.optimize import least_squares
 
 from hdopt.bench import loops
 from hdopt.bench.geometry import (
-    CS_TEETH,
     ERROR_BOUNDS,
     ERROR_STEPS,
-    FS_TEETH,
-    RAD_PER_MM,
-    RATIO,
     BaseErrors,
     base_teeth,
     find_zones,
@@ -43,8 +39,8 @@ SAMPLES = 4000
 STEP = 0.004
 BEARING_ORDERS = np.concatenate([np.arange(low, high, STEP) for low, high in ((0.37, 0.62), (1.05, 1.23), (6.0, 21.4))])
 BEARING_ORDERS = BEARING_ORDERS[np.abs(BEARING_ORDERS - np.round(BEARING_ORDERS)) > 0.02]
-# Orders of output encoders of 400 lines and more: whole numbers of lines.
-LINE_ORDERS = np.arange(400, 3001) / RATIO
+# Output encoders of 400 lines and more.
+LINES = np.arange(400, 3001)
 
 
 @dataclass(frozen=True)
@@ -61,17 +57,26 @@ class Evidence:
         return self.against_base > DECISIVE
 
     @property
+    def floor(self):
+        """Evidence below which a rival is not refuted."""
+        return max(DECISIVE, WORSE * self.own, self.least_share * self.against_base)
+
+    @property
     def rivals(self):
         """Catalogue entries that would explain the records as well as the truth."""
-        floor = max(DECISIVE, WORSE * self.own, self.least_share * self.against_base)
-        return tuple(sorted(name for name, left in self.against.items() if left < floor))
+        return tuple(sorted(name for name, left in self.against.items() if left < self.floor))
+
+    @property
+    def margin(self):
+        """Evidence against the closest rival, or against the base alone, in units of what decides."""
+        return float(min(self.against_base / DECISIVE, *(left / self.floor for left in self.against.values())))
 
 
 class Witness:
     """Samples of one case's recordings, the base's derivatives there, and the columns of every rival."""
 
     def __init__(self, setups, plans, rng):
-        self.setups, self.plans = setups, plans
+        self.setups, self.plans, self.gear = setups, plans, setups[0].gear
         total = sum(s.run.time.size for s in setups)
         share = min(1.0, SAMPLES / total)
         self.pick = [
@@ -82,26 +87,29 @@ class Witness:
         self.theta = theta
         self.rank = np.repeat(np.arange(len(setups)), [p.size for p in self.pick])
         self.errors = setups[0].errors
+        # Structures that take an eccentricity away make its column zero.
         vector = self.errors.vector()
-        here = kinematic_error(self.errors, theta)
-        slopes = [
-            (kinematic_error(BaseErrors(*(vector + step)), theta) - here) / step.max() for step in np.diag(ERROR_STEPS)
-        ]
+        here = self.error_of(vector, theta)
+        slopes = [(self.error_of(vector + step, theta) - here) / step.max() for step in np.diag(ERROR_STEPS)]
         means = (self.rank[:, None] == np.arange(len(setups))).astype(float)
         self.base = orthonormal(np.column_stack([means, *slopes]))
 
     def sampled(self, values):
         return np.concatenate([np.asarray(values(s))[p] for s, p in zip(self.setups, self.pick, strict=True)])
 
+    def error_of(self, vector, theta):
+        """Kinematic error (rad) at `theta` (rad) of this drive with the errors `vector` (12,)."""
+        return kinematic_error(BaseErrors(*vector), theta, self.gear)
+
     def refit(self, wave, turns=4):
         """What the base, refitted to base + `wave` within its plausible errors, leaves of it (rad rms)."""
         theta, rank, wave = self.theta[::3], self.rank[::3], wave[::3]  # smooth, but for pulses: a third will do
-        truth = kinematic_error(self.errors, theta)
+        truth = self.error_of(self.errors.vector(), theta)
         target = truth + wave
         unit = ERROR_BOUNDS
 
         def left(x):
-            residual = target - kinematic_error(BaseErrors(*(x * unit)), theta)
+            residual = target - self.error_of(x * unit, theta)
             return (residual - (np.bincount(rank, residual) / np.bincount(rank))[rank]) / truth.std()
 
         start = self.errors.vector() / unit
@@ -125,9 +133,8 @@ class Witness:
         if own in ("", "encoder_interpolation"):
             against["bearing_pass"] = per_square * _left_by_tone(base, self.theta, wave, BEARING_ORDERS, STEP)
         if own in ("", "bearing_pass"):
-            against["encoder_interpolation"] = min(
-                against["encoder_interpolation"], per_square * _left_by_tone(base, self.theta, wave, LINE_ORDERS)
-            )
+            by_lines = _left_by_tone(base, self.theta, wave, LINES / self.gear.ratio)
+            against["encoder_interpolation"] = min(against["encoder_interpolation"], per_square * by_lines)
         return Evidence(
             float(per_square * wave @ wave),
             {name: left for name, left in against.items() if name != own},
@@ -141,21 +148,21 @@ class Witness:
         return self._rivals
 
     def _columns(self):
-        theta, output = self.theta, self.theta / RATIO
-        zones = find_zones(self.errors, theta)
-        driving = zone_deviation_mm(zones, *base_teeth(self.errors)).argmax(axis=0)
+        gear, theta, output = self.gear, self.theta, self.theta / self.gear.ratio
+        zones = find_zones(self.errors, theta, gear)
+        driving = zone_deviation_mm(zones, *base_teeth(self.errors, gear)).argmax(axis=0)
         cs = np.take_along_axis(zones.cs_angle, driving[None], 0)[0]
         fs = np.take_along_axis(zones.fs_angle, driving[None], 0)[0]
         rivals = {
             "cs_tooth_harmonics": [waves(cs, range(2, 13))],
             "fs_tooth_harmonics": [waves(fs, range(2, 13))],
-            "tooth_mesh": [waves(cs, [CS_TEETH, 2 * CS_TEETH])],
+            "tooth_mesh": [waves(cs, [gear.cs_teeth, 2 * gear.cs_teeth])],
             "encoder_input_eccentricity": [waves(theta, [1])],
             "encoder_output_eccentricity": [waves(output, [1, 2])],
             "output_coupling": [waves(theta, [2]), waves(output, [2])],
             "encoder_interpolation": [waves(theta, [lines, 2 * lines]) for lines in (8, 12, 16, 20, 24, 32, 64)],
             "circular_spline_lobing": [waves(cs, [n]) for n in range(2, 13)],
-            "local_tooth_defect": [pulses(cs, CS_TEETH), pulses(fs, FS_TEETH)],
+            "local_tooth_defect": [pulses(cs, gear.cs_teeth), pulses(fs, gear.fs_teeth)],
         }
         if any(plan.torque is not None for plan in self.plans):
             torque = self.sampled(lambda s: s.run.torque)
@@ -164,9 +171,9 @@ class Witness:
             rivals["torsional_windup"] = [np.column_stack([torque, torque**3, torque[:, None] * twice])]
         speed = self.sampled(lambda s: s.run.speed)
         if np.ptp(np.sign(speed)) > 1:
-            rivals["lost_motion"] = [self.sampled(lambda s: _play(s.run.theta))]
+            rivals["lost_motion"] = [self.sampled(lambda s: _play(s.run.theta / gear.ratio))]
             rivals["hysteresis"] = [
-                self.sampled(lambda s, d=d: loops.bouc_wen(s.run.theta / RATIO, np.deg2rad(d), 1.0, 0.5))
+                self.sampled(lambda s, d=d: loops.bouc_wen(s.run.theta / gear.ratio, np.deg2rad(d), 1.0, 0.5))
                 for d in (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
             ]
         rivals["channel_delay"] = [speed]
@@ -186,7 +193,8 @@ class Witness:
         return rivals
 
     def _ke(self, setup):
-        return RAD_PER_MM * zone_deviation_mm(setup.zones, *base_teeth(setup.errors)).max(axis=0)
+        deviation = zone_deviation_mm(setup.zones, *base_teeth(setup.errors, setup.gear)).max(axis=0)
+        return setup.gear.rad_per_mm(setup.run.theta) * deviation
 
 
 def orthonormal(columns):
@@ -240,7 +248,6 @@ def _left_by_tone(base, theta, wave, orders, within=0.0):
     return min(_left(base, waves(theta, [order, 2 * order]), wave) for order in best)
 
 
-def _play(theta):
-    position = theta / RATIO
-    gap = np.full(theta.size, 1e-6)
+def _play(position):
+    gap = np.full(position.size, 1e-6)
     return (position - loops.play(position, gap)) / 1e-6

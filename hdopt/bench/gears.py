@@ -103,7 +103,7 @@ BUILT = ("pitch errors", "cam harmonics", "varying k_e")
 
 
 def as_built(gear, kind, rng):
-    """`gear` with the `kind` of thing that real ones have: "pitch errors" of single teeth, "cam harmonics" or a "varying k_e", by `rng`."""
+    """`gear` with a `kind` of thing that real ones have (`BUILT`), its size drawn by `rng`."""
     if kind == "pitch errors":
         um = rng.uniform(0.2, 0.8, 2)
         cs, fs = 1e-3 * um[0] * rng.standard_normal(gear.cs_teeth), 1e-3 * um[1] * rng.standard_normal(gear.fs_teeth)

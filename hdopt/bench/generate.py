@@ -1,12 +1,12 @@
-"""Write blind cases: `python -m hdopt.bench.generate --out DIR --seed S [--families nothing,single,...]`.
+"""Write blind cases: `python -m hdopt.bench.generate --out DIR --seed S [--cases N] [--families nothing,single,...]`.
 
-DIR/cases/<id>/ holds the recordings and case.json (what a test engineer knows: the drive and the files). The truth goes
-to DIR/sealed/keys.json, and its checksum to DIR/keys.sha256: whoever answers must not open `sealed` before the answers
-are written to DIR/answers/<id>.json.
+DIR/cases/<id>/ holds the recordings and case.json (what a test engineer knows: the files, and the drive by its shipped
+name or as a study file with its nominal geometry). The truth goes to DIR/sealed/keys.jsonl, one line a case, and its
+checksum to DIR/keys.sha256: whoever answers must not open `sealed` before the answers are written to
+DIR/answers/<id>.json.
 """
 
 import argparse
-import hashlib
 import json
 import sys
 from concurrent.futures import ProcessPoolExecutor
@@ -17,7 +17,9 @@ import pyarrow as pa
 import pyarrow.csv
 
 from hdopt.bench.cases import generate
-from hdopt.bench.suite import FAMILIES, plan
+from hdopt.bench.gears import CSF, GEARS, study_text
+from hdopt.bench.registry import lines, sha
+from hdopt.bench.suite import FAMILIES, FULL, plan
 
 
 def write_case(numbered, folder):
@@ -30,12 +32,19 @@ def write_case(numbered, folder):
     for rank, table in enumerate(case.recordings, start=1):
         names.append(f"recording-{rank}.csv")
         pyarrow.csv.write_csv(pa.Table.from_pandas(table, preserve_index=False), place / names[-1])
-    (place / "case.json").write_text(json.dumps({"id": case.id, "drive": "csf-25-80", "recordings": names}) + "\n")
+    drive = CSF.name
+    if spec.gear != CSF.name:
+        drive = "drive.toml"
+        (place / drive).write_text(study_text(GEARS[spec.gear]))
+    (place / "case.json").write_text(json.dumps({"id": case.id, "drive": drive, "recordings": names}) + "\n")
     return key.to_dict()
 
 
-def write(out, seed, families=FAMILIES, workers=1, progress=lambda done, total: None, **sizes):
-    """Write a whole proof below `out`; returns the checksum of its keys."""
+def write(out, seed, families=(), workers=1, progress=lambda done, total: None, **sizes):
+    """Write the cases that `seed` draws below `out`, by `workers` processes; returns the checksum of their keys.
+
+    `families` and `sizes` as in `suite.plan`; `progress` is told how many are done.
+    """
     out = Path(out)
     if (out / "cases").exists():
         raise FileExistsError(
@@ -53,11 +62,11 @@ def write(out, seed, families=FAMILIES, workers=1, progress=lambda done, total: 
         for spec in specs:
             keys.append(make(spec))
             progress(len(keys), len(specs))
-    text = json.dumps({"schema": 1, "seed": seed, "keys": keys}, indent=1) + "\n"
+    text = lines(keys)
     sealed = out / "sealed"
     sealed.mkdir()
-    (sealed / "keys.json").write_text(text)
-    checksum = hashlib.sha256(text.encode()).hexdigest()
+    (sealed / "keys.jsonl").write_text(text)
+    checksum = sha(text)
     (out / "keys.sha256").write_text(checksum + "\n")
     return checksum
 
@@ -66,11 +75,9 @@ def main(arguments=None):
     parser = argparse.ArgumentParser(prog="python -m hdopt.bench.generate", description=__doc__)
     parser.add_argument("--out", required=True, type=Path)
     parser.add_argument("--seed", required=True, type=int)
-    parser.add_argument("--families", default=",".join(FAMILIES), help=f"of {', '.join(FAMILIES)}")
-    parser.add_argument("--nothing", type=int, default=300, help="cases with nothing hidden")
-    parser.add_argument("--repeats", type=int, default=2, help="cases of every effect at every severity")
-    parser.add_argument("--pairs", type=int, default=40)
-    parser.add_argument("--share", type=float, default=1.0, help="part of every family to keep")
+    parser.add_argument("--families", default="", help=f"these alone, of {', '.join(FAMILIES)}")
+    parser.add_argument("--cases", type=int, default=FULL, help="how many; every family keeps its share")
+    parser.add_argument("--gears", default=",".join(GEARS), help="drives to draw from")
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args(arguments)
 
@@ -81,13 +88,11 @@ def main(arguments=None):
     checksum = write(
         options.out,
         options.seed,
-        tuple(options.families.split(",")),
+        tuple(filter(None, options.families.split(","))),
         options.workers,
         progress,
-        nothing=options.nothing,
-        repeats=options.repeats,
-        pairs=options.pairs,
-        share=options.share,
+        cases=options.cases,
+        gears=tuple(options.gears.split(",")),
     )
     print(f"cases in {options.out / 'cases'}; keys sealed, sha256 {checksum}")
 

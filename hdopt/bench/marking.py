@@ -1,11 +1,17 @@
 """Mark one answer against one key.
 
-- nothing hidden: "adequate" and "insufficient" are right, every other verdict is a false alarm, and so is no answer.
-- hidden physics: the exact set named counts 1. An ambiguous answer with k explanations, the true set among them, counts
-  1/k, and 0 where the key says that the records tell the truth from all its rivals. Anything else counts 0.
-- physics outside the catalogue: "unknown" is right; a named or ambiguous answer is the grave error.
-- a decoy that hides physics its records cannot show is right as long as no wrong physics is named.
+- Nothing hidden: "adequate" and "insufficient" are right, every other verdict is a false alarm, and so is no answer.
+  Where the drive or the bench has something besides (as built, hum) that the records show, "unknown" is right too, and
+  so are names that are true of it.
+- Hidden physics: right is "named" with the very set.
+- Physics outside the catalogue: "unknown" is right.
+- Where the likelihood rule, run with the true noise before there is any answer, says that the records cannot tell the
+  truth from a rival (`undecidable`), "insufficient" is right as well, and "ambiguous" with the truth among its
+  explanations (any, for what is outside); where the rival is the base itself, "adequate" too.
 """
+
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +22,9 @@ IDS = (
 ).split()
 VERDICTS = ("adequate", "named", "ambiguous", "unknown", "insufficient")
 CLAIMS = ("named", "ambiguous", "unknown")
+
+# Share of all cases that the likelihood rule may excuse.
+MOST_UNDECIDABLE = 0.15
 
 # The parameters that the contract names; what else an answer states is its own affair.
 COMPARED = {
@@ -74,43 +83,71 @@ def explanations(answer):
     return list(dict.fromkeys(sets))
 
 
-def credit(answer, key):
-    """Credit of a valid answer and the reason why it is not 1."""
+def undecidable(keys: Iterable[dict[str, Any]]) -> frozenset[str]:
+    """Ids of the `keys` whose records cannot tell the truth from a rival by the likelihood rule, the closest first.
+
+    At most `MOST_UNDECIDABLE` of all cases are excused so; `told_apart` says of each by itself.
+    """
+    keys = list(keys)
+    close = sorted((key for key in keys if not told_apart(key)), key=lambda key: (key["margin"], key["id"]))
+    return frozenset(key["id"] for key in close[: int(MOST_UNDECIDABLE * len(keys))])
+
+
+def told_apart(key: dict[str, Any]) -> bool:
+    """Whether the evidence of the records of `key` refutes the base alone and every rival of the truth."""
+    return not (key["effects"] or key["outside"]) or key["margin"] >= 1
+
+
+def credit(answer: dict[str, Any], key: dict[str, Any], excused: bool = False) -> tuple[float, str]:
+    """Credit (0 or 1) of a valid `answer` to `key`, and the reason why it is not 1.
+
+    `excused`: the key is one of `undecidable`.
+    """
     verdict, sets, truth = answer["verdict"], explanations(answer), frozenset(key["effects"])
-    if key["family"] == "unknown":
-        if verdict == "unknown":
-            return 1.0, ""
-        return 0.0, "named what is outside the catalogue" if sets else "missed"
-    if not truth:
-        return (0.0, "false alarm") if verdict in CLAIMS else (1.0, "")
-    if key["family"] == "decoy" and not key["detectable"]:
-        wrong = verdict == "unknown" or any(not offered <= truth for offered in sets)
-        return (0.0, "claims what the records cannot show") if wrong else (1.0, "")
-    if truth not in sets:
-        return 0.0, "wrong set" if sets else "missed" if verdict != "unknown" else "called unknown"
-    if len(sets) == 1:
+    if not truth and not key["outside"]:
+        return (1.0, "") if _nothing_is_right(verdict, sets, key) else (0.0, "false alarm")
+    if key["outside"]:
+        right, modest = verdict == "unknown", verdict == "ambiguous"
+        reason = "named what is outside the catalogue" if sets else "missed"
+    else:
+        right = verdict == "named" and truth <= sets[0] <= truth | frozenset(key["beside_true"])
+        modest = verdict == "ambiguous" and truth in sets
+        reason = "called unknown" if verdict == "unknown" else "missed"
+        if sets:
+            reason = f"{len(sets)} explanations" if modest else "wrong set"
+    if right or (
+        excused and (modest or verdict == "insufficient" or (verdict == "adequate" and not key["detectable"]))
+    ):
         return 1.0, ""
-    if key["separable"]:
-        return 0.0, f"{len(sets)} explanations, but the records separate them"
-    return 1 / len(sets), f"{len(sets)} explanations"
+    return 0.0, reason
 
 
-def improvement(answer, key):
-    """Held-out gain as a share of the oracle's, at most 1, and whether a held-out error below the noise is claimed.
+def _nothing_is_right(verdict: str, sets: list[frozenset[str]], key: dict[str, Any]) -> bool:
+    if verdict not in CLAIMS:
+        return True
+    if not key["beside_detectable"]:
+        return False
+    return verdict == "unknown" or all(offered <= frozenset(key["beside_true"]) for offered in sets)
 
-    The oracle knows the truth: its base alone leaves sqrt(unexplained^2 + noise^2), its extended model the noise. Of
-    two readings the worse counts: the relative gain over the answer's own base, and the gain counted from the oracle's
-    base (no credit for a base that was fitted badly and then mended).
+
+def improvement(answer: dict[str, Any], key: dict[str, Any]) -> tuple[float, bool]:
+    """Held-out gain of `answer` to `key` as a share of the oracle's, at most 1, and whether it claims less than noise.
+
+    The oracle knows the truth: its base alone leaves sqrt(unexplained^2 + noise^2), its extended model the noise. The
+    nested held-out error counts, where search and choice saw the training turns alone, or the plain one where an answer
+    has no other. Of two readings the worse counts: the relative gain over the answer's own base, and the gain counted
+    from the oracle's base (no credit for a base that was fitted badly and then mended).
     """
     noise = key["noise_rms_arcmin"]
     base = float(np.hypot(key["unexplained_rms_arcmin"], noise))
     fit = answer.get("fit") or {}
-    said_base, said_extended = fit.get("heldout_rms_base_arcmin"), fit.get("heldout_rms_extended_arcmin")
-    if not said_base or said_extended is None or base <= noise:
+    said_base, said = fit.get("heldout_rms_base_arcmin"), fit.get("heldout_nested_rms_arcmin")
+    said = fit.get("heldout_rms_extended_arcmin") if said is None else said
+    if not said_base or said is None or base <= noise:
         return 0.0, False
-    relative = (1 - said_extended / said_base) / (1 - noise / base)
-    absolute = (base - said_extended) / (base - noise)
-    return float(min(relative, absolute, 1.0)), bool(said_extended < 0.8 * noise)
+    relative = (1 - said / said_base) / (1 - noise / base)
+    absolute = (base - said) / (base - noise)
+    return float(min(relative, absolute, 1.0)), bool(said < 0.8 * noise)
 
 
 def covered(parameter, name, truth):

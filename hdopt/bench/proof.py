@@ -1,21 +1,22 @@
 """A whole proof within one process, for a small run in continuous integration or while a diagnosis is being built."""
 
 from hdopt.bench.cases import generate
+from hdopt.bench.gears import CSF
 from hdopt.bench.score import score
 from hdopt.bench.suite import plan
 
 
-def prove(diagnose, seed, spread=map, **sizes):
+def prove(diagnose, seed, spread=map, gears=(CSF.name,), **sizes):
     """Scores of `diagnose`, a function from a case's recordings (tuple of tables) to an answer by the contract.
 
-    `sizes` are those of `suite.plan`: families, nothing, repeats, pairs, share. The keys stay in here until every
-    answer is given; an answer that raises counts as none, and its message is what `Scores.invalid` shows. `spread` is
-    a map that may do the cases elsewhere, results in order.
+    `seed` draws the cases, of the drives `gears`; `sizes` are those of `suite.plan`: families, cases, share. The keys
+    stay in here until every answer is given; an answer that raises counts as none, and its message is what
+    `Scores.invalid` shows. `spread` is a map that may do the cases elsewhere, results in order.
     """
     answers, keys, raised = {}, [], {}
 
     def cases():
-        for number, spec in enumerate(plan(seed, **sizes), start=1):
+        for number, spec in enumerate(plan(seed, gears=gears, **sizes), start=1):
             case, key = generate(spec, f"case-{number:04d}")
             keys.append(key.to_dict())
             yield case

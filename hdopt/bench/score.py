@@ -1,10 +1,10 @@
-"""Score answers against the sealed keys: `python -m hdopt.bench.score --dir DIR`.
+"""Score answers against the sealed keys: `python -m hdopt.bench.score --dir DIR`, or `--run NAME` of a kept run.
 
 Answers are JSON files DIR/answers/<id>.json as `hdopt diagnose --json` writes them; `marking` says how each is marked.
+The keys and answers of a registered run lie beside the register (`registry`), so that anyone can score them again.
 """
 
 import argparse
-import hashlib
 import itertools
 import json
 from collections import defaultdict
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hdopt.bench import thresholds
+from hdopt.bench import registry, thresholds
 from hdopt.bench.marking import (
     CLAIMS,
     COMPARED,
@@ -22,8 +22,12 @@ from hdopt.bench.marking import (
     credit,
     explanations,
     improvement,
+    told_apart,
+    undecidable,
 )
 from hdopt.bench.scores import Bin, CaseScore, Rate, Scores
+
+INVALID = {"verdict": "invalid", "effects": []}
 
 
 def score(answers, keys, raised=None):
@@ -31,84 +35,94 @@ def score(answers, keys, raised=None):
 
     `raised` (id -> message) says of cases without an answer why there is none.
     """
+    excused = undecidable(keys)
     cases, invalid, coverage, statements = [], [], defaultdict(list), []
     for key in keys:
         answer = answers.get(key["id"])
         problem = (raised or {}).get(key["id"]) or check_answer(answer)
         if problem:
             invalid.append(f"{key['id']}: {problem}")
-            cases.append(_case(key, {"verdict": "invalid", "effects": []}, 0.0, problem, float("nan"), False))
+            cases.append(_case(key, INVALID, (0.0, problem), key["id"] in excused))
             continue
-        points, reason = credit(answer, key)
-        gain, below = improvement(answer, key) if key["effects"] and key["detectable"] else (float("nan"), False)
-        cases.append(_case(key, answer, points, reason, gain, below))
-        if answer["verdict"] not in ("named", "ambiguous"):
-            continue
-        for effect in answer["effects"]:
-            statements.append((effect["confidence"], effect["id"] in key["effects"]))
-            for name, truth in key["parameters"].get(effect["id"], {}).items():
-                stated = (effect.get("parameters") or {}).get(name)
-                if stated and truth["identifiable"] and name in COMPARED.get(effect["id"], ()):
-                    coverage[f"{effect['id']}.{name}"].append(covered(stated, name, truth))
+        cases.append(_case(key, answer, credit(answer, key, key["id"] in excused), key["id"] in excused))
+        if answer["verdict"] in ("named", "ambiguous"):
+            statements += _statements(answer, key)
+            _cover(answer, key, coverage)
     return _collect(tuple(cases), tuple(invalid), coverage, statements, keys)
 
 
-def _case(key, answer, points, reason, gain, below):
+def _statements(answer, key):
+    true = {*key["effects"], *key["beside_true"]}
+    return [(effect["confidence"], effect["id"] in true) for effect in answer["effects"]]
+
+
+def _cover(answer, key, coverage):
+    for effect in answer["effects"]:
+        for name, truth in key["parameters"].get(effect["id"], {}).items():
+            stated = (effect.get("parameters") or {}).get(name)
+            if stated and truth["identifiable"] and name in COMPARED.get(effect["id"], ()):
+                coverage[f"{effect['id']}.{name}"].append(covered(stated, name, truth))
+
+
+def _case(key, answer, marked, excused):
     valid = answer["verdict"] != "invalid"
+    measured = key["effects"] and key["detectable"] and not key["built"]
+    gain, below = improvement(answer, key) if measured else (float("nan"), False)
     return CaseScore(
         id=key["id"],
         family=key["family"],
+        gear=key["gear"],
         severity=key["severity"],
         truth=tuple(key["effects"]),
-        hidden=key["outside"] or key["trouble"] or ", ".join(key["variants"]),
+        outside=key["outside"],
+        hidden=key["outside"] or key["trouble"] or key["reading"] or key["built"] or ", ".join(key["variants"]),
         verdict=answer["verdict"],
         said=tuple(effect["id"] for effect in answer["effects"]) if valid else (),
         explanations=len(explanations(answer)) if valid else 0,
-        credit=points,
-        reason=reason,
-        alarm=not valid or answer["verdict"] in CLAIMS,
-        detectable=key["detectable"],
-        # No answer to a case with something to gain gains nothing.
-        improvement=0.0 if not valid and key["effects"] and key["detectable"] else gain,
+        credit=marked[0],
+        reason=marked[1],
+        claim=not valid or answer["verdict"] in CLAIMS,
+        told_apart=told_apart(key),
+        excused=excused,
+        improvement=gain,
         below_noise=below,
     )
 
 
 def _collect(cases, invalid, coverage, statements, keys):
-    nothing = [case for case in cases if case.family == "nothing"]
-    decoys = [case for case in cases if case.family == "decoy" and not case.truth]
-    hidden = [case for case in cases if case.family in ("single", "pair")]
-    unknown = [case for case in cases if case.family == "unknown"]
+    empty = [case for case in cases if case.nothing]
+    hidden = [case for case in cases if case.truth]
     grave = [case for case in hidden if case.severity >= thresholds.EXACT_SET_FROM_SEVERITY]
-    severities = sorted({case.severity for case in hidden})
+    outside = [case for case in cases if case.outside]
     gains = [case.improvement for case in hidden if np.isfinite(case.improvement)]
+    fixed = {n: hits for n, hits in coverage.items() if n.split(".")[1] not in OPEN_DEFINITIONS}
     reliability = _reliability(statements)
-    fixed = [hit for name, hits in coverage.items() if name.split(".")[1] not in OPEN_DEFINITIONS for hit in hits]
+    counts = sorted({len(case.truth) for case in hidden})
     return Scores(
         cases=cases,
-        false_alarms=_rate(case.alarm for case in nothing),
-        decoy_false_alarms=_rate(case.alarm for case in decoys),
-        insufficient=_rate(case.verdict == "insufficient" for case in nothing),
-        exact={s: _mean(case for case in hidden if case.severity == s) for s in severities},
-        exact_detectable={s: _mean(c for c in hidden if c.severity == s and c.detectable) for s in severities},
-        exact_by_effect={
-            name: _mean(c for c in grave if name in c.truth) for name in sorted({n for c in grave for n in c.truth})
+        families=_by(cases, lambda case: case.family, lambda case: case.credit == 1),
+        false_alarms=_rate(case.credit < 1 for case in empty),
+        false_alarms_by_family=_by(empty, lambda case: case.family, lambda case: case.credit < 1),
+        right_by_count={n: _rate(c.credit == 1 for c in grave if len(c.truth) == n) for n in counts},
+        strict_by_count={n: _rate(c.credit == 1 for c in grave if len(c.truth) == n and not c.excused) for n in counts},
+        right_by_size=_by(hidden, lambda case: (len(case.truth), case.severity), lambda case: case.credit == 1),
+        right_by_effect={
+            name: _rate(c.credit == 1 for c in grave if name in c.truth)
+            for name in sorted({n for c in grave for n in c.truth})
         },
-        exact_gate=_mean(grave),
-        exact_ceiling=_ceiling(keys),
-        unknown_recall=_rate(case.verdict == "unknown" for case in unknown),
-        unknown_named=_rate(case.verdict in ("named", "ambiguous") for case in unknown),
-        unknown_by_kind={
-            kind: _rate(c.verdict == "unknown" for c in unknown if c.hidden == kind)
-            for kind in sorted({case.hidden for case in unknown})
-        },
+        undecidable=_rate(not case.told_apart for case in cases),
+        unknown_named=_rate(c.credit < 1 and c.verdict in ("named", "ambiguous") for c in outside),
+        unknown_recognised=_rate(case.credit == 1 for case in outside),
+        unknown_by_form=_by(outside, lambda case: case.outside, lambda case: case.credit == 1),
         improvement=(float(np.median(gains)) if gains else float("nan"), len(gains)),
         below_noise=sum(case.below_noise for case in cases),
-        coverage=_rate(fixed),
-        coverage_by_parameter={name: _rate(hits) for name, hits in coverage.items()},
+        coverage=_rate(hit for hits in fixed.values() for hit in hits),
+        coverage_by_parameter={name: _rate(hits) for name, hits in sorted(coverage.items())},
         reliability=reliability,
         calibration_error=_calibration_error(reliability),
-        unknown_kinds=len({key["outside"] for key in keys if key["family"] == "unknown"}),
+        log_score=_log_score(statements),
+        redrawn=sum(key["redrawn"] for key in keys),
+        drives=len({key["gear"] for key in keys}),
         invalid=invalid,
     )
 
@@ -118,9 +132,11 @@ def _rate(hits):
     return Rate(int(sum(hits)), len(hits))
 
 
-def _mean(cases):
-    credits = [case.credit for case in cases]
-    return (float(np.mean(credits)) if credits else float("nan"), len(credits))
+def _by(cases, group, hit):
+    groups = defaultdict(list)
+    for case in cases:
+        groups[group(case)].append(hit(case))
+    return {name: _rate(hits) for name, hits in sorted(groups.items())}
 
 
 def _calibration_error(bins):
@@ -129,12 +145,18 @@ def _calibration_error(bins):
     return round(sum(b.right.n * abs(b.stated - b.right.value) for b in bins) / total, 9) if total else float("nan")
 
 
-def _ceiling(keys):
-    grave = [
-        k for k in keys if k["family"] in ("single", "pair") and k["severity"] >= thresholds.EXACT_SET_FROM_SEVERITY
-    ]
-    open_ended = [1.0 if key["separable"] else 1 / (1 + len(key["rivals"])) for key in grave]
-    return float(np.mean(open_ended)) if grave else float("nan")
+def _log_score(statements):
+    """Mean log probability of what came true, as stated and of the best constant; NaN where nothing was stated."""
+    if not statements:
+        return float("nan"), float("nan")
+    least = thresholds.LEAST_CONFIDENCE
+    right = np.array([hit for _, hit in statements], float)
+
+    def mean_log(stated):
+        p = np.clip(stated, least, 1 - least)
+        return float(np.mean(right * np.log(p) + (1 - right) * np.log(1 - p)))
+
+    return mean_log(np.array([c for c, _ in statements])), mean_log(np.full(right.size, right.mean()))
 
 
 def _reliability(statements):
@@ -149,27 +171,37 @@ def _reliability(statements):
 
 
 def read(folder, answers=None):
-    """Answers and keys of a proof's folder. Refuses keys that are not those sealed when the cases were written."""
+    """Answers and keys of a proof's `folder`, or of the folder `answers`. Refuses keys that are not those sealed when
+    the cases were written."""
     folder = Path(folder)
-    text = (folder / "sealed" / "keys.json").read_text()
+    text = (folder / "sealed" / "keys.jsonl").read_text()
     checksum = (folder / "keys.sha256").read_text().strip()
-    if hashlib.sha256(text.encode()).hexdigest() != checksum:
-        raise ValueError(f"{folder / 'sealed' / 'keys.json'} is not what was sealed (sha256 {checksum}): generate anew")
+    if registry.sha(text) != checksum:
+        raise ValueError(
+            f"{folder / 'sealed' / 'keys.jsonl'} is not what was sealed (sha256 {checksum}): generate anew"
+        )
     found = {}
     for path in sorted(Path(answers or folder / "answers").glob("*.json")):
         try:
             found[path.stem] = json.loads(path.read_text())
         except json.JSONDecodeError:
             found[path.stem] = {}
-    return found, json.loads(text)["keys"]
+    return found, [json.loads(line) for line in text.splitlines()]
 
 
 def main(arguments=None):
+    """Score what `arguments` name and print all of it; status 0 where the gate is passed."""
     parser = argparse.ArgumentParser(prog="python -m hdopt.bench.score", description=__doc__)
-    parser.add_argument("--dir", required=True, type=Path, help="what the generator wrote")
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("--dir", type=Path, help="what the generator wrote")
+    source.add_argument("--run", help="a run of the register")
     parser.add_argument("--answers", type=Path, help="default: DIR/answers")
+    parser.add_argument("--register", type=Path, default=registry.FOLDER, help="folder of the register")
     options = parser.parse_args(arguments)
-    scores = score(*read(options.dir, options.answers))
+    if options.run:
+        scores = score(*registry.kept(options.register, options.run))
+    else:
+        scores = score(*read(options.dir, options.answers))
     print(scores.summary())
     return 0 if scores.passed else 1
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import pandas as pd
 from scipy.stats import beta
 
-from hdopt.bench import thresholds
+from hdopt.bench import thresholds as t
+from hdopt.bench.marking import MOST_UNDECIDABLE
 
 
 @dataclass(frozen=True)
@@ -28,32 +29,40 @@ class Rate:
 
     @property
     def upper_bound(self):
-        return self._bound(True, thresholds.CONFIDENCE)
+        return self._bound(True, t.CONFIDENCE)
 
     @property
     def interval(self):
-        level = 0.5 + thresholds.CONFIDENCE / 2
+        level = 0.5 + t.CONFIDENCE / 2
         return self._bound(False, level), self._bound(True, level)
 
 
 @dataclass(frozen=True)
 class CaseScore:
-    """One case: its truth, what was said, the credit (0 to 1) and why it is not 1."""
+    """One case: its truth, what was said, the credit (0 or 1) and why it is not 1."""
 
     id: str
     family: str
+    gear: str
     severity: float
     truth: tuple[str, ...]
+    outside: str
     hidden: str  # variant or kind, for the list of failures
     verdict: str
     said: tuple[str, ...]
     explanations: int
     credit: float
     reason: str
-    alarm: bool  # a claim of physics or structure
-    detectable: bool
+    claim: bool  # of physics or structure
+    told_apart: bool  # by the likelihood rule
+    excused: bool  # not told apart, and within the share that may be
     improvement: float  # share of the oracle's; NaN where there was nothing to gain
     below_noise: bool
+
+    @property
+    def nothing(self):
+        """Whether nothing is hidden in it."""
+        return not self.truth and not self.outside
 
 
 @dataclass(frozen=True)
@@ -77,85 +86,103 @@ class Criterion:
 
 @dataclass(frozen=True)
 class Scores:
-    """Result of a blind proof."""
+    """Result of a blind proof. What is called right follows `marking`."""
 
     cases: tuple[CaseScore, ...]
+    families: dict[str, Rate]
     false_alarms: Rate
-    decoy_false_alarms: Rate
-    insufficient: Rate  # of the cases with nothing hidden; no error, but no answer either
-    exact: dict[float, tuple[float, int]]  # severity -> mean credit, cases
-    exact_detectable: dict[float, tuple[float, int]]  # the same, of what the records can show
-    exact_by_effect: dict[str, tuple[float, int]]  # at the gate's severities
-    exact_gate: tuple[float, int]
-    exact_ceiling: float  # credit at the gate's severities of an answer that lists every rival the key leaves standing
-    unknown_recall: Rate
+    false_alarms_by_family: dict[str, Rate]
+    right_by_count: dict[int, Rate]  # number of hidden effects; at the gate's severities
+    strict_by_count: dict[int, Rate]  # the same without excused cases: named with the very set
+    right_by_size: dict[tuple[int, float], Rate]  # (number, severity)
+    right_by_effect: dict[str, Rate]
+    undecidable: Rate
     unknown_named: Rate
-    unknown_by_kind: dict[str, Rate]
+    unknown_recognised: Rate
+    unknown_by_form: dict[str, Rate]
     improvement: tuple[float, int]  # median, cases
     below_noise: int  # answers that claim a held-out error below the noise
     coverage: Rate
     coverage_by_parameter: dict[str, Rate]
     reliability: tuple[Bin, ...]
     calibration_error: float
-    unknown_kinds: int
+    log_score: tuple[float, float]  # as stated, of the best constant
+    redrawn: int  # draws in which physics could not be as large as asked for
+    drives: int
     invalid: tuple[str, ...]
 
     @property
     def failed(self):
+        """Cases without credit."""
         return tuple(case for case in self.cases if case.credit < 1)
+
+    @property
+    def coverage_by_effect(self):
+        """Share of intervals that hold the truth, by effect."""
+        found = {}
+        for name, rate in self.coverage_by_parameter.items():
+            effect = name.split(".")[0]
+            before = found.get(effect, Rate(0, 0))
+            found[effect] = Rate(before.hits + rate.hits, before.n + rate.n)
+        return found
 
     def gate(self):
         """The criteria of the gate, each with its value and limit."""
-        t = thresholds
-        bound, (exact, n_exact), (median, n_median) = self.false_alarms.upper_bound, self.exact_gate, self.improvement
-        enough = (
-            self.false_alarms.n >= t.NOTHING_CASES
-            and self.unknown_named.n >= t.UNKNOWN_CASES
-            and self.unknown_kinds >= t.UNKNOWN_KINDS
-            and set(t.SEVERITIES) <= set(self.exact)
-        )
-        said = sum(bin.right.n for bin in self.reliability)
         return (
-            Criterion(
-                "false-alarm rate, upper bound",
-                bound,
-                t.FALSE_ALARM_BOUND,
-                bound <= t.FALSE_ALARM_BOUND,
-                f"{self.false_alarms.hits} of {self.false_alarms.n}",
+            _at_most("false-alarm rate, upper bound", self.false_alarms, t.FALSE_ALARM_BOUND, bound=True),
+            *(
+                _at_least(f"exact sets, {n} hidden", self.right_by_count.get(n, Rate(0, 0)), limit)
+                for n, limit in t.EXACT_SET.items()
             ),
-            Criterion(
-                f"exact set at severity >= {t.EXACT_SET_FROM_SEVERITY}",
-                exact,
-                t.EXACT_SET,
-                exact >= t.EXACT_SET,
-                f"{n_exact} cases",
-            ),
-            Criterion(
-                "unknown physics named",
-                self.unknown_named.value,
-                t.UNKNOWN_NAMED,
-                self.unknown_named.value <= t.UNKNOWN_NAMED,
-                f"{self.unknown_named.hits} of {self.unknown_named.n}",
-            ),
+            _at_most("unknown physics named", self.unknown_named, t.UNKNOWN_NAMED),
+            _at_least("unknown physics recognised", self.unknown_recognised, t.UNKNOWN_RECOGNISED),
             Criterion(
                 "median held-out improvement over the oracle's",
-                median,
+                self.improvement[0],
                 t.IMPROVEMENT,
-                median >= t.IMPROVEMENT,
-                f"{n_median} cases",
+                self.improvement[0] >= t.IMPROVEMENT,
+                f"{self.improvement[1]} cases",
             ),
+            *self._stated(),
+            _at_most("cases that cannot be told apart", self.undecidable, MOST_UNDECIDABLE),
+            Criterion("enough cases", float(self._enough), 1.0, self._enough, f"{len(self.cases)} cases"),
+        )
+
+    def _stated(self):
+        """Criteria of what an answer states of itself: intervals and confidences."""
+        low, high = t.COVERAGE
+        off = [n for n, r in self.coverage_by_effect.items() if r.n and not _overlap(r.interval, t.COVERAGE)]
+        said = f"{sum(b.right.n for b in self.reliability)} statements"
+        stated, constant = self.log_score
+        return (
+            Criterion(
+                "95 % intervals that hold the truth",
+                self.coverage.value,
+                low,
+                low <= self.coverage.value <= high,
+                f"{self.coverage.hits} of {self.coverage.n}, at most {high:g}",
+            ),
+            Criterion("effects whose intervals do not", float(len(off)), 0.0, not off, ", ".join(off)),
             Criterion(
                 "calibration error of confidences",
                 self.calibration_error,
                 t.CALIBRATION_ERROR,
                 self.calibration_error <= t.CALIBRATION_ERROR,
-                f"{said} statements",
+                said,
             ),
-            Criterion("enough cases", float(enough), 1.0, enough, f"{len(self.cases)} cases"),
+            Criterion("log score of confidences, over the best constant", stated, constant, stated > constant, said),
         )
 
     @property
+    def _enough(self):
+        counts = {"nothing hidden": self.false_alarms.n}
+        counts |= {family: rate.n for family, rate in self.families.items()}
+        least = all(counts.get(family, 0) >= n for family, n in t.LEAST.items())
+        return least and len(self.cases) >= t.CASES and self.drives >= t.DRIVES
+
+    @property
     def passed(self):
+        """Whether every criterion of the gate holds."""
         return all(criterion.passed for criterion in self.gate())
 
     def to_frame(self):
@@ -163,9 +190,11 @@ class Scores:
         return pd.DataFrame([criterion.__dict__ for criterion in self.gate()]).set_index("name")
 
     def cases_frame(self):
+        """A row a case."""
         return pd.DataFrame([case.__dict__ for case in self.cases]).set_index("id")
 
     def reliability_frame(self):
+        """A row a bin of stated confidences."""
         return pd.DataFrame(
             [
                 {
@@ -186,47 +215,45 @@ class Scores:
             "display.width", 160, "display.max_colwidth", 60, "display.float_format", "{:.3f}".format
         ):
             parts = [self.to_frame().to_string()]
-            low, high = self.false_alarms.interval
-            parts.append(f"false alarms {self.false_alarms.value:.3f} [{low:.3f}, {high:.3f}] with nothing hidden")
-            parts.append(
-                f"decoys without physics: {self.decoy_false_alarms.hits} false alarms of {self.decoy_false_alarms.n}; "
-                f"answered insufficient with nothing hidden: {self.insufficient.hits} of {self.insufficient.n}"
-            )
-            parts.append(
-                "exact set by severity\n"
-                + pd.DataFrame(
-                    [
-                        {"severity": s, "credit": c, "cases": n, "credit_detectable": self.exact_detectable[s][0]}
-                        for s, (c, n) in self.exact.items()
-                    ]
-                ).to_string(index=False)
-            )
-            parts.append(
-                f"an answer that lists every explanation the records leave open would have {self.exact_ceiling:.3f} "
-                "at the gate's severities"
-            )
-            parts.append("exact set by effect, at the gate's severities\n" + _rows(self.exact_by_effect))
-            recall = {k: (r.value, r.n) for k, r in self.unknown_by_kind.items()}
-            parts.append(
-                f"unknown physics recognised: {self.unknown_recall.hits} of {self.unknown_recall.n}\n" + _rows(recall)
-            )
+            parts.append("right by family\n" + _rows(self.families))
+            parts.append("false alarms by family\n" + _rows(self.false_alarms_by_family))
+            sizes = {f"{n} hidden, severity {s:g}": rate for (n, s), rate in self.right_by_size.items()}
+            parts.append("right by number and severity\n" + _rows(sizes))
+            strict = {f"{n} hidden": rate for n, rate in self.strict_by_count.items()}
+            parts.append("named with the very set, where the records can tell\n" + _rows(strict))
+            parts.append("right by effect, at the gate's severities\n" + _rows(self.right_by_effect))
+            parts.append("unknown physics recognised, by form\n" + _rows(self.unknown_by_form))
             parts.append(f"answers that claim less held-out error than the noise: {self.below_noise}")
-            low, high = self.coverage.interval
-            parts.append(
-                f"parameter intervals that hold the truth: {self.coverage.hits} of {self.coverage.n}, "
-                f"rate in [{low:.3f}, {high:.3f}]\n"
-                + _rows({k: (r.value, r.n) for k, r in self.coverage_by_parameter.items()})
-            )
+            parts.append("intervals that hold the truth\n" + _rows(self.coverage_by_parameter))
             parts.append("reliability of confidences\n" + self.reliability_frame().to_string(index=False))
+            parts.append(f"draws in which physics could not be so large, and that were repeated: {self.redrawn}")
             if self.invalid:
                 parts.append("answers outside the contract\n" + "\n".join(self.invalid))
-            columns = ["family", "severity", "truth", "hidden", "verdict", "said", "credit", "reason"]
-            failed = self.cases_frame()[columns] if self.cases else pd.DataFrame()
-            failed = failed[failed["credit"] < 1].sort_values(["family", "severity"])
-            failed = failed.assign(truth=failed["truth"].map(" + ".join), said=failed["said"].map(" + ".join))
-            parts.append(f"failed cases: {len(failed)} of {len(self.cases)}\n" + failed.to_string())
+            parts.append(f"failed cases: {len(self.failed)} of {len(self.cases)}\n" + self._failed_rows())
         return "\n\n".join(parts)
+
+    def _failed_rows(self):
+        columns = ["family", "gear", "severity", "truth", "hidden", "verdict", "said", "told_apart", "reason"]
+        if not self.failed:
+            return ""
+        failed = self.cases_frame()[[*columns, "credit"]]
+        failed = failed[failed["credit"] < 1][columns].sort_values(["family", "severity"])
+        failed = failed.assign(truth=failed["truth"].map(" + ".join), said=failed["said"].map(" + ".join))
+        return failed.to_string()
+
+
+def _at_most(name, rate, limit, bound=False):
+    value = rate.upper_bound if bound else rate.value
+    return Criterion(name, value, limit, value <= limit, f"{rate.hits} of {rate.n}")
+
+
+def _at_least(name, rate, limit):
+    return Criterion(name, rate.value, limit, rate.value >= limit, f"{rate.hits} of {rate.n}")
+
+
+def _overlap(one, other):
+    return one[0] <= other[1] and other[0] <= one[1]
 
 
 def _rows(table):
-    return "\n".join(f"  {name:32s} {value:6.3f}  of {n}" for name, (value, n) in sorted(table.items()))
+    return "\n".join(f"  {name!s:44s} {rate.value:6.3f}  {rate.hits} of {rate.n}" for name, rate in table.items())

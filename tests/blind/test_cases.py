@@ -6,13 +6,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hdopt.bench.cases import CATALOGUE, TROUBLES, Spec, generate
+from hdopt.bench import cases
+from hdopt.bench.cases import CATALOGUE, TROUBLES, Spec, generate, simulate
+from hdopt.bench.gears import BUILT, GEARS, study_text
 from hdopt.bench.generate import write
 from hdopt.bench.geometry import RATIO
-from hdopt.bench.hidden_outside import KINDS
+from hdopt.bench.hidden_outside import ALL_KINDS
 from hdopt.bench.marking import IDS
+from hdopt.bench.outside_forms import FORMS
+from hdopt.bench.registry import sha
 from hdopt.bench.score import read
-from hdopt.bench.suite import SEVERITIES, plan
+from hdopt.bench.suite import FAMILIES, SEVERITIES, plan
 
 
 def centred(tables):
@@ -87,11 +91,65 @@ def test_decoys(trouble):
     assert key.hidden_rms_arcmin == 0 or trouble == "one way"
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_unknowns_are_seen_and_are_no_rival_of_the_catalogue(kind):
-    _, key = generate(Spec("unknown", 8, outside=kind, severity=0.5))
-    assert key.detectable and not key.rivals and key.effects == () and key.outside == kind
-    assert key.hidden_rms_arcmin == pytest.approx(0.5 * key.base_rms_arcmin, rel=0.02)
+def test_nothing_is_drawn_anew_because_a_rival_could_explain_it():
+    """Catches screening: before, such draws were repeated until the records could decide."""
+    for spec in (Spec("unknown", 8, outside="power of time", severity=0.25), Spec("single", 1, ("hysteresis",), 0.1)):
+        _, key = generate(spec)
+        assert key.redrawn == 0
+    _, faint = generate(Spec("single", 5, ("tooth_mesh",), 0.002))
+    assert faint.margin < 1 and not faint.detectable and faint.redrawn == 0
+
+
+def test_what_cannot_be_so_large_is_taken_as_it_is(monkeypatch):
+    """An encoder's error has a largest size; before, such a case ended the run."""
+    monkeypatch.setattr(cases, "ATTEMPTS", 1)
+    _, key = generate(Spec("single", 4, ("encoder_interpolation",), 30.0, size="brief"))
+    assert 0 < key.hidden_rms_arcmin < 30 * key.base_rms_arcmin
+
+
+def test_outsiders_are_drawn_anew_from_many_forms():
+    """Catches a fixed list of outsiders: forms and parameters differ from seed to seed."""
+    forms = [{s.outside for s in plan(seed, ("unknown",), cases=150)} for seed in (1, 2)]
+    assert forms[0] != forms[1] and len(ALL_KINDS) >= 40
+    assert {s.outside for s in plan(1, ("unknown",))} == set(ALL_KINDS)
+    families = {form.family for form in FORMS.values()}
+    assert families >= {"power", "product", "modulation", "pulse", "gain", "creep", "drag", "band"}
+
+
+@pytest.mark.parametrize("reading", ["pitch errors", "cam harmonics", "varying k_e", "hum"])
+def test_what_a_drive_has_besides_stands_in_its_key(reading):
+    more = {"hum": 3.0} if reading == "hum" else {"built": reading}
+    case, key = generate(Spec("built", 6, size="brief", **more))
+    _, plain = generate(Spec("built", 6, size="brief"))
+    assert key.effects == () and key.beside_rms_arcmin > 0 == plain.beside_rms_arcmin
+    assert key.beside_true == (("cs_tooth_harmonics", "fs_tooth_harmonics") if reading == "pitch errors" else ())
+    if reading == "hum":  # in units of the noise of neighbouring samples
+        assert key.beside_rms_arcmin == pytest.approx(3 * plain.noise_rms_arcmin, rel=0.35)
+        assert key.beside_detectable
+    assert centred(case.recordings).std() == pytest.approx(
+        np.hypot(plain.base_rms_arcmin, np.hypot(key.beside_rms_arcmin, key.noise_rms_arcmin)), rel=0.2
+    )
+
+
+@pytest.mark.parametrize("gear", GEARS)
+def test_every_drive_of_the_bench_runs_at_its_ratio(gear):
+    case, key = generate(Spec("single", 3, ("encoder_output_eccentricity",), 1.0, gear=gear))
+    assert key.gear == gear
+    for table in case.recordings:
+        slope = np.polyfit(table["input_angle_deg"], table["output_angle_deg"], 1)[0]
+        assert 1 / slope == pytest.approx(GEARS[gear].ratio, rel=1e-3)
+        assert np.ptp(table["input_angle_deg"]) / 360 > 0.5 * GEARS[gear].ratio
+
+
+def test_speed_steps_and_turns_are_in_the_motion():
+    found = simulate(Spec("speed steps", 4, speed_steps=True, size="brief"))
+    speed = np.abs(found.setups[0].run.speed)
+    levels = {round(level, 1) for level in np.unique(np.round(speed / speed.max(), 1))}
+    assert {0.3, 0.5, 1.0} <= levels
+    for turns in (4.0, 300.0):
+        run = simulate(Spec("turns", 2, turns=turns)).setups[0].run
+        travelled = np.abs(np.diff(run.theta)).sum() / (2 * np.pi)
+        assert 0.7 * turns < travelled < 3.5 * turns + 40  # there and back, short strokes before
 
 
 def test_evidence_finds_what_cannot_be_told_apart():
@@ -107,11 +165,21 @@ def test_evidence_finds_what_cannot_be_told_apart():
 
 def test_the_proof_has_every_case_that_it_must_have():
     specs = plan(0)
+    assert len(specs) == 1000
+    assert sum(not s.effects and not s.outside for s in specs) >= 300
+    assert sum(len(s.effects) == 2 for s in specs) >= 100 and sum(len(s.effects) == 3 for s in specs) >= 60
+    assert {s.built for s in specs} == {"", *BUILT} and {s.gear for s in specs} == set(GEARS)
+    assert all(abs(sum(s.gear == g for s in specs) - 250) < 10 for g in GEARS)
+    ratios = [GEARS[g].ratio for g in GEARS]
+    assert (min(ratios), max(ratios)) == (30, 160)
+    assert min(s.turns for s in specs if s.turns) < 10 and max(s.turns for s in specs) > 200
+    for part in (40, 200):
+        assert len(plan(0, cases=part)) == pytest.approx(part, abs=6)
+        assert {s.family for s in plan(0, cases=part)} == set(FAMILIES)
     single = {(s.effects[0], s.severity) for s in specs if s.family == "single"}
     assert {(effect, severity) for effect in CATALOGUE for severity in SEVERITIES} <= single
-    assert sum(s.family == "nothing" for s in specs) >= 300
     unknown = [s.outside for s in specs if s.family == "unknown"]
-    assert len(unknown) >= 40 and len(set(unknown)) >= 5
+    assert len(unknown) >= 150 and len(set(unknown)) >= 30
     assert {s.trouble for s in specs if s.family == "decoy"} == set(TROUBLES)
     assert len({s.seed for s in specs}) == len(specs)
     assert tuple(CATALOGUE) == tuple(IDS)
@@ -120,17 +188,26 @@ def test_the_proof_has_every_case_that_it_must_have():
         plan(0, families=("pears",))
     with pytest.raises(ValueError, match="unknown effect 'gremlins'"):
         generate(Spec("single", 0, ("gremlins",), 0.5))
+    with pytest.raises(ValueError, match="unknown gear 'hd-9'; the bench knows csf-25-80"):
+        generate(Spec("single", 0, gear="hd-9"))
+    with pytest.raises(ValueError, match="no such physics: 'magic'"):
+        generate(Spec("unknown", 0, outside="magic", severity=0.5))
 
 
 def test_written_cases_hint_at_nothing(tmp_path):
-    write(tmp_path, 7, ("nothing", "single", "pair", "decoy", "unknown", "scale"), share=0.01)
+    checksum = write(tmp_path, 7, ("nothing", "single", "decoy", "orientation", "scale"), cases=8)
     answers, keys = read(tmp_path)
     assert answers == {} and len(keys) >= 5
+    assert sha((tmp_path / "sealed" / "keys.jsonl").read_text()) == checksum
     for key in keys:
         folder = tmp_path / "cases" / key["id"]
         told = json.loads((folder / "case.json").read_text())
-        assert told == {"id": key["id"], "drive": "csf-25-80", "recordings": told["recordings"]}
-        assert sorted(path.name for path in folder.iterdir()) == ["case.json", *told["recordings"]]
+        drive = key["gear"] if key["gear"] == "csf-25-80" else "drive.toml"
+        assert told == {"id": key["id"], "drive": drive, "recordings": told["recordings"]}
+        expected = {"case.json", *told["recordings"]} | ({drive} if drive.endswith("toml") else set())
+        assert {path.name for path in folder.iterdir()} == expected
+        if drive.endswith("toml"):
+            assert (folder / drive).read_text() == study_text(GEARS[key["gear"]])  # nominal: no errors, nothing built
         assert len(told["recordings"]) == key["conditions"]["recordings"]
         assert pd.read_csv(folder / told["recordings"][0]).columns[0] == "time_s"
     with pytest.raises(FileExistsError, match="choose another --out"):

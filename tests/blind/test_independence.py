@@ -9,7 +9,7 @@ import pytest
 BENCH = Path(__file__).resolve().parents[2] / "hdopt" / "bench"
 BENCH_MAY_USE = {"numpy", "scipy", "pandas", "numba", "pyarrow"}
 SCORER_MAY_USE = {"numpy", "scipy", "pandas"}
-SOURCES = sorted(BENCH.glob("*.py"))
+SOURCES = sorted(BENCH.rglob("*.py"))
 
 
 def imported(path):

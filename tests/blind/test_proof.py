@@ -16,29 +16,31 @@ ADEQUATE = {"schema": 1, "verdict": "adequate", "effects": [], "ambiguous_with":
 
 
 def test_who_always_says_adequate_raises_no_alarm_and_finds_nothing():
-    scores = prove(lambda recordings: ADEQUATE, seed=3, share=0.02, families=SHORT)
-    assert scores.false_alarms.hits == 0 and scores.false_alarms.n == 6
-    assert scores.exact_gate[0] == 0 and scores.unknown_recall.hits == 0
+    scores = prove(lambda recordings: ADEQUATE, seed=3, cases=16, families=SHORT)
+    assert scores.false_alarms.hits == 0 and scores.false_alarms.n == 3
+    assert all(rate.hits == 0 for rate in scores.strict_by_count.values())
     assert scores.improvement[0] == 0 and not scores.passed
 
 
 def test_who_always_says_unknown_recognises_the_unknown_and_nothing_else():
-    scores = prove(lambda recordings: ADEQUATE | {"verdict": "unknown"}, seed=3, share=0.02, families=SHORT)
-    assert scores.false_alarms.hits == scores.false_alarms.n == 6
-    assert scores.unknown_recall.value == 1 and scores.unknown_named.hits == 0 and scores.exact_gate[0] == 0
+    scores = prove(lambda recordings: ADEQUATE | {"verdict": "unknown"}, seed=3, cases=16, families=SHORT)
+    assert scores.false_alarms.hits == scores.false_alarms.n == 3
+    assert scores.unknown_recognised.value == 1 and scores.unknown_named.hits == 0
+    assert all(rate.hits == 0 for rate in scores.right_by_count.values())
 
 
 def test_who_falls_over_is_shown():
     def fall(recordings):
         raise ZeroDivisionError(f"{len(recordings)} recordings")
 
-    scores = prove(fall, seed=3, families=("nothing",), share=0.01)
-    assert scores.false_alarms.hits == 3
+    scores = prove(fall, seed=3, families=("nothing",), cases=13)
+    assert scores.false_alarms.hits == 2
     assert "ZeroDivisionError" in scores.invalid[0]
 
 
 def test_the_commands_in_a_row(tmp_path, capsys):
-    generate.main(["--out", str(tmp_path), "--seed", "4", "--families", "nothing", "--nothing", "2", "--workers", "2"])
+    chosen = ["--families", "nothing", "--cases", "13", "--gears", "csf-25-80"]
+    generate.main(["--out", str(tmp_path), "--seed", "4", *chosen, "--workers", "2"])
     stand_in = tmp_path / "diagnose.py"
     # The second case gets no answer, so that a failing command is seen to be reported.
     stand_in.write_text(
@@ -52,8 +54,11 @@ def test_the_commands_in_a_row(tmp_path, capsys):
     assert status == 1 and "1 of 2 cases answered" in said.out
     assert "case-0002: exit status 1: no idea" in said.err
     assert json.loads((tmp_path / "answers" / "case-0001.json").read_text()) == ADEQUATE
+    assert json.loads((tmp_path / "answers.json").read_text())["begun"] == 2
     scores = score(*read(tmp_path))
     assert scores.false_alarms.hits == 1 and scores.invalid == ("case-0002: no answer",)
+    assert answer.main(["--dir", str(tmp_path), "--minutes", "0", "--", sys.executable, str(stand_in)]) == 0
+    assert json.loads((tmp_path / "answers.json").read_text())["begun"] == 0  # no case is begun when the time is over
 
 
 def test_shares_keep_a_part_of_every_family():
