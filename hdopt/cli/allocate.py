@@ -3,44 +3,33 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import (
-    check_option,
-    drive_option,
-    emit,
-    engine_option,
-    json_option,
-    progress,
-    seed_option,
-    set_option,
-    status,
-    study_argument,
-)
+from hdopt.cli.common import StudyOptions, emit, progress, status, study_options, work_options
+
+if TYPE_CHECKING:
+    from hdopt.allocation.results import AllocateResult
 
 
 @click.command()
-@study_argument
-@drive_option
-@set_option
+@study_options
 @click.option("--rule", metavar="RULE", help="worst_case, rss or yield; the study's own if omitted.")
 @click.option("--compare/--no-compare", default=None, help="Also the other rules, in one table.")
-@engine_option
-@check_option
-@json_option
-@seed_option
-def command(study, drive, overrides, rule, compare, json_file, seed) -> int:
+@work_options
+def command(asked: StudyOptions, rule: str | None, compare: bool | None, json_file: Path | None, seed: int) -> int:
     """Least-cost tolerances that keep the requirement, verified once on a fresh seed.
 
     STUDY is a study file or a shipped study with costs. Exit status 1: the requirement cannot be met.
     """
     from hdopt.allocation.convex import Infeasible
-    from hdopt.study import load_study
     from hdopt.workflow.allocate import allocate
     from hdopt.workflow.requirement import of_allocation
 
-    loaded = load_study(study, overrides, drive)
+    loaded = asked.load()
     try:
         result = allocate(loaded, rule, compare=compare, seed=seed, progress=lambda rules: progress(rules, "rules"))
     except Infeasible as error:
@@ -58,7 +47,7 @@ def command(study, drive, overrides, rule, compare, json_file, seed) -> int:
     return status(result.accepted, verdict)
 
 
-def _lines(result):
+def _lines(result: AllocateResult) -> Iterator[str]:
     yield f"{result.study}: {result.rule} rule, limit {result.limit:g} {result.unit}: {result.status}"
     yield f"  {'':32s} {'tolerance':>12s} {'present':>12s} {'cost':>9s} {'present':>9s}"
     for name, row in result.errors.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -58,6 +59,48 @@ check_option = click.option(
 )
 """For every command that can say whether a study's requirement is met; `status` turns the verdict into the status."""
 CHECK = "hdopt.check"
+
+
+@dataclass(frozen=True)
+class StudyOptions:
+    """Which study a command is to work on: `study` its name or path, `drive` a shipped drive in place of its own, and
+    `overrides`, KEY=VALUE each."""
+
+    study: str | None
+    drive: str | None
+    overrides: tuple[str, ...]
+
+    def load(self, *further: str) -> Study:
+        """The study that is meant, with `further` KEY=VALUE after those of --set."""
+        from hdopt.study import load_study
+
+        return load_study(self.study, (*self.overrides, *further), self.drive)
+
+
+def study_options(command: Callable[..., R]) -> Callable[..., R]:
+    """[STUDY], --drive and --set of a `command`, which gets them as its first argument, a `StudyOptions`."""
+
+    @functools.wraps(command)
+    def bundled(
+        *,
+        study: str | None,
+        drive: str | None,
+        overrides: tuple[str, ...],
+        **others: Any,  # what the command's own options give
+    ) -> R:
+        return command(StudyOptions(study, drive, overrides), **others)
+
+    return study_argument(drive_option(set_option(bundled)))
+
+
+def answer_options(command: Callable[..., R]) -> Callable[..., R]:
+    """--json and --seed of a `command`, which gets them as `json_file` and `seed`."""
+    return json_option(seed_option(command))
+
+
+def work_options(command: Callable[..., R]) -> Callable[..., R]:
+    """--engine, --check, --json and --seed of a `command` with long work that can say whether a requirement is met."""
+    return engine_option(check_option(answer_options(command)))
 
 
 def status(answer: bool, verdict: Verdict | None) -> int:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import OutputFile, emit, json_option, seed_option
-from hdopt.cli.recorded import read_all, recording_options, source_of
+from hdopt.cli.common import OutputFile, answer_options, emit
+from hdopt.cli.recorded import RecordingOptions, recording_options
 
 if TYPE_CHECKING:
     from hdopt.workflow.compensate import Compensated
@@ -20,9 +20,10 @@ if TYPE_CHECKING:
 @click.option("-o", "output", metavar="FILE", type=OutputFile(), required=True, help="Where the table goes.")
 @click.option("--as", "form", type=click.Choice(["csv", "json", "c"]), help="By default what FILE ends with, else CSV.")
 @click.option("--terms", type=int, default=64, show_default=True, help="Coefficients at most; 0 for a table.")
-@json_option
-@seed_option
-def command(**options: Any) -> int:
+@answer_options
+def command(
+    given: RecordingOptions, output: Path, form: str | None, terms: int, json_file: Path | None, seed: int
+) -> int:
     """What a controller can subtract from the output's position.
 
     Indexed by input angle and output angle. Fitted to REC, chosen and judged on recordings, output turns or reversals
@@ -32,16 +33,15 @@ def command(**options: Any) -> int:
     from hdopt.files import write_text
     from hdopt.workflow.compensate import compensate
 
-    source = source_of(options["drive"], options["ratio"], options["columns"], options["bench_file"])
-    found = compensate(read_all(source, options["recordings"]), source.drive, options["terms"], options["seed"])
-    output: Path = options["output"]
+    source = given.source()
+    found = compensate(source.read_all(given.recordings), source.drive, terms, seed)
     ending = output.suffix.lower().lstrip(".")
-    form = options["form"] or (ending if ending in FORMATS else "csv")
+    form = form or (ending if ending in FORMATS else "csv")
     try:
         if found.worth:
             write_text(output, written(found.found, form, found.facts()))
     finally:
-        emit(found.to_dict(str(output) if found.worth else None), options["json_file"], _lines(found, output))
+        emit(found.to_dict(str(output) if found.worth else None), json_file, _lines(found, output))
     return 0 if found.worth else 1
 
 

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import OutputFile, emit, engine_option, json_option, seed_option
+from hdopt.cli.common import OutputFile, answer_options, emit, engine_option
+from hdopt.cli.recorded import RecordingOptions, recording_options
+
+if TYPE_CHECKING:
+    from hdopt.diagnosis.verdict.diagnosis import Diagnosis
 
 MOST_LISTED = 12
 """Parameters of one effect that the terminal shows."""
 
 
 @click.command()
-@click.argument("recordings", nargs=-1, required=True, metavar="REC...", type=click.Path(path_type=Path))
-@click.option("--drive", metavar="NAME|STUDY|none", default="csf-25-80", show_default=True, help="The drive recorded.")
-@click.option("--ratio", type=float, help="Reduction ratio, with --drive none.")
-@click.option(
-    "--columns", metavar="CHANNEL=NAME:UNIT,...", help="Layout: input, output or error, time, torque, temperature."
-)
+@recording_options
 @click.option(
     "--nuisance", metavar="NAME,...", default="", help="Fit beside every model, and never name: drift, time-warp."
 )
@@ -31,46 +32,42 @@ MOST_LISTED = 12
     help="Write a study with the drive's fitted errors and the effects found.",
 )
 @engine_option
-@json_option
-@seed_option
-def command(recordings, drive, ratio, columns, nuisance, report_file, study_file, json_file, seed) -> None:
+@answer_options
+def command(
+    given: RecordingOptions,
+    nuisance: str,
+    report_file: Path | None,
+    study_file: Path | None,
+    json_file: Path | None,
+    seed: int,
+) -> None:
     """What physics recordings of one drive hold that the model leaves out.
 
-    REC are .csv, .parquet or .mat files of one drive, fitted jointly. Exit status 0 whenever a verdict was reached.
+    REC are files of one drive, of any format that `hdopt inspect` reads, fitted jointly. Exit status 0 whenever a
+    verdict was reached.
     """
     from hdopt.diagnosis import diagnose
 
     asked = tuple(name.strip() for name in nuisance.split(",") if name.strip())
-    diagnosis = diagnose(recordings, drive_of(drive, ratio), ratio, columns, seed, asked)
+    source = given.source()
+    diagnosis = diagnose(source.read_all(given.recordings), source.drive, source.ratio, seed=seed, nuisance=asked)
     try:
         if report_file is not None:
             from hdopt.files import write_text
             from hdopt.report.html import render
             from hdopt.report.sections.diagnosis import diagnosis_report
 
-            write_text(report_file, render(diagnosis_report(diagnosis, [path.name for path in recordings])))
+            write_text(report_file, render(diagnosis_report(diagnosis, [path.name for path in given.recordings])))
         if study_file is not None:
             from hdopt.workflow.write_fitted import write_study
 
-            write_study(diagnosis, drive, study_file)
+            write_study(diagnosis, given.drive, study_file)
     finally:
         # A file that cannot be written after minutes of work must not take the answer with it.
         emit(diagnosis.to_dict(), json_file, _lines(diagnosis))
 
 
-def drive_of(name: str, ratio: float | None):
-    """The drive by its shipped name or study file; None for 'none', which needs a ratio."""
-    from hdopt.errors import HdoptError
-    from hdopt.study import load_study, shipped_drives
-
-    if name == "none":
-        if ratio is None:
-            raise HdoptError("--drive none needs the gear's ratio; give --ratio X")
-        return None
-    return (load_study(drive=name) if name in shipped_drives() else load_study(name)).drive
-
-
-def _lines(diagnosis):
+def _lines(diagnosis: Diagnosis) -> Iterator[str]:
     yield f"verdict: {diagnosis.verdict}"
     yield f"  {diagnosis.says}"
     for found in diagnosis.effects:

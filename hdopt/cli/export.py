@@ -2,45 +2,69 @@
 
 from __future__ import annotations
 
+import functools
 import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from hdopt.cli.common import OutputFile, drive_option, emit, json_option, seed_option, set_option, study_argument
+from hdopt.cli.common import OutputFile, StudyOptions, answer_options, emit, study_options
+
+if TYPE_CHECKING:
+    from hdopt.geometry.export import ExportResult
+
+R = TypeVar("R")
+
+FILES = {
+    "step": "STEP assembly (AP214, or --set export.step_schema=AP242).",
+    "dxf": "DXF of the profile for wire cutting, with bore and tolerance zone.",
+    "stl": "STL mesh of all parts in their places.",
+    "3mf": "3MF mesh with named, coloured parts.",
+    "svg": "Drawing: front view with dimensions, section, key dimensions.",
+    "png": "Rendered picture of the parts, pulled apart.",
+    "pdf": "Drawings: assembly and a sheet for each part.",
+    "drawings": "ZIP of the same sheets as SVG and DXF.",
+    "cam": "CSV of the cam: angle, radius, normal, curvature.",
+    "gcode": "G-code for a two-axis cam grinder (RS-274).",
+    "inspection": "CSV of the inspection plan.",
+    "mating": "CSV of what shaft, housing and seats must keep.",
+}
+"""Format, which names the option -> its help."""
+
+
+def file_options(command: Callable[..., R]) -> Callable[..., R]:
+    """An option for each of `FILES`; the `command` gets those that were given as `files`, format -> path."""
+    names = {f"file_{kind}": kind for kind in FILES}
+
+    @functools.wraps(command)
+    def bundled(*args: Any, **options: Any) -> R:  # what all options of the command give
+        files = {names[name]: options.pop(name) for name in tuple(options) if name in names}
+        return command(*args, files={kind: path for kind, path in files.items() if path}, **options)
+
+    decorated: Callable[..., R] = bundled
+    for name, kind in reversed(names.items()):
+        decorated = click.option(f"--{kind}", name, metavar="FILE", type=OutputFile(), help=FILES[kind])(decorated)
+    return decorated
 
 
 @click.command()
-@study_argument
-@drive_option
-@set_option
+@study_options
 @click.option("--structure", metavar="S", help="integral, automatic, one_way_major or one_way_minor.")
-@click.option(
-    "--step", metavar="FILE", type=OutputFile(), help="STEP assembly (AP214, or --set export.step_schema=AP242)."
-)
-@click.option(
-    "--dxf",
-    metavar="FILE",
-    type=OutputFile(),
-    help="DXF of the profile for wire cutting, with bore and tolerance zone.",
-)
-@click.option("--stl", metavar="FILE", type=OutputFile(), help="STL mesh of all parts in their places.")
-@click.option("--3mf", "threemf", metavar="FILE", type=OutputFile(), help="3MF mesh with named, coloured parts.")
-@click.option(
-    "--svg", metavar="FILE", type=OutputFile(), help="Drawing: front view with dimensions, section, key dimensions."
-)
-@click.option("--png", metavar="FILE", type=OutputFile(), help="Rendered picture of the parts, pulled apart.")
-@click.option("--pdf", metavar="FILE", type=OutputFile(), help="Drawings: assembly and a sheet for each part.")
-@click.option("--drawings", metavar="FILE", type=OutputFile(), help="ZIP of the same sheets as SVG and DXF.")
-@click.option("--cam", metavar="FILE", type=OutputFile(), help="CSV of the cam: angle, radius, normal, curvature.")
-@click.option("--gcode", metavar="FILE", type=OutputFile(), help="G-code for a two-axis cam grinder (RS-274).")
-@click.option("--inspection", metavar="FILE", type=OutputFile(), help="CSV of the inspection plan.")
-@click.option("--mating", metavar="FILE", type=OutputFile(), help="CSV of what shaft, housing and seats must keep.")
+@file_options
 @click.option("--context", is_flag=True, help="With bearing races, flexspline ring and circular spline.")
 @click.option("--allocation", metavar="FILE", help="Tolerances from the JSON that `hdopt allocate` wrote.")
-@json_option
-@seed_option
-def command(study, drive, overrides, structure, context, allocation, json_file, seed, threemf, **files) -> int:
+@answer_options
+def command(
+    asked: StudyOptions,
+    structure: str | None,
+    files: Mapping[str, Path],
+    context: bool,
+    allocation: str | None,
+    json_file: Path | None,
+    seed: int,
+) -> int:
     """The wave generator as checked files: STEP, DXF, STL, 3MF, a drawing (SVG) and a picture (PNG).
 
     STUDY is a study file or a shipped study; without one, the shipped drive csf-25-80 is taken. Every file is read back
@@ -48,17 +72,15 @@ def command(study, drive, overrides, structure, context, allocation, json_file, 
     then none is left. Without a file, the key dimensions are printed and nothing is written.
     """
     from hdopt.geometry.check import CheckFailed
-    from hdopt.study import load_study
     from hdopt.workflow.allocation_file import read_allocation
     from hdopt.workflow.export import export
 
     chosen = [f"wave_generator.structure={structure}"] if structure else []
     chosen += ["export.context=true"] if context else []
-    wanted = {kind: path for kind, path in {**files, "3mf": threemf}.items() if path}
-    loaded = load_study(study, (*overrides, *chosen), drive)
+    loaded = asked.load(*chosen)
     tolerances = read_allocation(Path(allocation), loaded) if allocation else None
     try:
-        result = export(loaded, wanted, tolerances)
+        result = export(loaded, files, tolerances)
     except CheckFailed as failed:
         print(f"hdopt: {failed}", file=sys.stderr)
         return 1
@@ -66,7 +88,7 @@ def command(study, drive, overrides, structure, context, allocation, json_file, 
     return 0
 
 
-def _lines(result):
+def _lines(result: ExportResult) -> Iterator[str]:
     values = result.to_dict()
     yield f"{result.identity.title}, {values['structure']}, fingerprint {values['fingerprint']}"
     yield ""
@@ -97,7 +119,7 @@ def _lines(result):
         yield "  nothing written: give --step, --dxf, --svg, --cam or another option that names a file"
 
 
-def _budget_lines(budgets):
+def _budget_lines(budgets: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for budget in budgets:
         verdict = "kept" if budget["met"] else "NOT KEPT"
         yield ""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from hdopt.cli.common import OutputFile, emit, engine_option, json_option, seed_option
-from hdopt.cli.recorded import Source, read_all, recording_options, source_of
+from hdopt.cli.common import OutputFile, answer_options, emit, engine_option
+from hdopt.cli.recorded import RecordingOptions, Source, recording_options
 
 if TYPE_CHECKING:
     from hdopt.recordings.sheet import Batch, Inspection
@@ -29,9 +30,8 @@ UNITS = {"slope": "arcmin/deg"}
 @click.option("--report", "report_file", metavar="FILE", type=OutputFile(), help="Write a one-page HTML report.")
 @click.option("--write-bench", "bench_out", metavar="FILE", type=OutputFile(), help="Write what was understood.")
 @engine_option
-@json_option
-@seed_option
-def command(**options: Any) -> int:
+@answer_options
+def command(given: RecordingOptions, **options: Any) -> int:
     """The acceptance sheet of a drive: peak-to-peak, return error, repeatability, slope, orders, checks, limits.
 
     REC are files of one drive (with --each, of one drive each): .csv and other text, .parquet, .mat, .h5, .tdms, .mcap,
@@ -40,21 +40,21 @@ def command(**options: Any) -> int:
     from hdopt.recordings.decision import parse_limits
     from hdopt.workflow.requirement import required_limits
 
-    source = source_of(options["drive"], options["ratio"], options["columns"], options["bench_file"])
+    source = given.source()
     limits = parse_limits(options["limits"])
     if not limits and source.study is not None:
         limits = required_limits(source.study)
     if options["each"]:
-        return _each(source, limits, options)
-    return _one(source, limits, options)
+        return _each(source, given.recordings, limits, options)
+    return _one(source, given.recordings, limits, options)
 
 
-def _one(source: Source, limits: dict[str, float], options: dict[str, Any]) -> int:
+def _one(source: Source, paths: Sequence[Path], limits: dict[str, float], options: dict[str, Any]) -> int:
     from hdopt.workflow.inspect import inspect
 
     mountings = [name.strip() for name in (options["mountings"] or "").split(",") if name.strip()]
     found = inspect(
-        read_all(source, options["recordings"]),
+        source.read_all(paths),
         source.drive,
         limits,
         speed_rpm=options["speed_rpm"],
@@ -64,17 +64,17 @@ def _one(source: Source, limits: dict[str, float], options: dict[str, Any]) -> i
         seed=options["seed"],
     )
     try:
-        _write(found, source, options)
+        _write(found, source, paths, options)
     finally:
         emit(found.to_dict(), options["json_file"], _lines(found))
     return 1 if options["check"] and found.missed else 0
 
 
-def _write(found: Inspection, source: Source, options: dict[str, Any]) -> None:
-    from hdopt.files import write_text
+def _write(found: Inspection, source: Source, paths: Sequence[Path], options: dict[str, Any]) -> None:
+    from hdopt.files import to_csv, write_text
 
     if options["csv_file"] is not None:
-        write_text(options["csv_file"], found.to_frame().to_csv(index=False, lineterminator="\n"))
+        write_text(options["csv_file"], to_csv(found.to_frame()))
     if options["report_file"] is not None:
         from hdopt.report.html import render
         from hdopt.report.sections.inspection import inspection_report
@@ -84,19 +84,19 @@ def _write(found: Inspection, source: Source, options: dict[str, Any]) -> None:
         from hdopt.recordings.bench import bench_text
         from hdopt.recordings.read import read_channels
 
-        channels = read_channels(options["recordings"][0], source.columns, source.bench)
+        channels = read_channels(paths[0], source.columns, source.bench)
         write_text(options["bench_out"], bench_text(channels.columns, source.ratio))
 
 
-def _each(source: Source, limits: dict[str, float], options: dict[str, Any]) -> int:
+def _each(source: Source, paths: Sequence[Path], limits: dict[str, float], options: dict[str, Any]) -> int:
     from hdopt.workflow.inspect_many import inspect_many
 
-    batch = inspect_many(options["recordings"], source.read, source.drive, limits, options["seed"])
-    from hdopt.files import write_text
+    batch = inspect_many(paths, source.read, source.drive, limits, options["seed"])
+    from hdopt.files import to_csv, write_text
 
     try:
         if options["csv_file"] is not None:
-            write_text(options["csv_file"], batch.to_frame().to_csv(index=False, lineterminator="\n"))
+            write_text(options["csv_file"], to_csv(batch.to_frame()))
         if options["report_file"] is not None:
             from hdopt.report.html import render
             from hdopt.report.sections.inspection import batch_report

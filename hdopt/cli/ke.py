@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import click
 
-from hdopt.cli.common import (
-    check_option,
-    drive_option,
-    emit,
-    json_option,
-    set_option,
-    status,
-    study_argument,
-)
+from hdopt.cli.common import StudyOptions, check_option, emit, json_option, status, study_options
+
+if TYPE_CHECKING:
+    from hdopt.workflow.kinematic_error import KinematicErrorResult
 
 
 @click.command()
-@study_argument
-@drive_option
-@set_option
+@study_options
 @click.option("--structure", metavar="S", help="integral, automatic, one_way_major or one_way_minor.")
 @click.option("--sampling-deg", type=float, help="Also take the peak-to-peak only on this grid, from 0.")
 @click.option("--turns", type=float, help="Input turns of that grid; one full relative turn if omitted.")
@@ -26,24 +23,30 @@ from hdopt.cli.common import (
 @click.option("--method", default="exact", help="exact (the default) or 'closed form', to second order in the errors.")
 @json_option
 @click.option("--seed", type=int, expose_value=False, help="Taken as in every command; nothing here is random.")
-def command(study, drive, overrides, structure, sampling_deg, turns, method, json_file) -> int:
+def command(
+    asked: StudyOptions,
+    structure: str | None,
+    sampling_deg: float | None,
+    turns: float | None,
+    method: str,
+    json_file: Path | None,
+) -> int:
     """Kinematic error of one drive: peak-to-peak, orders, contact, lag.
 
     STUDY is a study file or a shipped study; without one, the shipped drive csf-25-80 is taken.
     """
-    from hdopt.study import load_study
     from hdopt.workflow.kinematic_error import kinematic_error
     from hdopt.workflow.requirement import of_kinematic_error
 
     chosen = (f"wave_generator.structure={structure}",) if structure else ()
-    loaded = load_study(study, (*overrides, *chosen), drive)
+    loaded = asked.load(*chosen)
     result = kinematic_error(loaded, sampling_deg=sampling_deg, turns=turns, method=method)
     verdict = of_kinematic_error(loaded, result)
     emit(result.to_dict(), json_file, _lines(result), verdict)
     return status(True, verdict)
 
 
-def _lines(result):
+def _lines(result: KinematicErrorResult) -> Iterator[str]:
     yield f"{result.study}: {result.profile} wave generator, {result.structure}"
     yield f"  peak-to-peak, converged (k_e = 1)    {result.peak_to_peak_arcmin:9.4f} arcmin"
     yield f"    that holds over a tooth's width      {result.tooth_width_peak_to_peak_arcmin:9.4f} arcmin"

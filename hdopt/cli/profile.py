@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import click
 
-from hdopt.cli.common import drive_option, emit, json_option, seed_option, set_option, study_argument
+from hdopt.cli.common import StudyOptions, answer_options, emit, study_options
+
+if TYPE_CHECKING:
+    from hdopt.workflow.kinematic_error import ProfileResult
 
 
 @click.command()
-@study_argument
-@drive_option
-@set_option
+@study_options
 @click.option("--profile", metavar="P", help="ellipse, resal, two_disk or measured.")
-@json_option
-@seed_option
-def command(study, drive, overrides, profile, json_file, seed) -> None:
+@answer_options
+def command(asked: StudyOptions, profile: str | None, json_file: Path | None, seed: int) -> None:
     """The wave generator's profile: contact angle, curvature change, bending stress.
 
     STUDY is a study file or a shipped study; without one, the shipped drive csf-25-80 is taken.
     """
-    from hdopt.study import load_study
     from hdopt.workflow.kinematic_error import profile as analyse
 
     chosen = (f"wave_generator.profile={profile}",) if profile else ()
-    result = analyse(load_study(study, (*overrides, *chosen), drive))
+    result = analyse(asked.load(*chosen))
     emit(result.to_dict(), json_file, _lines(result))
 
 
@@ -42,7 +45,7 @@ ROWS = (
 )
 
 
-def _lines(result):
+def _lines(result: ProfileResult) -> Iterator[str]:
     values = result.to_dict()
     yield f"{result.study}: {result.profile} profile"
     for key, label, form in ROWS:

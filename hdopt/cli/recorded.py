@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import functools
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from hdopt.recordings.bench import Bench
     from hdopt.recordings.recording import Recording
     from hdopt.study import Study
+
+R = TypeVar("R")
 
 
 @dataclass(frozen=True)
@@ -32,9 +35,43 @@ class Source:
 
         return read_recording(path, self.ratio, self.columns, self.bench)
 
+    def read_all(self, paths: Iterable[Path]) -> list[Recording]:
+        """The recordings of this drive in `paths`, in their order."""
+        return [self.read(path) for path in paths]
 
-def recording_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """REC..., --drive, --ratio, --columns and --bench."""
+
+@dataclass(frozen=True)
+class RecordingOptions:
+    """The files `recordings`, and what is said of them: `drive` a shipped name, a study file or "none"; its `ratio`,
+    the `columns` and the `bench_file` as the options have them."""
+
+    recordings: tuple[Path, ...]
+    drive: str
+    ratio: float | None
+    columns: str | None
+    bench_file: Path | None
+
+    def source(self) -> Source:
+        """What was recorded and how; `HdoptError` where the options disagree or no ratio is known."""
+        return source_of(self.drive, self.ratio, self.columns, self.bench_file)
+
+
+def recording_options(command: Callable[..., R]) -> Callable[..., R]:
+    """REC..., --drive, --ratio, --columns and --bench of a `command`, which gets them as its first argument, a
+    `RecordingOptions`."""
+
+    @functools.wraps(command)
+    def bundled(
+        *,
+        recordings: tuple[Path, ...],
+        drive: str,
+        ratio: float | None,
+        columns: str | None,
+        bench_file: Path | None,
+        **others: Any,  # what the command's own options give
+    ) -> R:
+        return command(RecordingOptions(recordings, drive, ratio, columns, bench_file), **others)
+
     options = (
         click.argument("recordings", nargs=-1, required=True, metavar="REC...", type=click.Path(path_type=Path)),
         click.option(
@@ -55,9 +92,10 @@ def recording_options(command: Callable[..., Any]) -> Callable[..., Any]:
             help="A bench file (TOML) that says the layout once for all recordings.",
         ),
     )
+    decorated: Callable[..., R] = bundled
     for option in reversed(options):
-        command = option(command)
-    return command
+        decorated = option(decorated)
+    return decorated
 
 
 def source_of(drive: str, ratio: float | None, columns: str | None, bench_file: Path | None) -> Source:
@@ -81,8 +119,3 @@ def source_of(drive: str, ratio: float | None, columns: str | None, bench_file: 
             "or --drive none with the ratio"
         )
     return Source(study.drive, study, own, columns, bench)
-
-
-def read_all(source: Source, paths: Sequence[Path]) -> list[Recording]:
-    """All recordings of `source` in `paths`, in their order."""
-    return [source.read(path) for path in paths]

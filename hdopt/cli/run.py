@@ -4,55 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import (
-    check_option,
-    drive_option,
-    emit,
-    engine_option,
-    json_option,
-    progress,
-    seed_option,
-    set_option,
-    status,
-    study_argument,
-)
+from hdopt.cli.common import StudyOptions, emit, progress, resume_option, status, study_options, work_options
 
 if TYPE_CHECKING:
     from hdopt.workflow.run import RunResult
 
 
 @click.command()
-@study_argument
+@study_options
 @click.option("-o", "--output", "folder", metavar="DIR", help="Folder to write to; out/STUDY if omitted.")
-@click.option("--resume", is_flag=True, help="Go on where an interrupted run of the same study stood.")
+@resume_option
 @click.option("--verify", is_flag=True, help="Do the run in the folder STUDY (or -o DIR) again and compare every file.")
-@drive_option
-@set_option
-@engine_option
-@check_option
-@json_option
-@seed_option
-def command(study: str | None, folder: str | None, resume: bool, verify: bool, **options: Any) -> int:
+@work_options
+def command(
+    asked: StudyOptions, folder: str | None, resume: bool, verify: bool, json_file: Path | None, seed: int
+) -> int:
     """Everything a study asks for: results, tables, and report.html.
 
     STUDY is a study file or a shipped study (see `hdopt studies`); without one, the shipped drive csf-25-80 is taken.
     The folder is replaced as a whole at the end. With --verify, status 1 says that a file came out otherwise.
     """
     if verify:
-        return _verify(Path(folder or study or "."), options["json_file"])
-    from hdopt.study import load_study
+        return _verify(Path(folder or asked.study or "."), json_file)
     from hdopt.workflow.requirement import of_run
     from hdopt.workflow.run import run_study
 
-    loaded = load_study(study, options["overrides"], options["drive"])
+    loaded = asked.load()
     place = Path(folder) if folder else Path("out") / loaded.name
-    result = run_study(loaded, place, options["seed"], lambda names: progress(names, loaded.name), resume)
+    result = run_study(loaded, place, seed, lambda names: progress(names, loaded.name), resume)
     verdict = of_run(loaded, result)
-    emit(result.to_dict(), options["json_file"], _lines(result), verdict)
+    emit(result.to_dict(), json_file, _lines(result), verdict)
     return status(result.answer, verdict)
 
 

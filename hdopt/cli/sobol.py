@@ -8,18 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hdopt.cli.common import (
-    check_option,
-    drive_option,
-    emit,
-    engine_option,
-    json_option,
-    seed_option,
-    set_option,
-    status,
-    study_argument,
-    watched,
-)
+from hdopt.cli.common import StudyOptions, emit, status, study_options, watched, work_options
 
 if TYPE_CHECKING:
     from hdopt.study import Study
@@ -29,9 +18,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@study_argument
-@drive_option
-@set_option
+@study_options
 @click.option("-n", "n", type=click.IntRange(1, 2**30), help="Base points in all; 16384, or the method's own number.")
 @click.option(
     "--method",
@@ -42,22 +29,16 @@ if TYPE_CHECKING:
 )
 @click.option("--no-second-order", is_flag=True, help="Leave out the indices of pairs.")
 @click.option("--shapley", metavar="PLAYERS", help="Also Shapley effects of 'inputs' or 'groups'.")
-@engine_option
-@check_option
-@json_option
-@seed_option
-def command(
-    study: str | None, drive: str | None, overrides: tuple[str, ...], json_file: Path | None, seed: int, **options: Any
-) -> int:
+@work_options
+def command(asked: StudyOptions, json_file: Path | None, seed: int, **options: Any) -> int:
     """Which tolerances matter: Sobol' indices with 95 % intervals, Shapley effects where inputs are correlated.
 
     STUDY is a study file or a shipped study; without one, the shipped drive csf-25-80 is taken. Other methods are
     SALib's own, over the percentiles of the inputs.
     """
-    from hdopt.study import load_study
     from hdopt.workflow.requirement import of_tolerances
 
-    loaded = load_study(study, overrides, drive)
+    loaded = asked.load()
     result, lines = _analysed(loaded, seed, **options)
     verdict = of_tolerances(loaded, seed)
     emit(result.to_dict(), json_file, lines, verdict)

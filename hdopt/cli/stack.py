@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from hdopt.cli.common import (
-    check_option,
-    drive_option,
+    StudyOptions,
     emit,
-    engine_option,
     finished_parts_kept,
-    json_option,
     resume_option,
-    seed_option,
-    set_option,
     status,
-    study_argument,
+    study_options,
     watched,
+    work_options,
 )
+
+if TYPE_CHECKING:
+    from hdopt.tolerance.intervals import IntervalEstimate
+    from hdopt.tolerance.results import StackResult
 
 
 @click.command()
-@study_argument
-@drive_option
-@set_option
+@study_options
 @click.option("-n", "n", type=click.IntRange(1, 10**13), default=2**18, show_default=True, help="Samples in all.")
 @click.option("--tail", type=float, metavar="LIMIT", help="Also the probability of exceeding LIMIT, down to 1e-7.")
 @click.option("--worst-case", is_flag=True, help="Also the worst case over the tolerance box, with its certificate.")
@@ -38,20 +38,16 @@ from hdopt.cli.common import (
     help="'sobol', 16 scramblings, or 'monte-carlo', independent points.",
 )
 @resume_option
-@engine_option
-@check_option
-@json_option
-@seed_option
-def command(study: str | None, drive: str | None, overrides: tuple[str, ...], resume: bool, **options: Any) -> int:
+@work_options
+def command(asked: StudyOptions, resume: bool, json_file: Path | None, **options: Any) -> int:
     """Monte Carlo stack of the tolerances: distribution, yield, Ppk; tails and worst case on request.
 
     STUDY is a study file or a shipped study; without one, the shipped drive csf-25-80 is taken.
     """
-    from hdopt.study import load_study
     from hdopt.workflow.requirement import of_stack
     from hdopt.workflow.stack import stack
 
-    loaded, json_file = load_study(study, overrides, drive), options.pop("json_file")
+    loaded = asked.load()
     with finished_parts_kept(loaded, resume):
         result = stack(loaded, engine=watched("samples"), **options)
     verdict = of_stack(result)
@@ -59,23 +55,23 @@ def command(study: str | None, drive: str | None, overrides: tuple[str, ...], re
     return status(True, verdict)
 
 
-def _lines(result):
+def _row(label: str, estimate: IntervalEstimate, form: str, unit: str) -> str:
+    text = f"{estimate.value:9{form}}  ({estimate.low:{form}} to {estimate.high:{form}})"
+    return f"  {label:34s} {text} {unit}"
+
+
+def _lines(result: StackResult) -> Iterator[str]:
     stack = result.stack
     unit, line = stack.unit, stack.linearisation
-
-    def row(label, estimate, form=".4f", unit=unit):
-        text = f"{estimate.value:9{form}}  ({estimate.low:{form}} to {estimate.high:{form}})"
-        return f"  {label:34s} {text} {unit}"
-
     yield f"{result.study}: {stack.n} drives, {stack.sampling}; limit {stack.limit:g} {unit}"
-    yield row("mean", stack.mean)
-    yield row("standard deviation", stack.std)
+    yield _row("mean", stack.mean, ".4f", unit)
+    yield _row("standard deviation", stack.std, ".4f", unit)
     for q, estimate in stack.quantiles.items():
-        yield row(f"quantile {q:g}", estimate)
-    yield row(f"yield (required {stack.required_yield:g})", stack.conforming, ".5f", "")
-    yield row("beyond the limit", stack.ppm, ".0f", "ppm")
+        yield _row(f"quantile {q:g}", estimate, ".4f", unit)
+    yield _row(f"yield (required {stack.required_yield:g})", stack.conforming, ".5f", "")
+    yield _row("beyond the limit", stack.ppm, ".0f", "ppm")
     if stack.ppk is not None:
-        yield row("Ppk, (U - X50)/(X99.865 - X50)", stack.ppk, ".3f", "")
+        yield _row("Ppk, (U - X50)/(X99.865 - X50)", stack.ppk, ".3f", "")
     error = stack.rss - stack.required_quantile.value
     yield f"  {'root sum square, same quantile':34s} {stack.rss:9.4f}  ({error:+.4f} against the sample) {unit}"
     if result.worst_case is not None:

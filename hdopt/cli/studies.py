@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
 from hdopt.cli.common import emit, json_option
@@ -9,7 +11,7 @@ from hdopt.cli.common import emit, json_option
 
 @click.command()
 @json_option
-def command(json_file) -> None:
+def command(json_file: Path | None) -> None:
     """The shipped studies, a line each; run one with `hdopt run NAME`."""
     from hdopt.study import shipped_study_titles
 
