@@ -37,9 +37,7 @@ class OutsidePrior:
 
 def prior_ranges(effect: Effect) -> dict[str, Quantity]:
     """The numbers of an `effect` that have a prior range, by their names in a diagnosis."""
-    return {
-        item.name: item for item in effect.flat_declared() if isinstance(item, Quantity) and item.prior is not None
-    }
+    return {item.name: item for item in effect.flat_declared() if isinstance(item, Quantity) and item.prior is not None}
 
 
 def outside_prior(effect: Effect, parameters: Mapping[str, Parameter]) -> list[OutsidePrior]:

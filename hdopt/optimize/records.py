@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 from hdopt.optimize.setup import Setup
@@ -141,20 +141,34 @@ class Perturbation:
 
 
 @dataclass(frozen=True)
-class Verification:
-    """The best design's peak-to-peak (arcmin) by the exact geometry, and its quantile over fresh drives."""
+class QuantileCheck:
+    """The best design's peak-to-peak that the share `quantile` of fresh drives keeps: `quantile_arcmin` of so many
+    `drives`, with its 95 % interval `low` to `high`; `searched_arcmin` is what the search found, None where it was not
+    about the quantile."""
 
-    exact_arcmin: float
-    kernel_arcmin: float
-    quantile: float | None
-    quantile_arcmin: float | None
-    low: float | None
-    high: float | None
+    quantile: float
+    quantile_arcmin: float
+    low: float
+    high: float
     searched_arcmin: float | None
     drives: int
 
+
+@dataclass(frozen=True)
+class Verification:
+    """The best design's peak-to-peak (arcmin) by the exact geometry and by the compiled kernel, and its quantile over
+    fresh drives; `fresh` is None where the study has no tolerances."""
+
+    exact_arcmin: float
+    kernel_arcmin: float
+    fresh: QuantileCheck | None
+
     def to_dict(self) -> dict[str, Any]:
-        return asdict(self)
+        """JSON-ready, in one level; without tolerances the numbers of the quantile are None, of 0 drives."""
+        fresh = self.fresh
+        found = dict.fromkeys(field.name for field in fields(QuantileCheck)) if fresh is None else asdict(fresh)
+        none = {"drives": 0} if fresh is None else {}
+        return {"exact_arcmin": self.exact_arcmin, "kernel_arcmin": self.kernel_arcmin, **found, **none}
 
 
 def choose(solutions: Sequence[Solution]) -> Solution:

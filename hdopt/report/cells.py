@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -50,8 +50,9 @@ class Column:
         return max((len(cell) for cell in (self.name, *self.cells)), default=0) <= 22
 
 
-def columns(frame: pd.DataFrame, formats: dict[str, str] | None = None) -> list[Column]:
-    """The columns of `frame` as they are read, its index first where that has a meaning."""
+def columns(frame: pd.DataFrame, formats: Mapping[str, str] | None = None) -> list[Column]:
+    """The columns of `frame` as they are read, its index first where that has a meaning; `formats` maps a column's name
+    to a format spec such as '.3f', the others show four significant digits."""
     if index_has_meaning(frame):
         frame = frame.reset_index()
     formats = formats or {}
@@ -59,7 +60,7 @@ def columns(frame: pd.DataFrame, formats: dict[str, str] | None = None) -> list[
 
 
 def index_has_meaning(frame: pd.DataFrame) -> bool:
-    """Whether a table's index belongs to its content: it has a name, or entries other than 0, 1, 2..."""
+    """Whether the index of `frame` belongs to its content: it has a name, or entries other than 0, 1, 2..."""
     import pandas as pd
 
     return frame.index.name is not None or not isinstance(frame.index, pd.RangeIndex)
@@ -108,7 +109,7 @@ def _is_missing(value: Any) -> bool:
 
 
 def minus(text: str) -> str:
-    """A leading hyphen as the minus sign that is as wide as a digit."""
+    """`text` with a leading hyphen as the minus sign, which is as wide as a digit."""
     return "−" + text[1:] if text.startswith("-") else text
 
 

@@ -10,7 +10,7 @@ import base64
 import json
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from datetime import UTC, datetime
 from functools import singledispatchmethod
 from importlib.metadata import version
@@ -60,8 +60,9 @@ def write_report(report: Report, folder: Path) -> Path:
     return page
 
 
-def render(report: Report, csv_files: set[str] = frozenset()) -> str:
-    """The page's HTML; `csv_files` are the names of the files beside it that it may link to."""
+def render(report: Report, csv_files: Collection[str] = ()) -> str:
+    """The HTML of the page of a `report`; `csv_files` are the names of the files beside it that it may link to. Raises
+    `HdoptError` where a text refers to a figure or table that the report does not have."""
     import jinja2
 
     templates = files("hdopt.report") / "templates"
@@ -69,7 +70,7 @@ def render(report: Report, csv_files: set[str] = frozenset()) -> str:
     page = environment.from_string((templates / "report.html.j2").read_text(encoding="utf-8"))
     prepare = _Preparation(report, csv_files)
     figures = [item for section in report.sections for item in section.items if isinstance(item, Figure)]
-    return page.render(
+    html: str = page.render(
         report=report,
         sections=[
             {
@@ -90,19 +91,20 @@ def render(report: Report, csv_files: set[str] = frozenset()) -> str:
         version=version("hdopt"),
         date=date_of_page(),
     )
+    return html
 
 
 class _Preparation:
     """Numbers a report's figures and tables, and turns its items into what the page template shows."""
 
-    def __init__(self, report: Report, csv_files: set[str]) -> None:
+    def __init__(self, report: Report, csv_files: Collection[str]) -> None:
         self.csv_files = csv_files
         self.numbers: dict[str, str] = {}
         counts = {"Figure": 0, "Table": 0}
         for section in report.sections:
             for item in section.items:
-                kind = {Figure: "Figure", Picture: "Figure", Table: "Table"}.get(type(item))
-                if kind:
+                if isinstance(item, Figure | Picture | Table):
+                    kind = "Table" if isinstance(item, Table) else "Figure"
                     counts[kind] += 1
                     self.numbers[item.key] = f"{kind} {counts[kind]}"
 
@@ -142,7 +144,7 @@ class _Preparation:
 
     @item.register
     def _(self, item: Table) -> dict[str, Any]:
-        shown = columns(item.frame, dict(item.formats))
+        shown = columns(item.frame, item.formats)
         rows = list(zip(*(column.cells for column in shown), strict=True))
         return self._numbered(item) | {
             "kind": "table",
@@ -203,7 +205,8 @@ def _script_safe(text: str) -> str:
 def _plotly_js() -> str:
     from plotly.offline import get_plotlyjs
 
-    return get_plotlyjs()
+    source: str = get_plotlyjs()
+    return source
 
 
 def _data_url(content: str | bytes) -> str:

@@ -33,7 +33,7 @@ def figure_frame(figure: go.Figure) -> pd.DataFrame:
         if several:
             frame.insert(1, "x_axis", x_title)
             frame.insert(2, "y_axis", y_title)
-    joined = pd.concat(frames, ignore_index=True)
+    joined: pd.DataFrame = pd.concat(frames, ignore_index=True)
     if not several:
         renamed = {"x": titles[0][0] or "x", "y": titles[0][1] or "y"}
         if len(set(renamed.values()) | {"trace", "z"}) == 4:

@@ -52,7 +52,7 @@ HEIGHT = 400
 
 
 def faded(colour: str, opacity: float) -> str:
-    """'#rrggbb' as an rgba() of the given opacity, for fills and bands."""
+    """`colour` '#rrggbb' as an rgba() of the given `opacity`, 0 to 1, for fills and bands."""
     red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     return f"rgba({red},{green},{blue},{opacity:g})"
 
@@ -130,7 +130,8 @@ def template() -> go.layout.Template:
 
 
 def figure(x_title: str = "", y_title: str = "", height: int = HEIGHT, **layout: object) -> go.Figure:
-    """An empty figure in the report's style with its axes titled; `layout` goes to `update_layout`."""
+    """An empty figure in the report's style, `height` px high, its axes titled `x_title` and `y_title`; `layout` goes
+    to Plotly's `update_layout`."""
     import plotly.graph_objects as go
 
     made = go.Figure(layout={"template": template()})

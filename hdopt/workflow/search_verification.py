@@ -9,7 +9,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics.extremes import extremes_arcmin
-from hdopt.optimize.records import SearchResult, Verification
+from hdopt.optimize.records import QuantileCheck, SearchResult, Verification
 from hdopt.study import Study
 from hdopt.workflow.stack import drive_problem_of
 
@@ -37,16 +37,15 @@ def verify(study: Study, result: SearchResult, seed: int) -> Verification:
         low, high = extended_extremes_arcmin(ExtendedModel(drive, study.errors, added.at(drive), added.operation))
     kernel = result.best.quantities.get("peak_to_peak_arcmin", float("nan"))
     if "tolerances" not in study.sections:
-        return Verification(high - low, kernel, None, None, None, None, None, 0)
+        return Verification(high - low, kernel, None)
     blocks = quantile_blocks(study, drive, setup.settings.quantile, seed + 1, added)
     from scipy.stats import t
 
     middle = float(blocks.mean())
     half = float(t.ppf(0.975, BLOCKS - 1) * blocks.std(ddof=1) / np.sqrt(BLOCKS))
     searched = result.best.quantities.get("peak_to_peak_quantile_arcmin")
-    return Verification(
-        high - low, kernel, setup.settings.quantile, middle, middle - half, middle + half, searched, VERIFICATION
-    )
+    fresh = QuantileCheck(setup.settings.quantile, middle, middle - half, middle + half, searched, VERIFICATION)
+    return Verification(high - low, kernel, fresh)
 
 
 def quantile_blocks(

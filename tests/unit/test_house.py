@@ -19,7 +19,6 @@ UNDESCRIBED = {
     "bench": 36,
     "geometry": 79,
     "kinematics": 20,
-    "report": 51,
     "simulation": 3,
     "studies": 6,
     "tolerance": 2,

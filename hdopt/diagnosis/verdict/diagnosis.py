@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TypedDict
 
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding
@@ -12,6 +13,20 @@ from hdopt.diagnosis.inference.base_fit import BaseEstimate
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.diagnosis.verdict.where import Where
 from hdopt.effects.estimate import Parameter
+
+
+class FitNumbers(TypedDict):
+    """The numbers behind a verdict, arcmin rms: held-out errors of base, extended, generic and placebo model, on turns
+    and on whole conditions (None where there is one condition), and the noise floor; the chance of a false alarm."""
+
+    heldout_rms_base_arcmin: float
+    heldout_rms_extended_arcmin: float
+    heldout_rms_generic_arcmin: float
+    heldout_rms_placebo_arcmin: float
+    heldout_conditions_rms_base_arcmin: float | None
+    heldout_conditions_rms_extended_arcmin: float | None
+    noise_floor_arcmin: float
+    false_alarm_p: float
 
 
 @dataclass(frozen=True)
@@ -26,7 +41,7 @@ class Diagnosis:
     ambiguous_with: tuple[tuple[str, ...], ...]
     separating_test: str | None
     base: BaseEstimate
-    fit: Mapping[str, float | None]
+    fit: FitNumbers
     below_detection: Mapping[str, float]
     warnings: tuple[str, ...]
     says: str

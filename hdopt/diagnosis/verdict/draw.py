@@ -14,7 +14,7 @@ from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.nuisance import estimated, notes
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.orientation import Orientation
-from hdopt.diagnosis.verdict.diagnosis import Diagnosis
+from hdopt.diagnosis.verdict.diagnosis import Diagnosis, FitNumbers
 from hdopt.diagnosis.verdict.facts import find
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.diagnosis.verdict.rules import rule_for
@@ -69,7 +69,7 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
     )
 
 
-def fit_numbers(evidence: Evidence) -> dict[str, float | None]:
+def fit_numbers(evidence: Evidence) -> FitNumbers:
     """The numbers behind the verdict, as in the JSON's `fit`. `evidence` is that of the diagnosis."""
     across = evidence.across_conditions
     return {

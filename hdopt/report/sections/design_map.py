@@ -46,10 +46,11 @@ def pressure_angle_width_section(
     limits: Sequence[Limit] = (),
     key: str = "design-map",
 ) -> Section:
-    """Peak-to-peak over pressure angle (m,) and wave-generator width (n,): `peak_to_peak_arcmin` has shape (m, n).
+    """Peak-to-peak over `pressure_angle_deg` (m,) and the wave generator's `width_mm` (n,): `peak_to_peak_arcmin` has
+    shape (m, n).
 
     `design` is the drive in hand: x its width in mm, y its pressure angle in deg. `requirement_arcmin` becomes one
-    more line among `limits`.
+    more line among `limits`, where it lies within the map's values. `key` names the section.
     """
     values = np.asarray(peak_to_peak_arcmin, float)
     if requirement_arcmin is not None and values.min() < requirement_arcmin < values.max():

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from hdopt.report import Figure, KeyFigures, Report, Section, Table, Text
+from hdopt.report import Figure, Item, KeyFigures, Report, Section, Table, Text
 from hdopt.report.sections.diagnosis_residual import extended_name, plain_numbers, residual_section
 from hdopt.report.sections.words import in_sentence, label, listed, short
 from hdopt.report.theme import BLUE, GREEN, GREY, figure
@@ -23,7 +23,7 @@ NUMBERS = {"value": ".4g", "low": ".4g", "high": ".4g"}
 
 
 def diagnosis_report(diagnosis: Diagnosis, names: Sequence[str]) -> Report:
-    """One page on a diagnosis."""
+    """One page on a `diagnosis`; `names` are those of the recordings, for its heading."""
     sections = [
         verdict_section(diagnosis),
         proof_section(diagnosis),
@@ -34,7 +34,8 @@ def diagnosis_report(diagnosis: Diagnosis, names: Sequence[str]) -> Report:
 
 
 def verdict_section(diagnosis: Diagnosis) -> Section:
-    """The verdict, each effect with its size and parameters, what else it could be, what to measure next."""
+    """The verdict of a `diagnosis`: each effect with its size and parameters, what else it could be, what to measure
+    next."""
     import pandas as pd
 
     key_figures = {"Verdict": diagnosis.verdict}
@@ -44,7 +45,7 @@ def verdict_section(diagnosis: Diagnosis) -> Section:
     if diagnosis.where is not None:
         key_figures["Size"] = f"{short(diagnosis.where['rms_arcmin'])} arcmin rms"
         key_figures["Lives mostly in"] = str(diagnosis.where["domain"])
-    items = [KeyFigures(key_figures)]
+    items: list[Item] = [KeyFigures(key_figures)]
     for ids in diagnosis.ambiguous_with:
         alone = " alone" if set(ids) < {found.id for found in diagnosis.effects} else ""
         items.append(Text(f"As good an explanation: {listed([in_sentence(label(name)) for name in ids])}{alone}."))
@@ -105,13 +106,14 @@ def waves_figure(effect: str, waves: Mapping[int, Parameter]) -> Figure:
 
 
 def parameter_row(heading: str, name: str, parameter: Parameter) -> dict[str, object]:
-    """One row of a table of parameters; a pure number has no unit to show."""
+    """One row of a table of parameters: `name` in the column `heading`, then value, interval and unit of the
+    `parameter`; a pure number has no unit to show."""
     unit = "" if parameter.unit == "1" else parameter.unit
     return {heading: name, "value": parameter.value, "low": parameter.low, "high": parameter.high, "unit": unit}
 
 
 def confounded_items(diagnosis: Diagnosis) -> list[Table | Text]:
-    """What could be mistaken for the effects found on this recording, and what would part them."""
+    """What could be mistaken for the effects that a `diagnosis` found, and what would part them."""
     import pandas as pd
 
     tie = diagnosis.evidence.settings.verdict.tie
@@ -137,7 +139,8 @@ def confounded_items(diagnosis: Diagnosis) -> list[Table | Text]:
 
 
 def proof_section(diagnosis: Diagnosis) -> Section:
-    """Held-out error of base, placebo, generic basis and explanation, over turns and over whole conditions."""
+    """Held-out error (arcmin rms) of base, placebo, generic basis and explanation in a `diagnosis`, over turns and over
+    whole conditions."""
     import plotly.graph_objects as go
 
     fit = diagnosis.fit
@@ -170,7 +173,7 @@ def proof_section(diagnosis: Diagnosis) -> Section:
         "catalogue. Generic basis: smooth curves and sines without physics. Noise floor: what is left with a "
         "generic basis beside the best explanation."
     )
-    items = [Figure("diagnosis-heldout", "Held-out error", chart, note)]
+    items: list[Item] = [Figure("diagnosis-heldout", "Held-out error", chart, note)]
     if diagnosis.each_condition:
         items.append(conditions_figure(diagnosis))
     before, after = fit["heldout_rms_base_arcmin"], fit["heldout_rms_extended_arcmin"]
@@ -184,7 +187,7 @@ def proof_section(diagnosis: Diagnosis) -> Section:
 
 
 def conditions_figure(diagnosis: Diagnosis) -> Figure:
-    """Error on each operating condition, predicted from the others."""
+    """Error (arcmin rms) on each operating condition of a `diagnosis`, predicted from the others."""
     import plotly.graph_objects as go
 
     names = list(diagnosis.each_condition)
@@ -202,10 +205,11 @@ def conditions_figure(diagnosis: Diagnosis) -> Figure:
 
 
 def limits_section(diagnosis: Diagnosis) -> Section:
-    """The drive's errors as fitted, what the recording leaves open, and what it would not have shown."""
+    """The drive's errors as a `diagnosis` fitted them, what the recording leaves open, and what it would not have
+    shown."""
     import pandas as pd
 
-    items: list[Table | Text] = []
+    items: list[Item] = []
     base = [parameter_row("error", name, parameter) for name, parameter in diagnosis.base.parameters.items()]
     if base:
         caption = "With 95 % intervals."

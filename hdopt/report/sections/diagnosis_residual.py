@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,8 @@ from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.recordings.passes import synchronous_average
 from hdopt.recordings.read import TURN
-from hdopt.report import Figure, Section, Table
+from hdopt.recordings.rows import Rows
+from hdopt.report import Figure, Item, Section, Table
 from hdopt.report.sections.words import listed, short
 from hdopt.report.theme import BLUE, GREY, VERMILLION, figure
 
@@ -21,6 +23,10 @@ if TYPE_CHECKING:
     from hdopt.diagnosis.checks.localization import Location
     from hdopt.diagnosis.verdict.diagnosis import Diagnosis
 
+
+Fits = Sequence[tuple[str, Fit, str]]
+"""Fits to one recording, each with its name in the legend and its colour: the drive alone first, then, where something
+was found, the drive with it. All have the same rows."""
 
 SIGNIFICANT = 0.01
 """A domain is shown where noise alone would look like it less often than this."""
@@ -39,12 +45,13 @@ CHANNELS = {
 
 
 def residual_section(diagnosis: Diagnosis) -> Section:
-    """Recording and model over two turns, the residual by domain, and a picture for each domain that stands out."""
+    """Recording and model of a `diagnosis` over two turns, the residual by domain, and a picture for each domain that
+    stands out."""
     selection = diagnosis.evidence.selection
     base, best = selection.base, selection.best.fit
-    fits = [("before", base, VERMILLION)] + ([("after", best, BLUE)] if extended_name(diagnosis) else [])
+    fits: Fits = [("before", base, VERMILLION)] + ([("after", best, BLUE)] if extended_name(diagnosis) else [])
     standing_out = [location for location in diagnosis.located if location.p <= SIGNIFICANT]
-    items = [waveform_figure(fits, extended_name(diagnosis))]
+    items: list[Item] = [waveform_figure(fits, extended_name(diagnosis))]
     if len(diagnosis.located):
         items.append(located_table(diagnosis.located))
     if not base.problem.rows.locked:
@@ -68,8 +75,8 @@ def residual_section(diagnosis: Diagnosis) -> Section:
 
 
 def extended_name(diagnosis: Diagnosis) -> str:
-    """What the extended model is called: it has effects, or, of an unknown cause, the best description. Empty where the
-    drive alone stands, or where all that was found is ripple on the rows as recorded."""
+    """What the extended model of a `diagnosis` is called: it has effects, or, of an unknown cause, the best
+    description. Empty where the drive alone stands, or where all that was found is ripple on the rows as recorded."""
     if not diagnosis.evidence.selection.best.fit.terms:
         return ""
     if diagnosis.effects:
@@ -78,7 +85,7 @@ def extended_name(diagnosis: Diagnosis) -> str:
 
 
 def located_table(located: tuple[Location, ...]) -> Table:
-    """Structure of the base's residual by domain."""
+    """Structure of the base's residual by domain, as `located`: at least one domain."""
     import pandas as pd
 
     return Table(
@@ -97,13 +104,13 @@ def located_table(located: tuple[Location, ...]) -> Table:
     )
 
 
-def domain_figure(domain: str, fits: list[tuple[str, Fit, str]]) -> Figure | None:
-    """The picture that shows one domain, or None where the figure by order shows it already."""
+def domain_figure(domain: str, fits: Fits) -> Figure | None:
+    """The picture that shows one `domain` of the residual of `fits`; None where the figure by order shows it
+    already."""
     samples = fits[0][1].problem.rows
-    if domain == "time":
-        return channel_figure(domain, continued(samples.time, samples.record), fits)
     if domain in CHANNELS:
-        return channel_figure(domain, getattr(samples, domain), fits)
+        values = _channel(domain, samples)
+        return None if values is None else channel_figure(domain, values, fits)
     if domain == "integer order":
         return turn_figure(fits)
     if domain in ("direction", "reversal"):
@@ -113,8 +120,11 @@ def domain_figure(domain: str, fits: list[tuple[str, Fit, str]]) -> Figure | Non
     return None
 
 
-def waveform_figure(fits: list[tuple[str, Fit, str]], extended: str) -> Figure:
-    """Recorded and modelled error where the explanation matters most: two input turns, in the order recorded."""
+def waveform_figure(fits: Fits, extended: str) -> Figure:
+    """Recorded error and that of `fits` where the explanation matters most: two input turns, in the order recorded.
+
+    `extended` names the last of two fits in the legend (`extended_name`).
+    """
     import plotly.graph_objects as go
 
     (_, base, _), (_, best, _) = fits[0], fits[-1]
@@ -143,15 +153,15 @@ def waveform_figure(fits: list[tuple[str, Fit, str]], extended: str) -> Figure:
     return Figure("diagnosis-waveform", "Recording and model", plain_numbers(chart), caption)
 
 
-def turn_figure(fits: list[tuple[str, Fit, str]]) -> Figure:
-    """Input-synchronous average of the residual."""
+def turn_figure(fits: Fits) -> Figure:
+    """Input-synchronous average of the residual of `fits`."""
     return _synchronous_figure(
         "diagnosis-turn", "Residual over one input turn", "input angle [deg]", TURN, np.degrees(1.0), fits
     )
 
 
-def output_turn_figure(fits: list[tuple[str, Fit, str]]) -> Figure:
-    """Output-synchronous average of the residual."""
+def output_turn_figure(fits: Fits) -> Figure:
+    """Output-synchronous average of the residual of `fits`."""
     ratio = fits[0][1].problem.rows.ratio
     return _synchronous_figure(
         "diagnosis-output-turn",
@@ -163,7 +173,7 @@ def output_turn_figure(fits: list[tuple[str, Fit, str]]) -> Figure:
     )
 
 
-def _synchronous_figure(key: str, title: str, axis: str, period: float, scale: float, fits) -> Figure:
+def _synchronous_figure(key: str, title: str, axis: str, period: float, scale: float, fits: Fits) -> Figure:
     import plotly.graph_objects as go
 
     chart = figure(axis, "mean residual [arcmin]")
@@ -175,8 +185,8 @@ def _synchronous_figure(key: str, title: str, axis: str, period: float, scale: f
     return Figure(key, title, plain_numbers(chart), caption)
 
 
-def spectrum_figure(fits: list[tuple[str, Fit, str]]) -> Figure:
-    """Residual by order, from the lowest that the record resolves."""
+def spectrum_figure(fits: Fits) -> Figure:
+    """Residual of `fits` by order, from the lowest that the record resolves to 0.4 of the rows in a turn."""
     samples = fits[0][1].problem.rows
     span = max(samples.span_turns, 1.0)
     lowest, highest = min(1.0 / span, 0.5), 0.4 * samples.rows_per_turn
@@ -192,7 +202,8 @@ def spectrum_figure(fits: list[tuple[str, Fit, str]]) -> Figure:
 
 
 def ripple_figure(before: Fit, after: Fit) -> Figure:
-    """Orders above what the averaged rows hold, on the rows as recorded."""
+    """Orders above what the averaged rows hold, on the rows as recorded: the residual `before` and `after` high orders
+    were fitted."""
     samples = before.problem.rows
     span = max(samples.span_turns, 1.0)
     probes = [("before", FitProbe(before), VERMILLION), ("after", FitProbe(after), BLUE)]
@@ -216,8 +227,8 @@ def _envelopes(probes: list[tuple[str, FitProbe, str]], lowest: float, highest: 
     return chart
 
 
-def reversal_figure(fits: list[tuple[str, Fit, str]]) -> Figure:
-    """Residual along each direction's passes, from the reversal on."""
+def reversal_figure(fits: Fits) -> Figure:
+    """Residual of `fits` along each direction's passes, from the reversal on."""
     import plotly.graph_objects as go
 
     samples = fits[0][1].problem.rows
@@ -240,8 +251,9 @@ def reversal_figure(fits: list[tuple[str, Fit, str]]) -> Figure:
     return Figure("diagnosis-reversal", "Residual after reversals", plain_numbers(chart), caption)
 
 
-def channel_figure(name: str, values: Array, fits: list[tuple[str, Fit, str]]) -> Figure:
-    """Means of the residual along a recorded channel."""
+def channel_figure(name: str, values: Array, fits: Fits) -> Figure:
+    """Means of the residual of `fits` along the channel `name` of `CHANNELS`, whose `values` (n,) are those of their
+    rows."""
     import plotly.graph_objects as go
 
     chart = figure(CHANNELS[name], "mean residual [arcmin]")
@@ -265,15 +277,24 @@ def means_along(values: Array, residual: Array, spread_log: bool = False) -> tup
     return np.array([values[p].mean() for p in parts]), np.array([residual[p].mean() for p in parts])
 
 
+def _channel(name: str, samples: Rows) -> Array | None:
+    """The values of a channel over all rows, (n,); None where the recordings do not have it."""
+    if name == "time":
+        return None if samples.time is None else continued(samples.time, samples.record)
+    return {"torque": samples.torque, "speed": samples.speed, "temperature": samples.temperature}[name]
+
+
 def continued(time: Array, record: Index) -> Array:
-    """`time` (n,) s from the start of the first recording, each recording going on where the one before it ended."""
+    """`time` (n,) s from the start of the first recording, each going on where the one before it ended; `record` (n,)
+    is the number of the recording that a row is from, 0 first."""
     starts = np.flatnonzero(np.diff(record, prepend=-1))
     ends = np.r_[starts[1:], len(time)] - 1
     lengths = time[ends] - time[starts]
-    return time - (time[starts] - np.r_[0.0, np.cumsum(lengths)[:-1]])[record]
+    moved: Array = (time[starts] - np.r_[0.0, np.cumsum(lengths)[:-1]])[record]
+    return time - moved
 
 
 def plain_numbers(chart: go.Figure) -> go.Figure:
-    """The figure with arcmin written out: 0.0008, not 800 micro."""
+    """`chart` with arcmin on its upright axes written out: 0.0008, not 800 micro."""
     chart.update_yaxes(exponentformat="none")
     return chart

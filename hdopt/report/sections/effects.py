@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.report import Figure, KeyFigures, Section, Table, Text
+from hdopt.report import Figure, Item, KeyFigures, Section, Table, Text
 from hdopt.report.sections.words import listed
 from hdopt.report.theme import BLUE, GREY, VERMILLION, faded, figure
 
@@ -34,9 +34,11 @@ def effects_section(
 
     `rows` as in `KinematicErrorResult.effects`; `theta` input angle over one full relative turn, rad, shape (n,);
     `base_arcmin` the base model's error there, `passes_arcmin` the extended model's by direction (+1, -1), each (n,).
+    `base_peak_to_peak_arcmin` and `peak_to_peak_arcmin` are the converged values of both; `notes` are sentences for
+    below, `key` names the section.
     """
     counted = [row["id"].replace("_", " ") for row in rows if row["counted"]]
-    items: list[Any] = [
+    items: list[Item] = [
         KeyFigures(
             {
                 "Base model": f"{base_peak_to_peak_arcmin:.3f} arcmin",

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from hdopt.report import KeyFigures, Picture, Section, Table, Text
+from hdopt.report import Item, KeyFigures, Picture, Section, Table, Text
 
 if TYPE_CHECKING:
     from hdopt.geometry.export import ExportResult
@@ -15,7 +16,8 @@ if TYPE_CHECKING:
 def geometry_section(
     result: ExportResult, drawing_svg: str, picture_png: bytes | None = None, *, key: str = "geometry"
 ) -> Section:
-    """The section of an export: `drawing_svg` and `picture_png` as the export wrote them."""
+    """The section of an export that gave `result`: `drawing_svg` (text) and `picture_png` (bytes; None for no picture)
+    as the export wrote them. `key` begins the keys of its figures and tables."""
     from hdopt.geometry.drawing import views_alone
 
     values = result.to_dict()
@@ -23,7 +25,7 @@ def geometry_section(
     figures = {"parts": str(len(made)), "fingerprint": result.identity.fingerprint}
     if result.profile_deviation_um is not None:
         figures["profile in the files, off the analytic curve"] = f"{result.profile_deviation_um:.2g} um at most"
-    items = [KeyFigures(figures)]
+    items: list[Item] = [KeyFigures(figures)]
     items.append(
         Picture(
             f"{key}-drawing",
@@ -39,7 +41,7 @@ def geometry_section(
     return Section(key, "Wave generator to be made", tuple(items), _summary(values))
 
 
-def _summary(values: dict) -> str:
+def _summary(values: Mapping[str, Any]) -> str:
     files = ", ".join(kind.upper() for kind in values["files"])
     if not files:
         return "The parts, their key dimensions and the tolerances that the study allows them."
@@ -49,7 +51,7 @@ def _summary(values: dict) -> str:
     )
 
 
-def _parts(key: str, made: list[dict]) -> Table:
+def _parts(key: str, made: Sequence[Mapping[str, Any]]) -> Table:
     rows = [(_words(part["name"]), part["volume_mm3"], *part["bounding_box_mm"]) for part in made]
     frame = pd.DataFrame(rows, columns=["part", "volume [mm³]", "x [mm]", "y [mm]", "z [mm]"])
     formats = {"volume [mm³]": ".3f", "x [mm]": ".4f", "y [mm]": ".4f", "z [mm]": ".4f"}

@@ -27,8 +27,8 @@ def lag_section(
     """Lag over the input angle `theta` (rad, even, one or more whole turns, shape (n,)).
 
     `lag_arcmin` is the whole, `parts` its parts by name, each of shape (n,); `interference` the share of the angles
-    where the teeth have no backlash left. What is below zero is shown as such, never clipped. Of several turns the
-    first is drawn, within the band of all.
+    where the teeth have no backlash left; `key` names the section. What is below zero is shown as such, never clipped.
+    Of several turns the first is drawn, within the band of all.
     """
     lag_arcmin = np.asarray(lag_arcmin, float)
     says = f"The output lags by {lag_arcmin.mean():.3f} arcmin on average when the input reverses"

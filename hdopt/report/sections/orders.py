@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hdopt.arrays import Array
-from hdopt.report import Figure, Section, Table, Text
+from hdopt.arrays import Array, Mask
+from hdopt.report import Figure, Item, Section, Table, Text
 from hdopt.report.sections.words import listed
 from hdopt.report.theme import PALETTE, figure
 
@@ -30,10 +30,11 @@ def spectrum_section(
 ) -> Section:
     """Amplitudes at exact orders.
 
-    `orders` cycles per input turn, `amplitude_arcmin` half of each order's swing, both of shape (n,); `expressions`
-    how each order is written ('2(1 + 1/N)'), `origins` the physics it comes from. Equal `kinds` share a colour and a
-    place in the legend (at most seven; the origins, where none are given). `interference` is a table of orders that
-    the record is too short to tell apart, where there are any.
+    `ratio` is the reduction N. `orders` cycles per input turn, `amplitude_arcmin` half of each order's swing, both of
+    shape (n,); `expressions` how each order is written ('2(1 + 1/N)'), `origins` the physics it comes from. Equal
+    `kinds` share a colour and a place in the legend (at most seven; the origins, where none are given). `interference`
+    is a table of orders that the record is too short to tell apart, where there are any. `key` begins the keys of its
+    figures.
     """
     import pandas as pd
 
@@ -42,7 +43,7 @@ def spectrum_section(
     frame = pd.DataFrame(
         {"order": orders, "written": list(expressions), "amplitude_arcmin": amplitude_arcmin, "origin": list(origins)}
     )
-    items = [
+    items: list[Item] = [
         Figure(
             f"{key}-stems",
             "Order spectrum",
@@ -77,20 +78,24 @@ def _stems(
     around_two = np.abs(orders - 2) < 3.5 / ratio
     span = float(orders.max()) * 1.04 + 0.2
     near = np.abs(orders[:, None] - orders) < 0.06 * span
-    outshone = (near & (amplitude_arcmin[None, :] > amplitude_arcmin[:, None])).any(axis=1)
+    outshone: Mask = np.any(near & (amplitude_arcmin[None, :] > amplitude_arcmin[:, None]), axis=1)
     top = float(amplitude_arcmin.max()) * 1.18
     made = _two_panels(span, top, ratio)
     for colour, kind in zip(PALETTE * 3, dict.fromkeys(kinds), strict=False):
         mine = np.array([name == kind for name in kinds])
-        panels = [("x", "y", mine, True, ~outshone), ("x2", "y2", mine & around_two, False, around_two)]
+        panels: list[tuple[str, str, Mask, bool, Mask]] = [
+            ("x", "y", mine, True, np.logical_not(outshone)),
+            ("x2", "y2", mine & around_two, False, around_two),
+        ]
         for xaxis, yaxis, chosen, legend, named in panels:
             if not chosen.any():
                 continue
             x, y = orders[chosen], amplitude_arcmin[chosen]
             gap = np.full_like(x, np.nan)
-            place: dict[str, Any] = {"xaxis": xaxis, "yaxis": yaxis, "name": kind, "legendgroup": kind}
+            places = np.flatnonzero(chosen).tolist()
+            panel: dict[str, Any] = {"xaxis": xaxis, "yaxis": yaxis, "name": kind, "legendgroup": kind}
             made.add_scatter(
-                **place,
+                **panel,
                 x=np.stack([x, x, gap], axis=1).ravel(),
                 y=np.stack([0 * y, y, gap], axis=1).ravel(),
                 mode="lines",
@@ -99,16 +104,16 @@ def _stems(
                 hoverinfo="skip",
             )
             made.add_scatter(
-                **place,
+                **panel,
                 x=x,
                 y=y,
                 mode="markers+text",
                 marker={"color": colour, "size": 9},
-                text=[expressions[i] if named[i] else "" for i in np.flatnonzero(chosen)],
+                text=[expressions[i] if named[i] else "" for i in places],
                 textposition="top center",
                 textfont={"color": colour, "size": 12},
                 showlegend=legend,
-                customdata=[(expressions[i], origins[i]) for i in np.flatnonzero(chosen)],
+                customdata=[(expressions[i], origins[i]) for i in places],
                 cliponaxis=False,
                 hovertemplate="order %{customdata[0]} = %{x:.4f}<br>%{y:.4f} arcmin<br>%{customdata[1]}<extra></extra>",
             )

@@ -35,7 +35,8 @@ def profiles_section(
 
     `phi` angle from the major axis over one turn, rad, shape (n,); `deflection_mm` profile -> r(phi) - R, and
     `curvature_change_per_mm` profile -> change of curvature of the ring's neutral line, both of shape (n,);
-    `undeformed_radius_mm` R. `summary` has a row a profile with the column `profile` and any figures of merit.
+    `undeformed_radius_mm` R. `summary` has a row a profile with the column `profile` and any figures of merit. `key`
+    begins the keys of its figures.
     """
     times = EXAGGERATED * undeformed_radius_mm / max(float(np.abs(w).max()) for w in deflection_mm.values())
     change = {name: 1000 * values for name, values in curvature_change_per_mm.items()}
@@ -82,7 +83,7 @@ def profiles_section(
 
 
 def _comparison(peaks: Mapping[str, float]) -> str:
-    gentle, harsh = min(peaks, key=peaks.get), max(peaks, key=peaks.get)
+    gentle, harsh = min(peaks, key=lambda name: peaks[name]), max(peaks, key=lambda name: peaks[name])
     says = f"{label(gentle)}: the curvature changes by {peaks[gentle]:.2f} × 10⁻³/mm at most"
     if len(peaks) == 1:
         return f"{says}; bending stress grows in proportion."

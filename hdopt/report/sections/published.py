@@ -26,7 +26,8 @@ def published_section(
 
     `frame` has a row a case: `case`, `published_arcmin`, `sampled_arcmin` (computed on the published sampling) and
     `converged_arcmin` (nan where it has no meaning); further columns are shown in the table. `sampling` names that
-    sampling, `source` the publication.
+    sampling, `source` the publication. Cases whose sampled value is within `tolerance_arcmin` of the published one
+    count as reproduced; `key` names the section.
     """
     difference = (frame["sampled_arcmin"] - frame["published_arcmin"]).rename("difference_arcmin")
     excess = 100 * (frame["converged_arcmin"] / frame["sampled_arcmin"] - 1)

@@ -49,7 +49,11 @@ def trade_sections(
     perturbed: Sequence[Perturbation],
     file: str,
 ) -> tuple[Section, ...]:
-    """All sections of the trade report, in reading order. `file` is the chosen design's study file."""
+    """All sections of the trade report, in reading order.
+
+    `result` is that of the search, `views` its map and rings, `checked` its best design checked by other means,
+    `perturbed` what each constant of the trade changes; `file` is the name of the chosen design's study file.
+    """
     return (
         chosen_section(result, file),
         *(front_section(result, front) for front in result.fronts),
@@ -61,11 +65,12 @@ def trade_sections(
 
 
 def name_of(design: DesignRecord) -> str:
+    """Profile and structure of a `design`: 'Two-disk, integral'."""
     return f"{label(design.profile)}, {in_sentence(label(design.structure))}"
 
 
 def hover(design: DesignRecord) -> str:
-    """All of a design for a hover label."""
+    """All of a `design` for a hover label: its variables and quantities, a line each, as HTML."""
     lines = [f"<b>{name_of(design)}</b>"]
     lines += [f"{VARIABLES[k][0]} {number(v, VARIABLES[k][1])}" for k, v in design.variables.items()]
     shown = [key for key in PARALLEL if key in design.quantities]
@@ -74,6 +79,8 @@ def hover(design: DesignRecord) -> str:
 
 
 def chosen_section(result: SearchResult, file: str, key: str = "trade-chosen") -> Section:
+    """The best design of a `result` against the study's own drive: what it gains and pays, what holds it, and every
+    combination at its own best. `file` is the name of its study file, `key` begins the keys of the tables."""
     best, baseline = result.best, result.baseline
     objective = find_quantity(result.objective)
     after, before = best.quantities[result.objective], baseline.quantities[result.objective]
@@ -164,7 +171,7 @@ def _combinations(result: SearchResult) -> pd.DataFrame:
 
 
 def front_section(result: SearchResult, front: Front) -> Section:
-    """One front: each combination's own, the designs no other beats, baseline and chosen design."""
+    """One `front` of a `result`: each combination's own, the designs no other beats, baseline and chosen design."""
     key = f"trade-front-{'robust' if front.objective == ROBUST else 'nominal'}"
     x_quantity, y_quantity = find_quantity(front.second), find_quantity(front.objective)
     made = figure(_axis(x_quantity), _axis(y_quantity), height=520)
@@ -224,7 +231,8 @@ def _axis(quantity: Quantity) -> str:
 
 
 def designs_section(result: SearchResult, key: str = "trade-designs") -> Section:
-    """Parallel coordinates of all designs of the fronts, the baseline and the chosen one among them."""
+    """Parallel coordinates of all designs of the fronts of a `result`, the baseline and the chosen one among them;
+    `key` names the section."""
     found = [d for front in result.fronts for designs in front.by_combination.values() for d in designs]
     shown = list({(d.name, tuple(d.variables.items())): d for d in found}.values())
     every = [*shown, result.baseline, result.best]
@@ -310,7 +318,8 @@ def _parallel(axes: Sequence[Axis], shown: list[DesignRecord], result: SearchRes
 
 
 def map_section(result: SearchResult, seen: DesignMap, key: str = "trade-map") -> Section:
-    """Peak-to-peak over pressure angle and width about the chosen design, with the lines of its limits."""
+    """Peak-to-peak over pressure angle and width about the chosen design of a `result`, as `seen` on a grid, with the
+    lines of its limits; `key` names the section."""
     limits = [MapLimit(str(limit), grid, limit.bound) for limit, grid in seen.limits]
     chosen, baseline = result.best.variables, result.baseline.variables
     made = design_map(
@@ -341,8 +350,8 @@ def map_section(result: SearchResult, seen: DesignMap, key: str = "trade-map") -
 
 
 def rings_section(result: SearchResult, rings: Rings) -> Section:
-    """Curvature change along the ring for each profile's own best design."""
-    best = {}
+    """Curvature change along the ring for each profile's own best design in a `result`; `rings` holds their curves."""
+    best: dict[str, tuple[tuple[bool, float], DesignRecord]] = {}
     for design in result.combinations:
         rank = (not design.feasible, design.quantities[result.objective])
         if design.profile not in best or rank < best[design.profile][0]:
@@ -367,7 +376,8 @@ def rings_section(result: SearchResult, rings: Rings) -> Section:
 def confidence_section(
     result: SearchResult, checked: Verification, perturbed: Sequence[Perturbation], key: str = "trade-confidence"
 ) -> Section:
-    """The choice checked by other means, and each constant of the trade changed."""
+    """The choice of a `result` as `checked` by other means, and `perturbed`: each constant of the trade changed, with
+    what is best then; `key` names the section."""
     objective = find_quantity(result.objective)
     share = round(100 * result.setup.settings.perturbation)
     return Section(
@@ -418,13 +428,15 @@ def _checked_figures(checked: Verification) -> dict[str, str]:
         "Exact geometry": f"{checked.exact_arcmin:.4f} arcmin",
         "Compiled kernel": f"{checked.kernel_arcmin:.4f} arcmin",
     }
-    if checked.quantile_arcmin is not None:
-        values |= {
-            f"{100 * checked.quantile:g} % quantile, fresh drives": f"{checked.quantile_arcmin:.4f} arcmin",
-            "its 95 % interval": f"{checked.low:.4f} to {checked.high:.4f}",
-        }
-    if checked.searched_arcmin is not None:
-        values["in the search"] = f"{checked.searched_arcmin:.4f} arcmin"
+    fresh = checked.fresh
+    if fresh is None:
+        return values
+    values |= {
+        f"{100 * fresh.quantile:g} % quantile, fresh drives": f"{fresh.quantile_arcmin:.4f} arcmin",
+        "its 95 % interval": f"{fresh.low:.4f} to {fresh.high:.4f}",
+    }
+    if fresh.searched_arcmin is not None:
+        values["in the search"] = f"{fresh.searched_arcmin:.4f} arcmin"
     return values
 
 

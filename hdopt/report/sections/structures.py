@@ -29,7 +29,8 @@ def structures_section(
 
     `frame` has a row a structure with the columns `structure` and `peak_to_peak_arcmin`, and where lag is known
     `lag_mean_arcmin`, `lag_min_arcmin`, `lag_max_arcmin`; further columns are shown in the table. `waveforms` is
-    (theta in rad, structure -> error in arcmin), drawn over the span of `theta`.
+    (theta in rad, structure -> error in arcmin), drawn over the span of `theta`. `requirement_arcmin` is drawn as a
+    line; `key` begins the keys of its figures.
     """
     items: list[Figure | Table] = [
         Figure(
@@ -46,8 +47,8 @@ def structures_section(
         items.append(Figure(f"{key}-waveforms", "One turn with each structure", _waveforms(*waveforms)))
     shown = frame.assign(structure=[label(name) for name in frame["structure"]])
     items.append(Table(f"{key}-table", "Structures", shown))
-    best = frame.loc[frame["peak_to_peak_arcmin"].idxmin()]
-    worst = frame.loc[frame["peak_to_peak_arcmin"].idxmax()]
+    sizes = frame["peak_to_peak_arcmin"].to_numpy(float)
+    best, worst = frame.iloc[int(np.nanargmin(sizes))], frame.iloc[int(np.nanargmax(sizes))]
     return Section(
         key,
         "Structures of the wave generator",

@@ -27,7 +27,7 @@ SMALLEST_SHARE = 0.0005
 
 
 def readable(name: str) -> str:
-    """'wg_tilt_major_deg' reads 'WG tilt major'; callouts keep their words."""
+    """The study key or callout `name` in words: 'wg_tilt_major_deg' reads 'WG tilt major'."""
     words = name.removesuffix("_mm").removesuffix("_deg").split("_")
     words = [word.upper() if word in ("wg", "cs", "fs") else word for word in words]
     text = " ".join(words)
@@ -162,7 +162,8 @@ def _contributions(shares: pd.DataFrame) -> go.Figure:
 
 
 def sobol_section(result: SobolResult, key: str = "sobol") -> Section:
-    """Sobol' indices with intervals, how they settle, and the strongest pairs; Shapley effects where there are some."""
+    """Sobol' indices of a `result` with their intervals, how they settle, and the strongest pairs; Shapley effects
+    where there are some. `key` names the section."""
     items: list[Item] = []
     most: list[str] = []
     if result.sobol is not None:

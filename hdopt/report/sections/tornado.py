@@ -22,7 +22,8 @@ def sensitivities_section(
     """Each variable alone moved to its low and its high value, the others at the base.
 
     `frame` has a row a variable: `variable` (its name in words), `low` and `high` (the two values, written out with
-    their unit), `low_arcmin` and `high_arcmin` (the result there). `base_arcmin` is the result with none moved.
+    their unit), `low_arcmin` and `high_arcmin` (the result there). `base_arcmin` is the result with none moved; `what`
+    says in words what the result is, `key` names the section.
     """
     swing = (frame[["low_arcmin", "high_arcmin"]].sub(base_arcmin)).abs().max(axis=1)
     ordered = frame.iloc[np.argsort(-swing.to_numpy(), kind="stable")].reset_index(drop=True)

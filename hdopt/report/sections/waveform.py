@@ -31,7 +31,8 @@ def waveform_section(
 
     `theta` input angle, rad, rising evenly over one relative turn of both splines, shape (n,), its end given or left
     out; `ke_arcmin` the error there, shape (n,), at least 90 points a turn. `peak_to_peak_arcmin` is the converged
-    value where the grid's own is not to be shown; `requirement_arcmin` is what it is held against.
+    value where the grid's own is not to be shown; `requirement_arcmin` is what it is held against. `key` begins the
+    keys of its figures.
     """
     turns = _by_turn(theta, ke_arcmin)
     peak_to_peak = float(np.ptp(ke_arcmin)) if peak_to_peak_arcmin is None else peak_to_peak_arcmin
@@ -80,7 +81,7 @@ def waveform_section(
 def _whole_turns(theta: Array) -> int:
     """Whole turns in a record, whose last angle may be the end of a turn or the last sample before it."""
     step = (theta[-1] - theta[0]) / (len(theta) - 1)
-    return max(1, math.floor((theta[-1] - theta[0] + 1.001 * step) / (2 * math.pi)))
+    return max(1, math.floor(float(theta[-1] - theta[0] + 1.001 * step) / (2 * math.pi)))
 
 
 def _extremes_by_turn(theta: Array, ke_arcmin: Array) -> tuple[Array, Array]:
@@ -98,7 +99,8 @@ def _by_turn(theta: Array, ke_arcmin: Array) -> Array:
     end = theta[0] + 2 * math.pi * turns
     if theta[-1] < end:  # the error repeats after a full relative turn
         theta, ke_arcmin = np.append(theta, end), np.append(ke_arcmin, ke_arcmin[0])
-    return np.interp(theta[0] + 2 * math.pi * np.arange(turns)[:, None] + grid, theta, ke_arcmin)
+    wanted: Array = theta[0] + 2 * math.pi * np.arange(turns)[:, None] + grid
+    return np.asarray(np.interp(wanted, theta, ke_arcmin), float)
 
 
 def _beat(theta: Array, ke_arcmin: Array, peak_to_peak: float) -> go.Figure:

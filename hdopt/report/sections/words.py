@@ -21,12 +21,12 @@ def label(name: str) -> str:
 
 
 def in_sentence(name: str) -> str:
-    """A heading as it stands within a sentence: its first letter small, unless it begins an abbreviation."""
+    """The heading `name` as it stands within a sentence: its first letter small, unless it begins an abbreviation."""
     return name[:1].lower() + name[1:] if name[1:2].islower() or name[1:2] == " " else name
 
 
 def short(value: float) -> str:
-    """Three digits, and a large number written out: '0.0153', '1784'."""
+    """`value` in three digits, and a large number written out: '0.0153', '1784'."""
     return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
 
 
