@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from hdopt.report import KeyFigures, Section, Table, Text
+from hdopt.studies.sections import ConcealedSection
 from hdopt.study import Study
 from hdopt.workflow.steps import Context, StepResult
 
@@ -19,7 +20,7 @@ def concealed_physics(study: Study, context: Context) -> StepResult:
     from hdopt.parallel.engine import engine_from, for_large_items
     from hdopt.recordings.read import recording_from_table
 
-    size = study.section("concealed", "concealed-physics")
+    size = study.section("concealed", ConcealedSection, "concealed-physics")
     drive = study.drive
     ratio = drive.geometry.ratio
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from hdopt.errors import HdoptError
 from hdopt.report import Section, Table, Text
+from hdopt.studies.sections import ResidualsSection
 from hdopt.study import Study
 from hdopt.workflow.steps import Context, StepResult
 
@@ -39,7 +40,7 @@ def real_residuals(study: Study, context: Context) -> StepResult:
     """
     import pandas as pd
 
-    size = study.section("residuals", "real-residuals")
+    size = study.section("residuals", ResidualsSection, "real-residuals")
     cases = pd.DataFrame(list(answered_cases(study.drive, size, recordings_folder(), context.seed)))
     table = (
         cases.groupby(["noise", "severity"])
