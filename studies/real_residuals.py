@@ -107,8 +107,8 @@ def answered_cases(drive, size, folder: Path, seed: int) -> Iterator[dict[str, o
 
 
 def judged(noise: str, hidden: str, severity: float, diagnosis) -> dict[str, object]:
-    """One case: answered exactly (nothing said where nothing is), among the explanations offered, `unknown`, or wrong:
-    a name for what is not there."""
+    """One case: answered exactly (nothing said where nothing is), among the explanations offered (said beside more that
+    is `unknown`, too), `unknown`, or wrong: a name for what is not there."""
     said = tuple(sorted(found.id for found in diagnosis.effects))
     truth = (hidden,) if hidden else ()
     offered = {said, *(tuple(sorted(ids)) for ids in diagnosis.ambiguous_with)}
@@ -121,7 +121,7 @@ def judged(noise: str, hidden: str, severity: float, diagnosis) -> dict[str, obj
         "verdict": diagnosis.verdict,
         "said": ", ".join(said),
         "exact": exact,
-        "among": truth in offered and not unknown,
+        "among": truth in offered and bool(truth or not unknown),
         "unknown": unknown,
         "wrong": bool(said) and truth not in offered,
     }

@@ -69,6 +69,13 @@ def test_no_function_is_longer_than_sixty_lines():
     assert KERNELS.keys() <= long
 
 
+def test_test_files_have_names_of_their_own():
+    """Would catch two files of one name in folders that are no packages: one of them is then not collected."""
+    tests = Path(__file__).resolve().parents[1]
+    loose = [file.name for file in tests.rglob("test_*.py") if not (file.parent / "__init__.py").exists()]
+    assert [name for name, n in Counter(loose).items() if n > 1] == []
+
+
 def test_docstrings_name_every_argument():
     left: Counter[str] = Counter()
     for path, tree in TREES.items():

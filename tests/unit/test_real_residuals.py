@@ -49,6 +49,9 @@ def diagnosis(verdict, effects=(), ambiguous_with=()):
         ("hysteresis", diagnosis("named", ["hysteresis"]), True, True, False, False),
         ("hysteresis", diagnosis("ambiguous", ["lost_motion"], (("hysteresis",),)), False, True, False, False),
         ("hysteresis", diagnosis("named", ["hysteresis", "lost_motion"]), False, False, False, True),
+        ("hysteresis", diagnosis("unknown", ["hysteresis"]), False, True, True, False),
+        ("hysteresis", diagnosis("unknown"), False, False, True, False),
+        ("hysteresis", diagnosis("unknown", ["lost_motion"]), False, False, True, True),
         ("hysteresis", diagnosis("adequate"), False, False, False, False),
     ],
 )
