@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hdopt.cli.common import OutputFile, drive_option, emit, json_option, seed_option, set_option
-from hdopt.files import to_csv, write_text
 
 if TYPE_CHECKING:
     from hdopt.workflow.compare import CompareResult
@@ -44,20 +43,14 @@ def command(cam: str, study: str | None, drive: str | None, overrides: tuple[str
     The study that --write-study writes goes to `hdopt ke` and `hdopt stack`.
     """
     from hdopt.study import load_study
-    from hdopt.workflow.compare import compare, write_measured_study
+    from hdopt.workflow.compare import compare, write_comparison
 
     loaded = load_study(study, overrides, drive)
     result = compare(
         loaded, cam, probe_radius_mm=options["probe_radius_mm"], surface=options["surface"], part=options["part"]
     )
-    if options["csv_file"]:
-        write_text(options["csv_file"], to_csv(result.to_frame()))
-    if options["plot"]:
-        from hdopt.geometry.deviation_plot import deviation_plot
-
-        title = f"{result.part} of {result.study}, measured"
-        write_text(options["plot"], deviation_plot(result.fit, result.zone, title, str(cam)))
-    table = write_measured_study(loaded, result, options["write_study"]) if options["write_study"] else None
+    wanted = {"csv": options["csv_file"], "plot": options["plot"], "study": options["write_study"]}
+    table = write_comparison(result, {kind: path for kind, path in wanted.items() if path}, loaded, cam)
     emit(result.to_dict(), options["json_file"], _lines(result, options["write_study"], table))
     return 0 if result.met else 1
 

@@ -29,17 +29,14 @@ def command(
     Indexed by input angle and output angle. Fitted to REC, chosen and judged on recordings, output turns or reversals
     that the fit did not see. Exit status 1, and no file, where it would be no better than nothing beyond chance.
     """
-    from hdopt.compensation.writers import FORMATS, written
-    from hdopt.files import write_text
-    from hdopt.workflow.compensate import compensate
+    from hdopt.compensation.writers import FORMATS
+    from hdopt.workflow.compensate import compensate, write_compensation
 
-    source = given.source()
-    found = compensate(source.read_all(given.recordings), source.drive, terms, seed)
+    found = compensate(given.recordings, given.source(), terms, seed)
     ending = output.suffix.lower().lstrip(".")
     form = form or (ending if ending in FORMATS else "csv")
     try:
-        if found.worth:
-            write_text(output, written(found.found, form, found.facts()))
+        write_compensation(found, {form: output})
     finally:
         emit(found.to_dict(str(output) if found.worth else None), json_file, _lines(found, output))
     return 0 if found.worth else 1

@@ -46,22 +46,16 @@ def command(
     REC are files of one drive, of any format that `hdopt inspect` reads, fitted jointly. Exit status 0 whenever a
     verdict was reached.
     """
-    from hdopt.diagnosis import diagnose
+    from hdopt.workflow.diagnose import diagnose, write_diagnosis
 
     asked = tuple(name.strip() for name in nuisance.split(",") if name.strip())
     source = given.source()
-    diagnosis = diagnose(source.read_all(given.recordings), source.drive, source.ratio, seed=seed, nuisance=asked)
+    read = source.recordings(given.recordings)
+    diagnosis = diagnose(read, source, seed=seed, nuisance=asked)
+    wanted = {"report": report_file, "study": study_file}
+    files = {kind: path for kind, path in wanted.items() if path is not None}
     try:
-        if report_file is not None:
-            from hdopt.files import write_text
-            from hdopt.report.html import render
-            from hdopt.report.sections.diagnosis import diagnosis_report
-
-            write_text(report_file, render(diagnosis_report(diagnosis, [path.name for path in given.recordings])))
-        if study_file is not None:
-            from hdopt.workflow.write_fitted import write_study
-
-            write_study(diagnosis, given.drive, study_file)
+        write_diagnosis(diagnosis, files, [recording.name for recording in read], source)
     finally:
         # A file that cannot be written after minutes of work must not take the answer with it.
         emit(diagnosis.to_dict(), json_file, _lines(diagnosis))

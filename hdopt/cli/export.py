@@ -72,15 +72,13 @@ def command(
     then none is left. Without a file, the key dimensions are printed and nothing is written.
     """
     from hdopt.geometry.check import CheckFailed
-    from hdopt.workflow.allocation_file import read_allocation
     from hdopt.workflow.export import export
 
     chosen = [f"wave_generator.structure={structure}"] if structure else []
     chosen += ["export.context=true"] if context else []
     loaded = asked.load(*chosen)
-    tolerances = read_allocation(Path(allocation), loaded) if allocation else None
     try:
-        result = export(loaded, files, tolerances)
+        result = export(loaded, files, allocation)
     except CheckFailed as failed:
         print(f"hdopt: {failed}", file=sys.stderr)
         return 1

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from hdopt.cli.common import OutputFile, answer_options, emit, engine_option
-from hdopt.cli.recorded import RecordingOptions, Source, recording_options
+from hdopt.cli.recorded import RecordingOptions, recording_options
 
 if TYPE_CHECKING:
     from hdopt.recordings.sheet import Batch, Inspection
@@ -38,70 +38,43 @@ def command(given: RecordingOptions, **options: Any) -> int:
     ROS bags, PHD2 guide logs, .mf4. Exit status 1 with --check where a limit is missed.
     """
     from hdopt.recordings.decision import parse_limits
-    from hdopt.workflow.requirement import required_limits
+
+    limits = parse_limits(options["limits"]) or None
+    return (_each if options["each"] else _one)(given, limits, options)
+
+
+def _one(given: RecordingOptions, limits: dict[str, float] | None, options: dict[str, Any]) -> int:
+    from hdopt.workflow.acceptance_sheet import SheetLabel
+    from hdopt.workflow.inspect import inspect, write_inspection
 
     source = given.source()
-    limits = parse_limits(options["limits"])
-    if not limits and source.study is not None:
-        limits = required_limits(source.study)
-    if options["each"]:
-        return _each(source, given.recordings, limits, options)
-    return _one(source, given.recordings, limits, options)
-
-
-def _one(source: Source, paths: Sequence[Path], limits: dict[str, float], options: dict[str, Any]) -> int:
-    from hdopt.workflow.inspect import inspect
-
-    mountings = [name.strip() for name in (options["mountings"] or "").split(",") if name.strip()]
     found = inspect(
-        source.read_all(paths),
-        source.drive,
+        given.recordings,
+        source,
         limits,
         speed_rpm=options["speed_rpm"],
-        mountings=mountings,
-        serial=options["serial"],
-        conditions=options["conditions"],
+        mountings=[name.strip() for name in (options["mountings"] or "").split(",") if name.strip()],
+        label=SheetLabel(options["serial"], options["conditions"]),
         seed=options["seed"],
     )
     try:
-        _write(found, source, paths, options)
+        write_inspection(found, _files(options), given.recordings, source)
     finally:
         emit(found.to_dict(), options["json_file"], _lines(found))
     return 1 if options["check"] and found.missed else 0
 
 
-def _write(found: Inspection, source: Source, paths: Sequence[Path], options: dict[str, Any]) -> None:
-    from hdopt.files import to_csv, write_text
-
-    if options["csv_file"] is not None:
-        write_text(options["csv_file"], to_csv(found.to_frame()))
-    if options["report_file"] is not None:
-        from hdopt.report.html import render
-        from hdopt.report.sections.inspection import inspection_report
-
-        write_text(options["report_file"], render(inspection_report(found)))
-    if options["bench_out"] is not None:
-        from hdopt.recordings.bench import bench_text
-        from hdopt.recordings.read import read_channels
-
-        channels = read_channels(paths[0], source.columns, source.bench)
-        write_text(options["bench_out"], bench_text(channels.columns, source.ratio))
+def _files(options: dict[str, Any]) -> dict[str, Path]:
+    wanted = {"csv": options["csv_file"], "report": options["report_file"], "bench": options["bench_out"]}
+    return {kind: path for kind, path in wanted.items() if path is not None}
 
 
-def _each(source: Source, paths: Sequence[Path], limits: dict[str, float], options: dict[str, Any]) -> int:
-    from hdopt.workflow.inspect_many import inspect_many
+def _each(given: RecordingOptions, limits: dict[str, float] | None, options: dict[str, Any]) -> int:
+    from hdopt.workflow.inspect_many import inspect_many, write_batch
 
-    batch = inspect_many(paths, source.read, source.drive, limits, options["seed"])
-    from hdopt.files import to_csv, write_text
-
+    batch = inspect_many(given.recordings, given.source(), limits, options["seed"])
     try:
-        if options["csv_file"] is not None:
-            write_text(options["csv_file"], to_csv(batch.to_frame()))
-        if options["report_file"] is not None:
-            from hdopt.report.html import render
-            from hdopt.report.sections.inspection import batch_report
-
-            write_text(options["report_file"], render(batch_report(batch)))
+        write_batch(batch, _files(options))
     finally:
         emit(batch.to_dict(), options["json_file"], _batch_lines(batch))
     return 1 if options["check"] and batch.missed else 0

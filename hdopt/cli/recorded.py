@@ -1,9 +1,9 @@
-"""What the commands that read recordings share: their options, and how files become recordings of one drive."""
+"""What the commands that read recordings share: their options, as one record."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -11,33 +11,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 if TYPE_CHECKING:
-    from hdopt.drive.geometry import Drive
-    from hdopt.recordings.bench import Bench
-    from hdopt.recordings.recording import Recording
-    from hdopt.study import Study
+    from hdopt.workflow.recorded_drive import RecordedDrive
 
 R = TypeVar("R")
-
-
-@dataclass(frozen=True)
-class Source:
-    """The drive that was recorded, its `ratio`, its `study` (None without one), and how its files are laid out."""
-
-    drive: Drive | None
-    study: Study | None
-    ratio: float
-    columns: str | None
-    bench: Bench | None
-
-    def read(self, path: Path) -> Recording:
-        """One recording of this drive."""
-        from hdopt.recordings.read import read_recording
-
-        return read_recording(path, self.ratio, self.columns, self.bench)
-
-    def read_all(self, paths: Iterable[Path]) -> list[Recording]:
-        """The recordings of this drive in `paths`, in their order."""
-        return [self.read(path) for path in paths]
 
 
 @dataclass(frozen=True)
@@ -51,9 +27,11 @@ class RecordingOptions:
     columns: str | None
     bench_file: Path | None
 
-    def source(self) -> Source:
+    def source(self) -> RecordedDrive:
         """What was recorded and how; `HdoptError` where the options disagree or no ratio is known."""
-        return source_of(self.drive, self.ratio, self.columns, self.bench_file)
+        from hdopt.workflow.recorded_drive import recorded_drive
+
+        return recorded_drive(self.drive, self.ratio, self.columns, self.bench_file)
 
 
 def recording_options(command: Callable[..., R]) -> Callable[..., R]:
@@ -96,26 +74,3 @@ def recording_options(command: Callable[..., R]) -> Callable[..., R]:
     for option in reversed(options):
         decorated = option(decorated)
     return decorated
-
-
-def source_of(drive: str, ratio: float | None, columns: str | None, bench_file: Path | None) -> Source:
-    """What was recorded and how: `drive` a shipped name, a study file or "none"; `ratio`, `columns` and `bench_file` as
-    the options have them. Raises `HdoptError` where they disagree or no ratio is known."""
-    from hdopt.errors import HdoptError
-    from hdopt.recordings.bench import load_bench
-    from hdopt.study import load_study, shipped_drives
-
-    bench = load_bench(bench_file) if bench_file is not None else None
-    stated = ratio if ratio is not None else (bench.ratio if bench is not None else None)
-    if drive == "none":
-        if stated is None:
-            raise HdoptError("--drive none needs the gear's ratio; give --ratio X, or ratio in the bench file")
-        return Source(None, None, stated, columns, bench)
-    study = load_study(drive=drive) if drive in shipped_drives() else load_study(drive)
-    own = float(study.drive.geometry.ratio)
-    if stated is not None and abs(stated - own) > 1e-9:
-        raise HdoptError(
-            f"the ratio given is {stated:g}, that of the drive {drive} is {own:g}; give the drive that was recorded, "
-            "or --drive none with the ratio"
-        )
-    return Source(study.drive, study, own, columns, bench)

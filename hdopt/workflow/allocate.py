@@ -10,7 +10,7 @@ from hdopt.errors import HdoptError, unknown_name
 from hdopt.parallel.engine import Engine
 from hdopt.study import AnyStudy, Study, as_study
 from hdopt.tolerance.intervals import IntervalEstimate
-from hdopt.workflow.stack import StudyProblem, study_problem
+from hdopt.workflow.stack import ToleranceProblem, study_problem
 
 if TYPE_CHECKING:
     from hdopt.allocation.convex import Item
@@ -123,7 +123,7 @@ def _allocate_drive(study: Study, request: AllocationRequest, progress: Progress
 
 
 def _drive_result(
-    stated: StudyProblem,
+    stated: ToleranceProblem,
     problem: AllocationProblem,
     request: AllocationRequest,
     decided: tuple[Allocation, dict[str, str]],

@@ -5,20 +5,23 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from hdopt.errors import HdoptError, unknown_name
-from hdopt.files import replacing_all
+from hdopt.files import replacing_all, to_csv, write_text
 from hdopt.geometry.compare import CamFit, fit_cam, read_cam, table_of
 from hdopt.geometry.contour import Contour
 from hdopt.geometry.dimensions import tolerance_bounds
 from hdopt.geometry.job import Job, make_job
-from hdopt.study import Study
+from hdopt.study import AnyStudy, Study, as_study
 from hdopt.workflow.export import export_options
+from hdopt.workflow.output_files import Files, checked_files
 
 Surface = Literal["cam", "bearing"]
+FILES = ("csv", "plot", "study")
 
 
 @dataclass(frozen=True)
@@ -76,25 +79,48 @@ class CompareResult:
 
 
 def compare(
-    study: Study,
+    study: AnyStudy,
     measured: str | Path,
     *,
     probe_radius_mm: float = 0.0,
     surface: Surface = "cam",
     part: str | None = None,
+    files: Files | None = None,
 ) -> CompareResult:
-    """Lay the measured cam of a CSV file onto the cam that a study designs.
+    """Lay the measured cam of a CSV file onto the cam that a `study`, or its name or path, designs.
 
     `measured` has angle_deg,radius_mm or x_mm,y_mm of the centre of a ball of `probe_radius_mm` mm; `surface` says
-    whether the cam itself was measured or the outside of the bearing on it; `part` is one of two discs. Raises
-    `HdoptError` for points that are not of this cam.
+    whether the cam itself was measured or the outside of the bearing on it; `part` is one of two discs. `files`
+    to write: {"csv": PATH} the deviation of every point, {"plot": PATH} an SVG of them, {"study": PATH} the study with
+    the measured cam. Raises `HdoptError` for points that are not of this cam, and before any work where a file cannot
+    be written.
     """
+    study, wanted = as_study(study), checked_files(files, FILES)
     bounds = tolerance_bounds(study.data)
     job = make_job(study.drive, export_options(study), study.name, bounds, study.data.get("contributors"))
     name, contour = _nominal(job, surface, part)
     fit = fit_cam(read_cam(Path(measured)), contour, probe_radius_mm)
     allowed = bounds.get("wg_eccentricity_mm")
-    return CompareResult(study.name, name, surface, probe_radius_mm, job.model.profile_zone, fit, allowed)
+    result = CompareResult(study.name, name, surface, probe_radius_mm, job.model.profile_zone, fit, allowed)
+    write_comparison(result, wanted, study, str(measured))
+    return result
+
+
+def write_comparison(result: CompareResult, files: Mapping[str, Path], study: Study, source: str) -> Path | None:
+    """Write of a comparison `result` what `files` asks for ("csv", "plot", "study" -> path).
+
+    `study` is the one that the cam was laid onto, `source` the name of the measured file for the plot. Returns the path
+    of the cam's table beside a study, None where none was asked for. Raises `HdoptError` where a file cannot be
+    written.
+    """
+    if "csv" in files:
+        write_text(files["csv"], to_csv(result.to_frame()))
+    if "plot" in files:
+        from hdopt.geometry.deviation_plot import deviation_plot
+
+        title = f"{result.part} of {result.study}, measured"
+        write_text(files["plot"], deviation_plot(result.fit, result.zone, title, source))
+    return write_measured_study(study, result, files["study"]) if "study" in files else None
 
 
 def _nominal(job: Job, surface: Surface, part: str | None) -> tuple[str, Contour]:

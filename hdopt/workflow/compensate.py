@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,14 @@ import numpy as np
 from hdopt.arrays import Array, Index, Mask
 from hdopt.compensation.pursuit import dictionary, pursue
 from hdopt.compensation.surface import Harmonics, Surface, grid_angles, surface_of
-from hdopt.compensation.writers import homing_arcmin
+from hdopt.compensation.writers import FORMATS, homing_arcmin, written
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
+from hdopt.files import write_text
 from hdopt.recordings.recording import TURN, Recording
 from hdopt.recordings.rows import Rows, gather, neighbours_for
+from hdopt.workflow.output_files import Files, checked_files
+from hdopt.workflow.recorded_drive import AnyDrive, AnyRecordings, recorded_drive
 from hdopt.workflow.waveform_fit import WaveformFit, fit_rows
 
 Found = Harmonics | Surface
@@ -122,13 +126,35 @@ def homing_words(homing: tuple[float, float]) -> str:
 
 
 def compensate(
-    recordings: Sequence[Recording], drive: Drive | None = None, terms: int = MOST_TERMS, seed: int = 1
+    recordings: AnyRecordings,
+    drive: AnyDrive = None,
+    terms: int = MOST_TERMS,
+    seed: int = 1,
+    files: Files | None = None,
 ) -> Compensated:
-    """What to subtract, from `recordings` of one drive.
+    """What to subtract, from `recordings` (files or records) of one drive.
 
-    `drive` None leaves the model out and takes harmonics alone. `terms` coefficients at most, 0 for a table over both
-    angles. `seed` for fits and resampling. Raises `HdoptError` where nothing moves or `terms` is out of range.
+    `drive`: its record, a study, a shipped name or the path of a study file; None leaves the model out and takes
+    harmonics alone. `terms` coefficients at most, 0 for a table over both angles. `seed` for fits and resampling.
+    `files` to write, where it is worth it: {"csv": PATH}, {"json": PATH} or {"c": PATH}. Raises `HdoptError` where
+    nothing moves or `terms` is out of range, and before any work where a file cannot be written.
     """
+    source, wanted = recorded_drive(drive), checked_files(files, FORMATS)
+    made = compensation_of(source.recordings(recordings), source.drive, terms, seed)
+    write_compensation(made, wanted)
+    return made
+
+
+def write_compensation(made: Compensated, files: Mapping[str, Path]) -> None:
+    """Write a compensation `made` in the formats that `files` asks for ("csv", "json", "c" -> path); nothing where it
+    would be no better than none beyond chance. Raises `HdoptError` where a file cannot be written."""
+    for form, path in files.items():
+        if made.worth:
+            write_text(path, written(made.found, form, made.facts()))
+
+
+def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms: int, seed: int) -> Compensated:
+    """The compensation from the records of `recordings`; `drive`, `terms`, `seed` and errors as for `compensate`."""
     if not 0 <= terms <= MOST_TERMS:
         raise HdoptError(f"--terms is {terms}; give 1 to {MOST_TERMS} coefficients, or 0 for a table")
     moving = [r for r in recordings if not r.input_locked]

@@ -2,58 +2,79 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
+from hdopt.files import to_csv, write_text
 from hdopt.recordings.capability import outliers, performance
 from hdopt.recordings.recording import Recording
 from hdopt.recordings.sheet import Batch, Unit
-from hdopt.workflow.inspect import inspect
+from hdopt.workflow.acceptance_sheet import acceptance_sheet
+from hdopt.workflow.inspect import limits_for
+from hdopt.workflow.output_files import Files, checked_files
+from hdopt.workflow.recorded_drive import AnyDrive, RecordedDrive, recorded_drive
+
+FILES = ("csv", "report")
 
 
 def inspect_many(
-    paths: Sequence[Path],
-    read: Callable[[Path], Recording],
-    drive: Drive | None,
-    limits: Mapping[str, float],
+    recordings: Sequence[Recording | str | Path],
+    drive: AnyDrive = None,
+    limits: Mapping[str, float] | None = None,
     seed: int = 1,
+    files: Files | None = None,
 ) -> Batch:
-    """Inspect each of `paths` as a drive of its own, on the engine in force.
+    """Inspect each of `recordings` (files or records) as a drive of its own, on the engine in force.
 
-    `read` turns a path into a recording; `drive` and `limits` as for `inspect`; `seed` for fits and intervals. A file
-    that cannot be read is a row that says so. Raises `HdoptError` where none can be read.
+    `drive` and `limits` as for `inspect`; `seed` for fits and intervals. A file that cannot be read is a row that says
+    so. `files` to write: {"csv": PATH} the table, {"report": PATH} one HTML page. Raises `HdoptError` where none can be
+    read, and before any work where a file cannot be written.
     """
     from hdopt.parallel.engine import engine_from
 
-    work = partial(_unit, read=read, drive=drive, limits=dict(limits), seed=seed)
-    units = list(engine_from(None).map(work, list(paths)))
+    source, wanted = recorded_drive(drive), checked_files(files, FILES)
+    limits = dict(limits_for(source, limits))
+    work = partial(_unit, source=source, limits=limits, seed=seed)
+    units = list(engine_from(None).map(work, list(recordings)))
     sound = [unit for unit in units if not unit.error]
     if not sound:
         raise HdoptError(f"none of {len(units)} recordings can be read; the first: {units[0].error[:200]}")
     values = [unit.peak_to_peak for unit in sound]
     far = {sound[k].name for k in outliers(values)}
     limit = limits.get("peak_to_peak")
-    return Batch(
+    batch = Batch(
         tuple(replace(unit, outlier=unit.name in far and not unit.error) for unit in units),
         limit,
         None if limit is None else performance(values, limit, seed),
     )
+    write_batch(batch, wanted)
+    return batch
 
 
-def _unit(
-    path: Path, read: Callable[[Path], Recording], drive: Drive | None, limits: dict[str, float], seed: int
-) -> Unit:
+def write_batch(batch: Batch, files: Mapping[str, Path]) -> None:
+    """Write of a `batch` of sheets what `files` asks for ("csv", "report" -> path). Raises `HdoptError` where a file
+    cannot be written."""
+    if "csv" in files:
+        write_text(files["csv"], to_csv(batch.to_frame()))
+    if "report" in files:
+        from hdopt.report.html import render
+        from hdopt.report.sections.inspection import batch_report
+
+        write_text(files["report"], render(batch_report(batch)))
+
+
+def _unit(recording: Recording | str | Path, source: RecordedDrive, limits: dict[str, float], seed: int) -> Unit:
+    name = recording.name if isinstance(recording, Recording) else Path(recording).name
     try:
-        sheet = inspect([read(path)], drive, limits, seed=seed)
+        sheet = acceptance_sheet(source.recordings(recording), source.drive, limits, seed=seed)
     except HdoptError as error:
-        return Unit(path.name, error=str(error))
+        return Unit(name, error=str(error))
     verdict = next((d.verdict for d in sheet.limits if d.name == "peak_to_peak"), "")
     return Unit(
-        path.name,
+        name,
         sheet.recording_peak_to_peak if sheet.beat is None else sheet.beat.value,
         "recording" if sheet.beat is None else "beat",
         float(sheet.one_turn.max()) if len(sheet.one_turn) else 0.0,

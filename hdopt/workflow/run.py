@@ -48,7 +48,7 @@ class RunResult:
 
 
 def run_study(
-    study: AnyStudy, folder: Path, seed: int = 1, progress: Progress = iter, resume: bool = False
+    study: AnyStudy, folder: str | Path, seed: int = 1, progress: Progress = iter, resume: bool = False
 ) -> RunResult:
     """Do the steps that a `study`, or its name or path, asks for and write report.html, results.json and the CSV
     files into `folder`.
@@ -59,7 +59,7 @@ def run_study(
     `resume`, steps and parts of steps that an interrupted run of the same study, seed and version finished are taken
     from it. Raises `HdoptError` for a folder that cannot be written, or that another run is writing to.
     """
-    study = as_study(study)
+    study, folder = as_study(study), Path(folder)
     listed, names = steps_of(study)
     try:
         todo = {name: find_step(name) for name in names}

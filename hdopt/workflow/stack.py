@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
-from hdopt.drive.errors import PHASE_OF, study_key
+from hdopt.drive.errors import PHASE_OF, DriveErrors, study_key
+from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.kinematics.model_error import ModelError, model_error
 from hdopt.kinematics.waveform import CLOSED_FORM, EXACT
 from hdopt.parallel.engine import Engine
 from hdopt.study import AnyStudy, Study, as_study
 from hdopt.study.tolerances import ContributorsSection, LinearStackSection, RequirementSection, TolerancesBase
+from hdopt.tolerance.copula import CorrelationGroup
 from hdopt.tolerance.distributions import Distribution
 from hdopt.tolerance.drive_inputs import DriveProblem, DriveResponse, drive_problem
 from hdopt.tolerance.linear_stack import LinearResponse
@@ -23,6 +26,8 @@ from hdopt.tolerance.space import InputSpace
 from hdopt.tolerance.stack import StackRequest, run_stack
 
 STACK_N = 2**18
+USUAL_YIELD = 0.9973
+"""Share of drives that must keep a limit where nobody says: as many as lie within 3 standard deviations of a normal."""
 SOBOL_N = 2**14
 PILOT_N, PILOT_MEASURED = 512, 32
 """Drives of which the pilot for the model error takes the largest and some others; with measured teeth, which take
@@ -32,8 +37,9 @@ SHAPLEY_INPUTS = 8
 
 
 @dataclass(frozen=True)
-class StudyProblem:
-    """What a study asks of its tolerances: response, inputs, limit and yield."""
+class ToleranceProblem:
+    """What is asked of tolerances: the `response` to the inputs of a `space`, its upper `limit` in `unit`, and the
+    share of drives that must keep it. `study` is its name, `notes` what is to be said of it."""
 
     study: str
     response: Response
@@ -43,12 +49,44 @@ class StudyProblem:
     unit: str
     notes: tuple[str, ...] = ()
 
+    @classmethod
+    def of_drive(
+        cls,
+        drive: Drive,
+        tolerances: Mapping[str, Distribution],
+        limit: float,
+        required_yield: float = USUAL_YIELD,
+        *,
+        errors: DriveErrors | None = None,
+        correlations: Sequence[CorrelationGroup] = (),
+        homogenization: float = 1.0,
+    ) -> ToleranceProblem:
+        """The problem of records, for calls that need no study.
 
-def study_problem(study: AnyStudy) -> StudyProblem:
-    """Response, inputs and requirement of a `study`, or of its name or path: its drive's, or those of its linear stack.
+        `drive` and the distributions of its errors, `tolerances`, by study key (mm, deg); `limit` (arcmin) of the
+        kinematic error's peak-to-peak, which the share `required_yield` of drives must keep. What is toleranced
+        nowhere keeps its value in `errors`; `correlations` group inputs that vary together; `homogenization` is k_e.
+        Raises `HdoptError` for a key that is not an error, and for a magnitude that could be negative.
+        """
+        problem = drive_problem(
+            drive, tolerances, held=errors, correlations=correlations, homogenization=homogenization
+        )
+        notes = _freed(problem.freed)
+        return cls("drive", problem.response, problem.space, limit, required_yield, "arcmin", notes)
+
+
+AnyProblem: TypeAlias = ToleranceProblem | AnyStudy
+"""What the calls about tolerances take: a problem made of records, or a study, its name or its path."""
+
+
+def study_problem(study: AnyProblem) -> ToleranceProblem:
+    """Response, inputs and requirement of a `study`, or of its name or path: its drive's, or those of its linear stack;
+    a problem as it is.
 
     Raises `HdoptError` where it has no [tolerances] or no [requirement], and no [linear_stack].
     """
+    if isinstance(study, ToleranceProblem):
+        return study
     study = as_study(study)
     if "linear_stack" in study.sections:
         return _linear(study)
@@ -56,10 +94,9 @@ def study_problem(study: AnyStudy) -> StudyProblem:
     notes = []
     if problem.replaced:
         notes.append(f"callouts take the place of the tolerances of {', '.join(problem.replaced)}")
-    if problem.freed:
-        notes.append(f"[tolerances] does not give {', '.join(problem.freed)}: free over the full turn")
+    notes += _freed(problem.freed)
     response, said = with_effects(study, problem.response)
-    return StudyProblem(
+    return ToleranceProblem(
         study.name,
         response,
         problem.space,
@@ -80,10 +117,14 @@ def drive_problem_of(study: Study) -> DriveProblem:
         study.drive,
         _not_measured(study, tolerances.distributions(study.folder)),
         held=study.errors if "errors" in study.sections else None,
-        contributors=None if contributors is None else contributors.build(),
+        contributors=contributors.build() if contributors else None,
         correlations=[row.build() for row in tolerances.correlation],
         homogenization=_homogenization(study, requirement.homogenization),
     )
+
+
+def _freed(names: Sequence[str]) -> tuple[str, ...]:
+    return (f"[tolerances] does not give {', '.join(names)}: free over the full turn",) if names else ()
 
 
 def _not_measured(study: Study, distributions: dict[str, Distribution]) -> dict[str, Distribution]:
@@ -111,14 +152,14 @@ def with_effects(study: Study, response: DriveResponse) -> tuple[Response, tuple
     return extended, (*chosen.says, "the effects are the same in every drive: they have no tolerance")
 
 
-def _linear(study: Study) -> StudyProblem:
+def _linear(study: Study) -> ToleranceProblem:
     from hdopt.tolerance.linear_stack import Dimension, linear_problem
 
     section = study.section("linear_stack", LinearStackSection)
     response, space = linear_problem(
         {name: Dimension(d.sensitivity, d.tolerance, d.sigmas) for name, d in section.dimensions.items()}
     )
-    return StudyProblem(study.name, response, space, section.gap_tolerance, section.required_yield, section.unit)
+    return ToleranceProblem(study.name, response, space, section.gap_tolerance, section.required_yield, section.unit)
 
 
 def _homogenization(study: Study, kind: str) -> float:
@@ -136,7 +177,7 @@ def _homogenization(study: Study, kind: str) -> float:
 
 
 def stack(
-    study: AnyStudy = None,
+    study: AnyProblem = None,
     n: int = STACK_N,
     *,
     tail: float | None = None,
@@ -148,10 +189,10 @@ def stack(
 ) -> StackResult:
     """Monte Carlo stack of a study's tolerances against its requirement, with `n` samples in all.
 
-    `study` is a study, its name or its path. `tail` adds the probability beyond that limit, `worst_case` the worst
-    case. `sampling` is 'sobol' or 'monte-carlo', `seed` its seed; `quantiles` are reported beside the usual ones;
-    `engine` computes the sample (threads, processes or a cluster). Raises `HdoptError` where the study has
-    no tolerances, or `n` is too small.
+    `study` is a study, its name or its path, or a problem made of records (`ToleranceProblem.of_drive`). `tail` adds
+    the probability beyond that limit, `worst_case` the worst case. `sampling` is 'sobol' or 'monte-carlo', `seed` its
+    seed; `quantiles` are reported beside the usual ones; `engine` computes the sample (threads, processes or a
+    cluster). Raises `HdoptError` where the study has no tolerances, or `n` is too small.
     """
     problem = study_problem(study)
     if sampling not in SAMPLINGS:
@@ -189,7 +230,7 @@ def stack(
     return StackResult(problem.study, result, worst, rare, tuple(notes), method, distance)
 
 
-def _method(problem: StudyProblem, seed: int) -> tuple[str | None, ModelError | None]:
+def _method(problem: ToleranceProblem, seed: int) -> tuple[str | None, ModelError | None]:
     """The method of the drives' kinematic error, and how far it is from the exact geometry, for a pilot of drives."""
     response = problem.response
     if not isinstance(response, DriveResponse):
@@ -203,7 +244,7 @@ def _method(problem: StudyProblem, seed: int) -> tuple[str | None, ModelError | 
 
 
 def sobol(
-    study: AnyStudy = None,
+    study: AnyProblem = None,
     n: int = SOBOL_N,
     *,
     second_order: bool = True,
@@ -214,7 +255,7 @@ def sobol(
     """Sobol' indices of a study's inputs and groups with `n` base points in all; Shapley effects where inputs are
     correlated, or where `shapley` asks for them: 'inputs' or 'groups'.
 
-    `study` is a study, its name or its path; `second_order` adds the indices of pairs; `seed` is that of the samples,
+    `study` is as for `stack`; `second_order` adds the indices of pairs; `seed` is that of the samples,
     `engine` computes them (threads, processes or a cluster).
     """
     from hdopt.tolerance.sensitivity import run_shapley, run_sobol
@@ -237,7 +278,7 @@ def sobol(
 
 
 def screen(
-    study: AnyStudy = None,
+    study: AnyProblem = None,
     method: str = "morris",
     n: int | None = None,
     *,
@@ -246,7 +287,7 @@ def screen(
 ) -> Screening:
     """Which inputs of a study matter, by SALib's `method`: 'morris', 'delta', 'pawn', 'rbd_fast' or 'dgsm'.
 
-    `study` is a study, its name or its path; `n` the base points, the method's own number where None; `seed` that of
+    `study` is as for `stack`; `n` the base points, the method's own number where None; `seed` that of
     the samples, `engine` computes them. `to_salib()` of the result is SALib's own.
     """
     problem = study_problem(study)

@@ -48,12 +48,13 @@ class Verification:
         }
 
 
-def verify_run(folder: Path, progress: Progress = iter) -> Verification:
+def verify_run(folder: str | Path, progress: Progress = iter) -> Verification:
     """Do the run in `folder` again, in a temporary folder, and compare every file; `progress` is told of
     each step.
 
     Raises `HdoptError` where the folder holds no run, or its study is no longer where it was.
     """
+    folder = Path(folder)
     old = read_json(folder / RESULTS_FILE, "a folder that `hdopt run` wrote")
     known = old.get("provenance") if isinstance(old, dict) else None
     if not isinstance(known, dict) or not isinstance(known.get("source"), dict) or not known["source"]:

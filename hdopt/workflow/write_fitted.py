@@ -10,6 +10,8 @@ import numpy as np
 from hdopt.errors import HdoptError
 from hdopt.simulation import EffectValues
 from hdopt.simulation.operation import RPM
+from hdopt.study import Study
+from hdopt.workflow.recorded_drive import AnyDrive, recorded_drive
 
 if TYPE_CHECKING:
     from hdopt.diagnosis.verdict.diagnosis import Diagnosis
@@ -17,16 +19,15 @@ if TYPE_CHECKING:
     from hdopt.effects.estimate import Parameter
 
 
-def write_study(diagnosis: Diagnosis, drive: str, path: Path) -> None:
-    """Write to `path` a study that starts from `drive`, a shipped drive's name or a study file, and holds the extended
-    model of the `diagnosis`: the fitted errors of the base model, each effect that was named as [effects.ID], and in
-    [operation] the condition of the recordings.
+def write_study(diagnosis: Diagnosis, drive: AnyDrive, path: Path) -> None:
+    """Write a study file at `path` that starts from the study of `drive` (a study, its name or its path) and holds the
+    extended model of `diagnosis`: the fitted errors of the base model, each effect that was named as [effects.ID], and
+    in [operation] the condition of the recordings.
 
     Intervals, and what the recordings left open, stand as comments. Raises `HdoptError` where there was no
     harmonic-drive model to fit.
     """
     from hdopt.files import write_text
-    from hdopt.study import load_study, shipped_drives
     from hdopt.study.effects import effect_keys
     from hdopt.study.write import study_toml, with_moved_paths
 
@@ -34,10 +35,11 @@ def write_study(diagnosis: Diagnosis, drive: str, path: Path) -> None:
         raise HdoptError(
             "--write-study needs a harmonic-drive model; diagnose with --drive NAME, not with --drive none"
         )
-    shipped = drive in shipped_drives()
-    study = load_study(drive=drive) if shipped else load_study(drive)
-    data: dict[str, Any] = {"drive": drive}
-    if not shipped:
+    study = recorded_drive(drive).study
+    if study is None:
+        raise HdoptError("a fitted study starts from a study; give `drive` as a study, a shipped name or a path")
+    data: dict[str, Any] = {"drive": study.name}
+    if not _is_shipped_drive(study):
         data = with_moved_paths(study.data, study.folder, path.parent)
         data = {name: content for name, content in data.items() if name not in REPLACED}
     comments: dict[tuple[str, ...], list[str]] = {}
@@ -55,6 +57,11 @@ def write_study(diagnosis: Diagnosis, drive: str, path: Path) -> None:
         comments["effects", effect.id] = _said_of(effect, said[effect.id])
     comments[()] = _left_open(diagnosis, {effect.id for effect in effects})
     write_text(path, study_toml(data, comments=comments))
+
+
+def _is_shipped_drive(study: Study) -> bool:
+    """Whether `study` is a drive that ships, unchanged: its name says it all."""
+    return bool(study.recipe) and study.recipe["source"] is None and not study.recipe["overrides"]
 
 
 REPLACED = ("errors", "study", "effects", "operation")
@@ -76,15 +83,19 @@ def _left_open(diagnosis: Diagnosis, written: set[str]) -> list[str]:
 
 
 def found_effects(diagnosis: Diagnosis) -> tuple[EffectValues, ...]:
-    """The effects that a diagnosis named, with the numbers of its fit, strongest first."""
-    evidence = diagnosis.evidence
+    """The effects that a diagnosis named, with the numbers of its fit, strongest first.
+
+    What a fit describes without naming it, such as a sine in time, is none of them.
+    """
+    evidence, named = diagnosis.evidence, {found.id for found in diagnosis.effects}
     fitted: dict[str, EffectValues] = {}
     for selection in (evidence.high, evidence.selection):
         if selection is None:
             continue
         fit = selection.best.fit
         for term, coefficients in zip(fit.terms, fit.coefficients, strict=True):
-            fitted[term.effect] = EffectValues.fitted(term, coefficients)
+            if term.effect in named:
+                fitted[term.effect] = EffectValues.fitted(term, coefficients)
     return tuple(fitted[found.id] for found in diagnosis.effects if not of_torque_sweep(fitted[found.id]))
 
 

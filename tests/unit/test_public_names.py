@@ -1,6 +1,8 @@
 """What `import hdopt` offers: every name is there, a version, and calls that take records, names and studies alike."""
 
+import ast
 import importlib.metadata
+from pathlib import Path
 
 import pytest
 
@@ -28,3 +30,12 @@ def test_kinematic_error_of_records_of_a_name_and_of_a_study_are_one():
 def test_errors_beside_a_study_are_refused():
     with pytest.raises(hdopt.HdoptError, match=r"change them with study\.with_"):
         hdopt.kinematic_error("csf-25-80", hdopt.DriveErrors())
+
+
+def test_type_checkers_see_the_same_names():
+    """`import hdopt` is lazy; the imports under TYPE_CHECKING must name the same things from the same modules."""
+    tree = ast.parse(Path(hdopt.__file__).read_text())
+    (block,) = [node for node in tree.body if isinstance(node, ast.If)]
+    seen = {alias.name: node.module for node in block.body for alias in node.names}
+    assert all(alias.asname == alias.name for node in block.body for alias in node.names)
+    assert seen == hdopt._EXPORTS

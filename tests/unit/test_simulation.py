@@ -385,6 +385,16 @@ def test_every_effect_is_written_back_and_read(study_with, tmp_path, name, keys)
     assert "# The recordings cannot tell these effects from: tooth_mesh and lost_motion." in text
 
 
+def test_what_a_fit_describes_without_naming_it_is_not_written(tmp_path):
+    """A sine in time beside the effect named: there is no such effect to write, which ended in a KeyError."""
+    diagnosis = diagnosis_of(load_study(), Term("hysteresis", {"transition_deg": 1.0, "model": Law.DAHL}), (1.0,))
+    fit = diagnosis.evidence.selection.best.fit
+    fit.terms += (Term("_sine_in_time", {"frequency_hz": 0.1}),)
+    fit.coefficients += (np.array([0.3, 0.1]),)
+    write_study(diagnosis, "csf-25-80", tmp_path / "w.toml")
+    assert [effect.id for effect in load_study(tmp_path / "w.toml").effects] == ["hysteresis"]
+
+
 def test_friction_of_a_torque_sweep_stays_a_comment(tmp_path):
     """It is known by torque, against a locked input; a drive that turns crosses over by angle."""
     term = Term("hysteresis", {"friction_nm": 2.0, "knee_nm": 5.0})

@@ -1,0 +1,277 @@
+"""The figures, checks and decisions of one drive's acceptance sheet, from its recordings; no diagnosis needed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hdopt.arrays import Array
+from hdopt.drive.geometry import Drive
+from hdopt.errors import HdoptError
+from hdopt.recordings import figures
+from hdopt.recordings.capability import gauge
+from hdopt.recordings.decision import Decision, decide
+from hdopt.recordings.figures import Cells
+from hdopt.recordings.orders import ModelOrder, OrderSpectrum, model_orders, order_spectrum
+from hdopt.recordings.recording import Recording
+from hdopt.recordings.sheet import Beat, Inspection, OrderLine
+from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
+from hdopt.workflow.waveform_fit import WaveformFit, fit_waveform
+
+MODEL_LEAVES = 3.0
+"""A model whose residual is below so many times the scatter of neighbouring samples explains the waveform: noise that
+hangs together over some samples shows a half or a third of itself between neighbours."""
+LEAST_OF_A_BEAT = 0.25
+"""Share of the beat that a record must cover for the model to extrapolate the rest: at 20 of 80 turns the errors of its
+orders are 10 times those of the whole beat, at 10 turns 44 times."""
+HIGHEST_WHOLE_ORDER = 8
+ORIGIN_UNKNOWN = "whole order of the input"
+MAKERS_FIGURE = (
+    "makers state the angular transmission accuracy over one turn of the output in one direction: the full beat"
+)
+
+
+@dataclass(frozen=True)
+class SheetLabel:
+    """What a sheet says of the drive in words: its serial number, and the conditions of the recordings."""
+
+    serial: str = ""
+    conditions: str = ""
+
+
+NO_LABEL = SheetLabel()
+
+
+def acceptance_sheet(
+    recordings: Sequence[Recording],
+    drive: Drive | None,
+    limits: Mapping[str, float],
+    *,
+    speed_rpm: float | None = None,
+    mountings: Sequence[str] = (),
+    label: SheetLabel = NO_LABEL,
+    seed: int = 1,
+) -> Inspection:
+    """The acceptance sheet of one drive from its `recordings`.
+
+    `drive` None leaves out what needs a model (the beat of a short record, the origin of the orders). `limits` by name
+    in arcmin (`hdopt.recordings.decision.LIMIT_NAMES`). `speed_rpm` of the input for the slope in time, by default the
+    recording's own. `mountings` labels each recording for the gauge study. `label` goes on the sheet; `seed` is that of
+    the fit. Raises `HdoptError` where there is nothing to inspect.
+    """
+    if not recordings:
+        raise HdoptError("no recordings were given; give at least one file")
+    if mountings and len(mountings) != len(recordings):
+        raise HdoptError(f"{len(mountings)} mountings are named for {len(recordings)} recordings; name one for each")
+    moving = [r for r in recordings if not r.input_locked]
+    sweeps = [t for t in map(torsion_of, recordings) if t is not None]
+    parts = tuple(figures.cells_of(r) for r in moving)
+    fit = fit_waveform(moving, drive, seed) if drive is not None and moving else None
+    turned = [figures.turn_peak_to_peaks(cells)[0] for cells in parts]
+    one_turn = np.concatenate(turned) if turned else np.empty(0)
+    slope, slope_sigma = max((figures.steepest_slope(cells) for cells in parts), default=(0.0, 0.0))
+    doubt = _uncertainty(moving, parts, fit)
+    found = Inspection(
+        names=tuple(r.name for r in recordings),
+        serial=label.serial,
+        conditions=label.conditions,
+        ratio=recordings[0].ratio,
+        turns=max(r.turns for r in recordings),
+        one_turn=one_turn,
+        recording_peak_to_peak=max((figures.directional_peak_to_peak(c) for c in parts), default=0.0),
+        beat=_beat(moving, parts, fit, doubt, seed),
+        rms=math.sqrt(float(np.mean([figures.rms(c) ** 2 for c in parts]))) if parts else 0.0,
+        returned=next((back for back in map(figures.return_error, parts) if back is not None), None),
+        repeatability=figures.repeatability(parts) if parts else None,
+        slope_per_deg=slope,
+        slope_arcsec_per_s=_slope_in_time(moving, slope, speed_rpm),
+        orders=_orders(moving, drive),
+        drift=max((figures.drift(c) for c in parts), key=abs, default=0.0),
+        torsion=sweeps[0] if sweeps else None,
+        starting_torque=next((t for t in map(starting_torque_nm, recordings) if t is not None), None),
+        gauge=gauge([figures.directional_peak_to_peak(c) for c in parts], list(mountings)) if mountings else None,
+        uncertainty=doubt,
+        checks=_checks(moving, parts, fit),
+        limits=(),
+        understood=tuple(f"{r.name}: {said}" for r in recordings for said in r.understood),
+        warnings=(*(w for r in recordings for w in r.warnings), *_model_warnings(parts, fit)),
+        cells=parts,
+        orientation=_orientation(fit),
+    )
+    return replace(found, limits=_decisions(found, limits, slope_sigma))
+
+
+def _orientation(fit: WaveformFit | None) -> dict[str, Any] | None:
+    if fit is None:
+        return None
+    way = "as counted" if fit.sign > 0 else "the other way round"
+    return {"input": way, "output": way, "decided_by": "data" if fit.decided else "as given", "evidence": fit.evidence}
+
+
+def _uncertainty(recordings: Sequence[Recording], parts: Sequence[Cells], fit: WaveformFit | None) -> float:
+    """Standard uncertainty (arcmin) of a peak-to-peak: two cells' scatter, and the encoders' where the bench says.
+
+    Where a model explains the waveform, what it leaves is the noise, coloured as it may be.
+    """
+    if not parts:
+        return 0.0
+    cell = max(float(np.median(cells.sigma)) for cells in parts)
+    noise = max(cells.noise_arcmin for cells in parts)
+    if fit is not None and noise > 0:
+        cell *= max(1.0, min(fit.rms_arcmin / noise, MODEL_LEAVES))
+    sensor = max(r.sensor_arcmin for r in recordings)
+    return math.sqrt(2 * (cell**2 + sensor**2))
+
+
+def _beat(
+    recordings: Sequence[Recording], parts: Sequence[Cells], fit: WaveformFit | None, doubt: float, seed: int
+) -> Beat | None:
+    """Measured where one recording covers the whole beat, else as the model extrapolates it; None without either."""
+    for recording, cells in zip(recordings, parts, strict=True):
+        if recording.turns >= recording.ratio:
+            value = figures.directional_peak_to_peak(cells)
+            return Beat(value, max(value - 1.96 * doubt, 0.0), value + 1.96 * doubt, "measured")
+    longest = max((r.turns for r in recordings), default=0.0)
+    if fit is None or longest < LEAST_OF_A_BEAT * fit.ratio:
+        return None
+    value, low, high = fit.beat_peak_to_peak(seed)
+    # What the model leaves is not in its waveform: two extremes of it, as a scatter, widen the interval.
+    noise = max((cells.noise_arcmin for cells in parts), default=0.0)
+    left = 1.96 * math.sqrt(2 * max(fit.rms_arcmin**2 - noise**2, 0.0) + doubt**2)
+    return Beat(value, max(value - math.hypot(value - low, left), 0.0), value + math.hypot(high - value, left), "model")
+
+
+def _slope_in_time(recordings: Sequence[Recording], slope: float, speed_rpm: float | None) -> float | None:
+    """The slope (arcmin per deg of input) as a rate at the output, arcsec/s, at a speed or the usual one."""
+    if speed_rpm is not None:
+        return slope * 60 * speed_rpm * 6
+    for recording in recordings:
+        if recording.time is not None and np.ptp(recording.time) > 0:
+            speed = np.median(np.abs(np.diff(recording.input_angle)) / np.maximum(np.diff(recording.time), 1e-12))
+            return float(slope * 60 * math.degrees(float(speed)))
+    return None
+
+
+def _orders(recordings: Sequence[Recording], drive: Drive | None) -> tuple[OrderLine, ...]:
+    """Amplitudes at the model's orders and the other whole ones, fitted together on the longest recording."""
+    if not recordings:
+        return ()
+    recording = max(recordings, key=lambda r: r.turns)
+    if recording.turns < 1:
+        return ()
+    known = model_orders(recording.ratio)
+    given = [o.order for o in known]
+    whole = [ModelOrder(f"{k}", float(k), ORIGIN_UNKNOWN) for k in range(1, HIGHEST_WHOLE_ORDER + 1)]
+    listed = [*(known if drive is not None else known[:1]), *whole]
+    wanted = {o.order: o for o in reversed(listed) if drive is None or o.order in given or o.origin == ORIGIN_UNKNOWN}
+    cells = figures.cells_of(recording)
+    forward = cells.direction == (1.0 if (cells.direction > 0).mean() >= 0.5 else -1.0)
+    usable = sorted(
+        order for order in wanted if order * recording.turns >= 0.8 and order < 0.4 * 2 * math.pi / cells.width
+    )
+    spectrum = _separable_spectrum(cells.angle[forward], cells.error[forward], usable)
+    if spectrum is None:
+        return ()
+    together = {order for group in spectrum.inseparable for order in group}
+    return tuple(
+        OrderLine(wanted[o].symbol, o, float(a), wanted[o].origin, o not in together)
+        for o, a in zip(spectrum.orders.tolist(), spectrum.amplitudes.tolist(), strict=True)
+    )
+
+
+def _separable_spectrum(angle: Array, error: Array, orders: list[float]) -> OrderSpectrum | None:
+    """The orders fitted together; of those that a short record cannot part, the lowest stands for its neighbours."""
+    step = 0.8 * 2 * math.pi / max(float(np.ptp(angle)), 1e-9)
+    kept: list[float] = []
+    for order in orders:
+        if not kept or order - kept[-1] >= step or order == round(order):
+            if kept and order - kept[-1] < step:
+                kept.pop()
+            kept.append(order)
+    while kept:
+        try:
+            return order_spectrum(angle, error, kept)
+        except HdoptError:
+            kept.pop()
+    return None
+
+
+def _checks(recordings: Sequence[Recording], parts: Sequence[Cells], fit: WaveformFit | None) -> dict[str, str]:
+    """Ratio, orientation, skew and slipped counts, a sentence each."""
+    if not recordings:
+        return {"ratio": "not checked: the input is locked"}
+    said = [s for r in recordings for s in (*r.understood, *r.warnings) if "ratio" in s or "against input/" in s]
+    found = {"ratio": said[0] if said else "not checked: only an error was recorded, or the angles move too little"}
+    if fit is not None:
+        way = "the drive counts as the model does" if fit.sign > 0 else "both angles count the other way round"
+        found["orientation"] = (
+            f"{way} (log-likelihood {fit.evidence:.0f} better than the other)"
+            if fit.decided
+            else "not decided by this record: taken as given; cover more of the beat"
+        )
+    skew = next((s for s in map(figures.skew_s, recordings) if s is not None), None)
+    if skew is None:
+        found["skew"] = "not checked: needs passes at two speeds"
+    else:
+        sure = abs(skew[0]) > 3 * skew[1]
+        found["skew"] = (
+            f"output {skew[0] * 1e3:.3g} +- {2 * skew[1] * 1e3:.1g} ms later{'' if sure else ' (not significant)'}"
+        )
+    slipped = [s for r, c in zip(recordings, parts, strict=True) for s in figures.slips(c, r.quantum_arcmin)]
+    found["slipped_counts"] = (
+        f"{len(slipped)} steps that stay, the largest {max(abs(s[1]) for s in slipped):.3g} arcmin"
+        if slipped
+        else "none"
+    )
+    return found
+
+
+def _model_warnings(parts: Sequence[Cells], fit: WaveformFit | None) -> list[str]:
+    if fit is None:
+        return []
+    noise = max(cells.noise_arcmin for cells in parts)
+    found = []
+    if fit.rms_arcmin > MODEL_LEAVES * noise:
+        found.append(
+            f"the model leaves {fit.rms_arcmin:.3g} arcmin rms where neighbouring samples scatter by {noise:.2g}: "
+            "more is in the record than the drive's errors (hdopt diagnose says what); an extrapolated beat lacks it"
+        )
+    return found
+
+
+def _decisions(found: Inspection, limits: Mapping[str, float], slope_sigma: float) -> tuple[Decision, ...]:
+    """Every limit held against its figure."""
+    made: list[Decision] = []
+    doubt = found.uncertainty
+    for name, limit in limits.items():
+        value, sigma, note = _figure(found, name, doubt, slope_sigma)
+        made.append(decide(name, value, sigma, limit, note))
+    return tuple(made)
+
+
+def _figure(found: Inspection, name: str, doubt: float, slope_sigma: float) -> tuple[float | None, float, str]:
+    """A figure by its name in `--limit`: value, standard uncertainty, and what it is."""
+    beat, back, torsion = found.beat, found.returned, found.torsion
+    if name == "peak_to_peak":
+        if beat is None:
+            return None, doubt, "too little of the beat was recorded, or there is no drive to extrapolate with"
+        if beat.source == "model" and any(w.startswith("the model leaves") for w in found.warnings):
+            return None, doubt, f"the model says {beat.value:.3g} arcmin, but does not explain the record"
+        half = max(beat.high - beat.value, beat.value - beat.low) / 1.96
+        return beat.value, half, f"over the full beat, {beat.source}"
+    values: dict[str, tuple[float | None, float, str]] = {
+        "one_turn": (float(found.one_turn.max()) if len(found.one_turn) else None, doubt, "largest of all input turns"),
+        "recording": (found.recording_peak_to_peak or None, doubt, "over the recording, one direction"),
+        "rms": (found.rms, doubt / math.sqrt(max(found.turns, 1.0)), ""),
+        "return_error": (None, 0.0, "one direction only was recorded")
+        if back is None
+        else (abs(back.median), back.sigma / math.sqrt(len(back.curve)), "median"),
+        "repeatability": (found.repeatability, doubt / math.sqrt(max(found.turns, 1.0)), ""),
+        "slope": (found.slope_per_deg, slope_sigma, ""),
+        "hysteresis_loss": (None if torsion is None else torsion.hysteresis_loss_arcmin, doubt, "at zero torque"),
+    }
+    return values[name]

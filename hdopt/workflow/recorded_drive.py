@@ -1,0 +1,88 @@
+"""The drive that recordings are of, in every form that a call takes, and how its files are read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+from hdopt.drive.geometry import Drive
+from hdopt.errors import HdoptError
+from hdopt.recordings.bench import Bench, load_bench
+from hdopt.recordings.read import read_recording
+from hdopt.recordings.recording import Recording
+from hdopt.study import Study, load_study, shipped_drives
+
+SAME_RATIO = 1e-9
+"""Ratios that differ by less are one: they are quotients of tooth counts."""
+
+
+@dataclass(frozen=True)
+class RecordedDrive:
+    """A recorded `drive`, its `study` (None without one) and `ratio`, and how its files are laid out: `columns` as
+    `--columns`, `bench` as a bench file says. A gear without a model has `drive` None; its `ratio` may then be known
+    from the recordings alone."""
+
+    drive: Drive | None
+    study: Study | None = None
+    ratio: float | None = None
+    columns: str | None = None
+    bench: Bench | None = None
+
+    def read(self, path: str | Path) -> Recording:
+        """The recording of this drive in the file `path`. Raises `HdoptError` where it cannot be used, or no ratio is
+        known."""
+        if self.ratio is None:
+            raise HdoptError("the ratio is not known; give --drive NAME, or --drive none with --ratio X")
+        return read_recording(path, self.ratio, self.columns, self.bench)
+
+    def recordings(self, given: AnyRecordings) -> list[Recording]:
+        """The recordings of this drive: those `given` as records stay, files are read."""
+        if isinstance(given, Recording | str | Path):
+            given = [given]
+        return [item if isinstance(item, Recording) else self.read(item) for item in given]
+
+
+AnyRecordings: TypeAlias = Sequence[Recording | str | Path] | Recording | str | Path
+"""Files or records of one drive, or a single one."""
+
+AnyDrive: TypeAlias = RecordedDrive | Drive | Study | str | Path | None
+"""What every call with recordings takes as their drive: its record, a study, a shipped name, the path of a study file;
+None or "none" for a gear without a harmonic-drive model; `recorded_drive(...)` where the files need a layout."""
+
+
+def recorded_drive(
+    drive: AnyDrive, ratio: float | None = None, columns: str | None = None, bench: Bench | str | Path | None = None
+) -> RecordedDrive:
+    """The recorded drive that `drive` means, with the `ratio` of a gear without a model, and the layout of its files:
+    `columns` as `--columns` takes them, `bench` a bench file or its record.
+
+    Raises `HdoptError` where the ratios given disagree, or "none" is given without one.
+    """
+    if isinstance(drive, RecordedDrive):
+        return drive
+    layout = load_bench(Path(bench)) if isinstance(bench, str | Path) else bench
+    stated = ratio if ratio is not None or layout is None else layout.ratio
+    if drive is None or drive == "none":
+        if stated is None and drive is not None:
+            raise HdoptError("--drive none needs the gear's ratio; give --ratio X, or ratio in the bench file")
+        return RecordedDrive(None, None, stated, columns, layout)
+    study, of = (None, drive) if isinstance(drive, Drive) else ((found := _study(drive)), found.drive)
+    own = float(of.geometry.ratio)
+    if stated is not None and abs(stated - own) > SAME_RATIO:
+        raise HdoptError(
+            f"the ratio given is {stated:g}, that of the drive {_name(drive)} is {own:g}; give the drive that was "
+            "recorded, or --drive none with the ratio"
+        )
+    return RecordedDrive(of, study, own, columns, layout)
+
+
+def _study(drive: Study | str | Path) -> Study:
+    if isinstance(drive, Study):
+        return drive
+    return load_study(drive=str(drive)) if str(drive) in shipped_drives() else load_study(drive)
+
+
+def _name(drive: Drive | Study | str | Path) -> str:
+    return drive.name if isinstance(drive, Study) else "given" if isinstance(drive, Drive) else str(drive)
