@@ -53,7 +53,7 @@ def seed_of(commit: str) -> int:
 def opening_commit(folder: Path, name: str) -> str:
     """Hash of the commit that entered the run `name` into the register in `folder`."""
     log = ["git", "log", "--format=%H", "--reverse", f'-S"name": "{name}"', "--", "register.json"]
-    done = subprocess.run(log, cwd=folder, capture_output=True, text=True, check=True)
+    done = subprocess.run(log, cwd=folder, capture_output=True, text=True)
     if not done.stdout.split():
         raise ValueError(f"no commit enters {name!r} into {folder / 'register.json'}; commit it first")
     return done.stdout.split()[0]

@@ -52,7 +52,9 @@ def hashes(package: Path = ROOT / "hdopt") -> dict[str, str]:
 
 def lines(records: Iterable[dict[str, Any]]) -> str:
     """`records` as text, one JSON object a line, keys in order: the form that is hashed and kept."""
-    return "".join(json.dumps(r, sort_keys=True, separators=(",", ":")) + "\n" for r in records)
+    return "".join(
+        json.dumps(r, sort_keys=True, separators=(",", ":"), default=lambda value: value.item()) + "\n" for r in records
+    )
 
 
 def sha(text: str) -> str:
