@@ -194,8 +194,9 @@ def plan(
     given: Mapping[str, str | None],
     gap: float = 0.0,
 ) -> Plan:
-    """The fits and position tolerances of a wave generator.
+    """The fits and position tolerances of a wave generator of this `structure`, whose `parts` are given lowest first.
 
+    `bounds` limit its eccentricity (mm) and tilt (rad); a slide's play comes from the `clearances` of the drive.
     `given` has the fits that the options set, `gap` is the axial play of each slide, mm.
     """
     joints = joints_of(parts, given)

@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from hdopt.geometry.assembly import WaveGeneratorModel
-from hdopt.geometry.contour import Circle
+from hdopt.geometry.contour import Circle, ParallelCurve
 from hdopt.geometry.features import BoltCircle, DBore, KeywayBore, polar
 from hdopt.geometry.iso286 import deviations
+from hdopt.geometry.model import WaveGeneratorModel
 from hdopt.geometry.part import Part, Prism, Tongue
+from hdopt.geometry.threads import THREADS
 
 GENERAL_POSITION = 0.1
 """Diameter of the position zone of bolt holes, mm: half the play of a bolt in a medium clearance hole (ISO 273)."""
@@ -93,7 +94,7 @@ class Callout:
 
 
 def callouts_of(part: Part, model: WaveGeneratorModel) -> tuple[Callout, ...]:
-    """The callouts of a part, each of its own feature."""
+    """The callouts of a `part` of the `model`, each of its own feature; a datum that nothing refers to has none."""
     found = [
         _profile(part, model),
         _bore(part, model),
@@ -128,7 +129,8 @@ def primary(part: Part) -> str:
 
 
 def secondary(part: Part) -> str | None:
-    """What datum B is, which locks the rotation: keyway, flat, slot or the pattern of bolt holes; None without one."""
+    """What datum B of a `part` is, which locks the rotation: keyway, flat, slot or the pattern of bolt holes; None
+    without one."""
     if isinstance(part.bore, KeywayBore):
         return "keyway"
     if isinstance(part.bore, DBore):
@@ -172,15 +174,13 @@ def _profile(part: Part, model: WaveGeneratorModel) -> Callout | None:
 
 
 def contour_name(part: Part) -> str:
-    """The law of a profile, in words and numbers."""
+    """The law of the profile of a `part`, in words and numbers (mm): "circle" for one without a parallel curve."""
     contour = part.contour
-    if contour is None or isinstance(contour, Circle):
+    if not isinstance(contour, ParallelCurve):
         return "circle"
-    profile = getattr(contour, "profile", None)
-    name = getattr(profile, "name", "profile").replace("_", "-")
-    major, minor = getattr(profile, "semi_major", 0.0), getattr(profile, "semi_minor", 0.0)
-    inside = f"{getattr(contour, 'distance', 0.0):g} inside it"
-    return f"{name} a = {major:.4f}, b = {minor:.4f}, {inside}"
+    profile = contour.profile
+    name = profile.name.replace("_", "-")
+    return f"{name} a = {profile.semi_major:.4f}, b = {profile.semi_minor:.4f}, {contour.distance:g} inside it"
 
 
 def _bore(part: Part, model: WaveGeneratorModel) -> Callout | None:
@@ -248,16 +248,15 @@ def _bolts(part: Part, model: WaveGeneratorModel) -> Callout | None:
 
 
 def outer_point(bolts: BoltCircle) -> tuple[float, float]:
-    """The point of the first hole that lies farthest out."""
+    """The point (x, y), mm, of the first hole of `bolts` that lies farthest from the axis."""
     x, y = bolts.centres[0]
     away = math.hypot(x, y)
     return x * (1 + bolts.hole / 2 / away), y * (1 + bolts.hole / 2 / away)
 
 
 def hole_note(part: Part, model: WaveGeneratorModel) -> str:
-    """Thread or clearance, with its depth."""
-    from hdopt.geometry.assembly import THREADS
-
+    """Thread or clearance of the bolt holes of a `part`, which has some, with the depth (mm) of a hub's thread; `model`
+    is that of the wave generator."""
     bolts = part.bolts
     assert bolts is not None
     thread = next((name for name, (_, tap) in THREADS.items() if math.isclose(tap, bolts.hole)), None)

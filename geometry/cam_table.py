@@ -26,7 +26,8 @@ FEWEST_POINTS, MOST_POINTS = 16, 360_000
 
 
 def cam_table(contour: Contour, resolution_deg: float) -> Array:
-    """Rows of angle, radius, normal's direction (all angles in rad, clockwise from the major axis) and curvature, 1/mm.
+    """The cam's `contour` as rows of angle, radius (mm), normal's direction (all angles in rad, clockwise from the
+    major axis) and curvature, 1/mm.
 
     Shape (n, 4), n = 360/`resolution_deg` rounded up; the angles are those of the points themselves, evenly spaced from
     0. Raises `HdoptError` for a resolution that gives fewer than 16 or more than 360,000 points.
@@ -71,9 +72,9 @@ def _parameter_at(curve: ParallelCurve, angle: Array) -> Array:
 
 
 def write_cam(path: Path, job: Job) -> None:
-    """Write the table of the part that carries the bearing (disc 1 of two) as CSV with its origin in comments."""
+    """Write the table of the part of a `job` that carries the bearing (disc 1 of two) to `path`, as CSV with its origin
+    in comments."""
     part = job.model.profiled[0]
-    assert part.contour is not None
     rows = cam_table(part.contour, job.model.cam_resolution_deg)
     with open(path, "w", encoding="utf-8", newline="") as file:
         file.write(f"# {job.identity.title}: {part.name}; {job.identity.description}\n")
@@ -87,14 +88,14 @@ def write_cam(path: Path, job: Job) -> None:
 
 
 def check_cam(path: Path, job: Job, name: str) -> dict[str, Any]:
-    """Read the table back: every point against the analytic curve, every normal against the chord of its neighbours."""
+    """Read the table at `path` back: every point against the analytic curve of the `job`, every normal against the
+    chord of its neighbours. Raises `CheckFailed`, which calls the file `name`, with all that is wrong."""
     with open(path, encoding="utf-8") as file:
         rows = list(csv.reader(line for line in file if not line.startswith("#")))
     values = np.array(rows[1:], float)
     angle, radius, normal = np.radians(values[:, 0]), values[:, 1], np.radians(values[:, 2])
     points = np.column_stack([radius * np.sin(angle), radius * np.cos(angle)])
     contour = job.model.profiled[0].contour
-    assert contour is not None
     deviation = float(np.abs(contour.deviation(points)).max())
     failures = []
     if tuple(rows[0]) != COLUMNS:

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hdopt.geometry.assembly import WaveGeneratorModel
 from hdopt.geometry.callouts import Callout
+from hdopt.geometry.model import WaveGeneratorModel
 from hdopt.geometry.part import Part, Prism
 from hdopt.geometry.part21 import Part21
 from hdopt.geometry.solids import BUILD_TOLERANCE
@@ -91,7 +91,11 @@ class StepCheck:
 
 
 def check_step(file: StepFile, model: WaveGeneratorModel, identity: Identity, schema: str, name: str = "") -> StepCheck:
-    """Compare a file that was read back with the model it is to show; `CheckFailed` with all that is wrong."""
+    """Compare a `file` that was read back with the `model` it is to show.
+
+    `identity` and `schema` ("AP214" or "AP242") are what its header has to say; `name` is what the file is called in
+    messages, its own name where empty. Raises `CheckFailed` with all that is wrong.
+    """
     name = name or file.path.name
     failures = list(_check_header(file, identity, schema))
     names, expected = [part.name for part in file.parts], [part.name for part in model.parts]
@@ -188,7 +192,7 @@ def _is_valid(solid: cq.Solid) -> bool:
 
 
 def volume_of(solid: cq.Solid) -> float:
-    """mm^3, integrated until it is sure: the usual quick rule is 6e-7 off on smoothed profiles."""
+    """Volume of a `solid`, mm^3, integrated until it is sure: the usual quick rule is 6e-7 off on smoothed profiles."""
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
 

@@ -56,7 +56,8 @@ class CamFit:
 
 
 def read_cam(path: Path) -> Array:
-    """Points (n, 2), mm, of a CSV with columns angle_deg,radius_mm (clockwise from the major axis) or x_mm,y_mm.
+    """Points (n, 2), mm, of a CSV at `path` with columns angle_deg,radius_mm (clockwise from the major axis) or
+    x_mm,y_mm.
 
     `#` starts a comment; further columns are left alone. Raises `HdoptError` with the line of what cannot be used.
     """
@@ -161,6 +162,6 @@ def _require_all_round(points: Array) -> None:
 
 
 def table_of(fit: CamFit) -> list[dict[str, Any]]:
-    """One row a point: angle in degrees, deviation in um."""
+    """One row a point of a `fit`: angle in degrees, clockwise from the major axis, and deviation in um."""
     rows = zip(np.degrees(fit.angles).tolist(), (1e3 * fit.deviations).tolist(), strict=True)
     return [{"angle_deg": angle, "deviation_um": deviation} for angle, deviation in rows]

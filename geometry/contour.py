@@ -180,7 +180,8 @@ class Circle:
 
 
 def break_angles(profile: WaveGeneratorProfile) -> list[float]:
-    """Angles in [0, 2 pi) where an edge of a solid has to end: where r''' jumps, and the axes of symmetric profiles.
+    """Angles in [0, 2 pi) where an edge of a solid with this `profile` has to end: where r''' jumps, and the axes of
+    symmetric profiles.
 
     Resal's curve carries a point force at either tip and the two-disk curve leaves its disc at the wrap angle: there
     the curvature has a corner, which one polynomial spline cannot follow.

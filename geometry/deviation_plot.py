@@ -14,7 +14,8 @@ LEFT, RIGHT, TOP, BOTTOM = 20.0, 182.0, 16.0, 84.0
 
 
 def deviation_plot(fit: CamFit, zone: float, title: str, description: str) -> str:
-    """Text of the SVG; `zone` is the full width of the profile's tolerance zone, mm."""
+    """Text of an SVG that shows the deviations of a `fit` over the angle; `zone` is the full width of the profile's
+    tolerance zone, mm. `title` stands above, `description` goes with the file."""
     sheet = Sheet(WIDTH, HEIGHT, title, description)
     half = 1e3 * zone / 2
     reach = 1.15 * max(half, 1e3 * fit.largest)

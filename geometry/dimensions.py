@@ -10,11 +10,11 @@ from typing import Any
 
 from hdopt.drive.errors import AMPLITUDE_NAMES, STUDY_KEYS
 from hdopt.drive.geometry import Structure
-from hdopt.geometry.assembly import WaveGeneratorModel
 from hdopt.geometry.budget import Plan
 from hdopt.geometry.contour import Circle
 from hdopt.geometry.features import DBore, KeywayBore
 from hdopt.geometry.iso286 import deviations
+from hdopt.geometry.model import WaveGeneratorModel
 from hdopt.geometry.part import Part, Prism, Tongue
 
 ECCENTRICITY, TILTS = "wg_eccentricity_mm", ("wg_tilt_major_deg", "wg_tilt_minor_deg")
@@ -42,7 +42,8 @@ class Dimension:
 
 
 def tolerance_bounds(data: Mapping[str, Any]) -> dict[str, float]:
-    """The tolerance of each error in a study file's [tolerances]: `upper`, or half the range of one with two signs."""
+    """The tolerance (mm or deg) of each error in [tolerances] of a study file's `data`: `upper`, or half the range of
+    one with two signs."""
     bounds = {}
     for key, spec in data.get("tolerances", {}).items():
         if not isinstance(spec, Mapping) or "upper" not in spec:
@@ -58,7 +59,7 @@ def key_dimensions(
     bounds: Mapping[str, float],
     contributors: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> tuple[Dimension, ...]:
-    """The table for a wave generator's parts; `width` is the profile's, mm.
+    """The table for the parts of a `model`; `width` is the profile's, mm.
 
     `bounds` are tolerances by study key (mm or deg) or by contributor; `contributors` the study's callouts, which
     replace the errors they feed. A value of `bounds` under a contributor's name replaces the callout's own.
@@ -149,7 +150,8 @@ GENERAL = ((3.0, 0.1), (6.0, 0.1), (30.0, 0.2), (120.0, 0.3), (400.0, 0.5), (100
 
 
 def general_limits(nominal: float) -> tuple[float, float]:
-    """Deviations that ISO 2768-1, class m, permits a length without a tolerance of its own, mm."""
+    """Deviations, mm, that ISO 2768-1, class m, permits a length of `nominal` mm without a tolerance of its own; beyond
+    the table, those of its last row."""
     permitted = next((value for limit, value in GENERAL if nominal <= limit), GENERAL[-1][1])
     return -permitted, permitted
 

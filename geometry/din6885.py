@@ -55,7 +55,7 @@ KEYS: tuple[tuple[float, Key], ...] = (
 
 
 def key_for_bore(diameter: float) -> Key:
-    """The key of a bore, mm; `HdoptError` where the table has none."""
+    """The key of a bore of `diameter` mm; `HdoptError` where the table, 6 mm and up, has none."""
     largest = KEYS[-1][0]
     if SMALLEST_BORE <= diameter <= largest:
         return next(key for limit, key in KEYS if diameter <= limit)

@@ -16,15 +16,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from hdopt.arrays import Array
 from hdopt.geometry.arcs import outline_of_slot, sample
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.contour import Circle
 from hdopt.geometry.dimensions import TILTS
 from hdopt.geometry.features import DBore, KeywayBore, polar
-from hdopt.geometry.part import Part, Prism
+from hdopt.geometry.part import Part, Prism, ProfiledPart
 from hdopt.geometry.sheet import SMALL, TEXT, Point, Sheet
 from hdopt.geometry.views import (
-    Array,
     Vector,
     View,
     half_behind_minor_axis_zero,
@@ -76,7 +76,7 @@ class Placed:
 
 
 def draw(job: Job) -> str:
-    """The drawing as the text of an SVG."""
+    """The drawing of a `job` as the text of an SVG."""
     sheet = Sheet(WIDTH, HEIGHT, job.identity.title, job.identity.description)
     made = [(part, solid) for part, solid in job.solids if not part.context]
     boxes = np.array([part.box for part, _ in made])
@@ -99,7 +99,8 @@ def draw(job: Job) -> str:
 
 
 def views_alone(svg: str) -> str:
-    """A drawing without border, tables and title block: for a page that shows those in its own way."""
+    """`svg`, a drawing of `draw`, without border, tables and title block: for a page that shows those in its own
+    way."""
     svg = re.sub(rf'<g id="{PAPERWORK}">.*?</g>', "", svg, count=1, flags=re.DOTALL)
     left, top, width, height = VIEWS
     old = f'width="{WIDTH:g}mm" height="{HEIGHT:g}mm" viewBox="0 0 {WIDTH:g} {HEIGHT:g}"'
@@ -108,7 +109,8 @@ def views_alone(svg: str) -> str:
 
 
 def check_drawing(path: Path, job: Job, name: str) -> dict[str, Any]:
-    """Read the drawing back: well-formed, of its size, naming the study, with every key dimension."""
+    """Read the drawing at `path` back: well-formed, of its size, naming the study, with every key dimension of the
+    `job`. Returns how many there are; raises `CheckFailed`, which calls the file `name`, with all that is wrong."""
     root = ElementTree.parse(path).getroot()
     said = [element.text or "" for element in root.iter("{http://www.w3.org/2000/svg}text")]
     failures = []
@@ -130,6 +132,7 @@ def _border(sheet: Sheet) -> None:
 
 
 def draw_view(sheet: Sheet, place: Placed, view: View) -> None:
+    """The visible lines of a `view` on the `sheet`, at `place`."""
     for line in view.visible:
         sheet.polyline(place(line))
 
@@ -163,9 +166,10 @@ def _front_view(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], 
         _disc_callout(sheet, place, carrier.contour)
 
 
-def _extent(parts: Sequence[Part]) -> tuple[float, float, float, float]:
-    boxes = np.array([part.contour.box for part in parts])
-    return (*boxes[:, :2].min(0).tolist(), *boxes[:, 2:].max(0).tolist())
+def _extent(parts: Sequence[ProfiledPart]) -> tuple[float, float, float, float]:
+    """x_min, y_min, x_max, y_max of what carries the bearing, mm."""
+    left, low, right, high = zip(*(part.contour.box for part in parts), strict=True)
+    return min(left), min(low), max(right), max(high)
 
 
 def _cutting_plane(sheet: Sheet, place: Placed, low: float, high: float) -> None:
@@ -178,7 +182,7 @@ def _cutting_plane(sheet: Sheet, place: Placed, low: float, high: float) -> None
         sheet.text((x - 8.5, end + 1.3), "A", 4.5, "end", bold=True)
 
 
-def _profile_callout(sheet: Sheet, place: Placed, carrier: Part, job: Job, right: float) -> None:
+def _profile_callout(sheet: Sheet, place: Placed, carrier: ProfiledPart, job: Job, right: float) -> None:
     """Tolerance frames of the profile: its form, and where its errors allow it to lie about the bore."""
     angle = math.radians(52)
     tip = _on_contour(carrier, angle)
@@ -195,19 +199,21 @@ def _profile_callout(sheet: Sheet, place: Placed, carrier: Part, job: Job, right
         sheet.frame((corner[0], corner[1] + 5.6), "parallelism", value, "B")
 
 
-def _on_contour(part: Part, angle: float) -> Point:
+def _on_contour(part: ProfiledPart, angle: float) -> Point:
     """A point of a part's outline in the direction `angle`, clockwise from the major axis."""
     contour = part.contour
     if isinstance(contour, Circle):
         return contour.radius * math.sin(angle), contour.offset + contour.radius * math.cos(angle)
-    return tuple(contour.points(angle)[0].tolist())
+    x, y = contour.points(angle)[0].tolist()
+    return x, y
 
 
 def _bore_callout(sheet: Sheet, place: Placed, parts: Sequence[Part], right: float, bottom: float) -> None:
     """The bore that holds the shaft, where it is seen from the front; else the hole that clears it."""
-    holder = parts[0] if parts[0].bore and not parts[0].slot and not parts[-1].clearance_hole else None
-    sliding = next((part for part in reversed(parts) if part.clearance_hole), None)
-    bore = sliding.bore if sliding else holder.bore
+    sliding = next((part.bore for part in reversed(parts) if part.clearance_hole), None)
+    bore = sliding or parts[0].bore
+    if bore is None:
+        return
     lines = [f"⌀{2 * bore.radius:g} {'H13' if sliding else 'H7'}"]
     if isinstance(bore, KeywayBore):
         depth = 2 * bore.radius + bore.key.hub_depth
@@ -219,10 +225,9 @@ def _bore_callout(sheet: Sheet, place: Placed, parts: Sequence[Part], right: flo
 
 
 def _bolt_callout(sheet: Sheet, place: Placed, parts: Sequence[Part], left: float, top: float) -> None:
-    part = next((part for part in reversed(parts) if part.bolts), None)
-    if part is None:
+    bolts = next((part.bolts for part in reversed(parts) if part.bolts), None)
+    if bolts is None:
         return
-    bolts = part.bolts
     sheet.circle(place.point(0, 0), place.scale * bolts.radius, "axis")
     x, y = bolts.centres[-1]
     edge = math.hypot(x, y)
@@ -266,7 +271,7 @@ def _section(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], job
 
 
 def _edge_callouts(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], top: float) -> None:
-    carrier = next(part for part, _ in reversed(made) if part.contour is not None)
+    carrier = next(part for part, _ in reversed(made) if isinstance(part, ProfiledPart))
     edge = carrier.body[0].top_edge
     if edge.axial:
         tip = place.point(carrier.top - edge.axial / 2, -carrier.contour.box[1] - edge.radial / 2)
@@ -278,10 +283,10 @@ def _edge_callouts(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]
 
 def _seat_dimension(sheet: Sheet, place: Placed, parts: Sequence[Part], right: float) -> None:
     """Diameter of the hub's seat or of the hole for the shaft, on the right of the section."""
-    top = next((part for part in reversed(parts) if part.bore), None)
-    if top is None or top is parts[0]:
+    top, bore = next(((part, part.bore) for part in reversed(parts) if part.bore), (parts[0], None))
+    if bore is None or top is parts[0]:
         return
-    radius = top.bore.radius
+    radius = bore.radius
     fit = "H13" if top.clearance_hole else "H7"
     label = f"⌀{2 * radius:g} {fit}" + ("/h6" if parts[0].name == "hub" else "")
     x = place.point(right, 0)[0] + 12
@@ -290,12 +295,12 @@ def _seat_dimension(sheet: Sheet, place: Placed, parts: Sequence[Part], right: f
 
 def _holding_bore(sheet: Sheet, place: Placed, parts: Sequence[Part], left: float) -> None:
     """Diameter of the bore that holds the shaft, on the left of the section; it is datum B."""
-    holder = next((part for part in parts if part.bore and not part.clearance_hole), None)
-    if holder is None:
+    held = next(((part.bottom, part.bore) for part in parts if part.bore and not part.clearance_hole), None)
+    if held is None:
         return
-    radius = holder.bore.radius
+    foot, bore = held
+    radius = bore.radius
     x = place.point(left, 0)[0] - 14
-    foot = holder.bottom
     sheet.dimension(place.point(foot, -radius), place.point(foot, radius), x, f"⌀{2 * radius:g} H7", True)
     sheet.datum((x, place.point(0, -radius)[1]), "B")
 
@@ -303,7 +308,8 @@ def _holding_bore(sheet: Sheet, place: Placed, parts: Sequence[Part], left: floa
 def draw_exploded(
     sheet: Sheet, made: list[tuple[Part, cq.Solid]], centre: Point = EXPLODED_CENTRE, room: Point = EXPLODED_ROOM
 ) -> None:
-    """The parts pulled apart along the axis, with their names, about `centre` within `room` (width, height), mm."""
+    """The parts of `made`, (part, solid) from the input on, pulled apart along the axis, with their names: on the
+    `sheet` about `centre` (x, y) within `room` (width, height), mm."""
     apart = pulled_apart(made)
     view = seen_from(apart, *EXPLODED)
     low_x, low_y, high_x, high_y = view.box
@@ -316,7 +322,7 @@ def draw_exploded(
     _names(sheet, place, made, apart)
 
 
-def _names(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], apart: list[cq.Shape]) -> None:
+def _names(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], apart: Sequence[cq.Shape]) -> None:
     """Each part's name above it."""
     eye, right = (np.array(vector) / np.linalg.norm(vector) for vector in EXPLODED)
     up = np.cross(eye, right)
@@ -328,12 +334,14 @@ def _names(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], apart
         sheet.text((x, y - 2.5), part.name.replace("_", " "), TEXT, "middle")
 
 
-def pulled_apart(made: list[tuple[Part, cq.Solid]]) -> list[cq.Shape]:
-    """The solids moved along z until none reaches into the next, with a gap; those of one height stay together."""
+def pulled_apart(made: Sequence[tuple[Part, cq.Solid]]) -> list[cq.Solid]:
+    """The solids of `made`, (part, solid) from the lowest up, each moved along z to stand a gap above the one before;
+    the gap is 0.3 of the largest part's height along y."""
     import cadquery as cq
 
     gap = EXPLODED_GAP * max(part.size[1] for part, _ in made)
-    shapes, end = [], None
+    shapes: list[cq.Solid] = []
+    end: float | None = None
     for part, solid in made:
         shift = 0.0 if end is None else end + gap - part.bottom
         shapes.append(solid.moved(cq.Location(cq.Vector(0, 0, shift))))
@@ -393,7 +401,7 @@ def _title_block(sheet: Sheet, job: Job, scale: float) -> None:
 
 
 def draw_first_angle(sheet: Sheet, at: Point) -> None:
-    """The symbol of first-angle projection (ISO 128)."""
+    """The symbol of first-angle projection (ISO 128) on the `sheet`, its middle at the point `at`, mm."""
     x, y = at
     sheet.polyline([(x - 10, y - 2), (x - 2, y - 4), (x - 2, y + 4), (x - 10, y + 2)], "thin", closed=True)
     sheet.circle((x + 7, y), 4)

@@ -15,7 +15,7 @@ from hdopt.geometry.contour import Circle, Contour
 
 if TYPE_CHECKING:
     from hdopt.geometry.job import Job
-    from hdopt.geometry.part import Part
+    from hdopt.geometry.part import ProfiledPart
 
 MILLIMETRES = 4
 """$INSUNITS of a drawing in mm."""
@@ -37,8 +37,9 @@ class Outline:
     contour: Contour | None = None
 
 
-def outlines(part: Part, zone: float, suffix: str = "") -> list[Outline]:
-    """All outlines of a part that carries the bearing; `zone` is the full width of the profile's tolerance zone, mm."""
+def outlines(part: ProfiledPart, zone: float, suffix: str = "") -> list[Outline]:
+    """All outlines of a `part` that carries the bearing; `zone` is the full width of the profile's tolerance zone, mm,
+    `suffix` the end of the layers' names."""
 
     def of(layer: str, contour: Contour) -> Outline:
         return Outline(layer, outline_of(contour), contour.area, contour)
@@ -62,7 +63,7 @@ def outlines(part: Part, zone: float, suffix: str = "") -> list[Outline]:
 
 
 def all_outlines(job: Job) -> list[Outline]:
-    """The outlines of the cam, or of both discs with their names at the end of the layers'."""
+    """The outlines of the cam of a `job`, or of both discs with their names at the end of the layers'."""
     parts, zone = job.model.profiled, job.model.profile_zone
     if len(parts) == 1:
         return outlines(parts[0], zone)
@@ -70,11 +71,11 @@ def all_outlines(job: Job) -> list[Outline]:
 
 
 def write_dxf(path: Path, job: Job) -> None:
-    """Write the outlines of what carries the bearing."""
-    import ezdxf
+    """Write the outlines of what carries the bearing in a `job` to `path`."""
     from ezdxf import units
+    from ezdxf.filemanagement import new
 
-    document = ezdxf.new("R2010", setup=["linetypes"], units=units.MM)
+    document = new("R2010", setup=["linetypes"], units=units.MM)
     document.header.custom_vars.append("hdopt", job.identity.description)
     space = document.modelspace()
     made = all_outlines(job)
@@ -101,17 +102,23 @@ def write_dxf(path: Path, job: Job) -> None:
 
 
 def check_dxf(path: Path, job: Job, name: str) -> dict[str, Any]:
-    """Read the file back: unit, layers, closed outlines, their area, and their distance from the analytic curve."""
-    import ezdxf
+    """Read the file at `path` back and compare it with the `job`: unit, layers, closed outlines, their area, and their
+    distance from the analytic curve.
 
-    document = ezdxf.readfile(path)
+    Returns the largest distance (um) and the areas by layer (mm^2); raises `CheckFailed`, which calls the file `name`,
+    with all that is wrong.
+    """
+    from ezdxf.entities.lwpolyline import LWPolyline
+    from ezdxf.filemanagement import readfile
+
+    document = readfile(path)
     failures = []
     if document.header.get("$INSUNITS") != MILLIMETRES:
         failures.append("its unit is not the millimetre")
     if document.header.custom_vars.get("hdopt") != job.identity.description:
         failures.append("it does not name the study")
     expected = all_outlines(job)
-    found = [entity for entity in document.modelspace() if entity.dxftype() == "LWPOLYLINE"]
+    found = [entity for entity in document.modelspace() if isinstance(entity, LWPolyline)]
     if len(found) != len(expected):
         failures.append(f"it has {len(found)} outlines, not {len(expected)}")
     largest, areas = 0.0, {}

@@ -13,11 +13,11 @@ from typing import Any
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, MissingLibrary, unknown_name
 from hdopt.files import replacing_all
-from hdopt.geometry.assembly import WaveGeneratorModel
 from hdopt.geometry.dimensions import Dimension
 from hdopt.geometry.formats import FORMATS
 from hdopt.geometry.job import make_job
 from hdopt.geometry.mating import MatingRow
+from hdopt.geometry.model import WaveGeneratorModel
 from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.step import Identity
 
@@ -73,11 +73,12 @@ def export_drive(
     bounds: Mapping[str, float] | None = None,
     contributors: Mapping[str, Any] | None = None,
 ) -> ExportResult:
-    """Write a drive's wave generator to `files` (a key of `FORMATS` -> path) and check each file from disk.
+    """Write a `drive`'s wave generator to `files` (a key of `FORMATS` -> path) and check each file from disk.
 
-    `name` is what the files call their study; `bounds` are tolerances by study key (mm or deg) or contributor, and
-    `contributors` the study's callouts. Raises `HdoptError` for input that cannot be made, and
-    `hdopt.geometry.check.CheckFailed` where a file fails its check: then no file of this export is left.
+    `options` are sizes that were given (mm and deg as their names say), the others follow their rules. `name` is what
+    the files call their study; `bounds` are tolerances by study key (mm or deg) or contributor, and `contributors` the
+    study's callouts. Raises `HdoptError` for input that cannot be made, and `hdopt.geometry.check.CheckFailed` where a
+    file fails its check: then no file of this export is left.
     """
     options = options or ExportOptions()
     for kind in files:

@@ -176,7 +176,8 @@ def countersink_volume(bore: Bore, size: float) -> float:
 
 
 def countersink_tool(bore: Bore, size: float, face: float, outward: int) -> cq.Shape:
-    """The countersink's cone at the plane z = `face`, whose outside lies toward `outward` (+1 or -1)."""
+    """The cone of a 45 degree countersink of `size` mm at the mouth of a `bore`, in the plane z = `face`, whose outside
+    lies toward `outward` (+1 or -1)."""
     import cadquery as cq
 
     depth = size + bore.depth_of_countersink
@@ -246,18 +247,20 @@ class BoltCircle:
 
 
 def polar(radius: float, direction: float) -> tuple[float, float]:
-    """x, y of a point at `direction`, clockwise from the major axis."""
+    """x, y of a point `radius` from the axis at `direction` rad, clockwise from the major axis."""
     return radius * math.sin(direction), radius * math.cos(direction)
 
 
 def cylinder(radius: float, bottom: float, top: float, centre: tuple[float, float] = (0.0, 0.0)) -> cq.Solid:
+    """A cylinder of `radius` between z = `bottom` and `top`, its axis through `centre` (x, y); mm."""
     import cadquery as cq
 
     return cq.Solid.makeCylinder(radius, top - bottom, cq.Vector(*centre, bottom))
 
 
 def bar(start: float, end: float, width: float, bottom: float, top: float, direction: float) -> cq.Solid:
-    """A box along `direction` from `start` to `end`, `width` across."""
+    """A box between z = `bottom` and `top`, along `direction` (rad, clockwise from the major axis) from `start` to
+    `end`, `width` across; mm."""
     import cadquery as cq
 
     box = cq.Solid.makeBox(width, end - start, top - bottom, cq.Vector(-width / 2, start, bottom))

@@ -40,10 +40,11 @@ _WORD = re.compile(r"([A-Z])\s*(-?\d+\.?\d*)")
 
 
 def wheel_path(contour: ParallelCurve, wheel_radius: float) -> Array:
-    """Work angle C (rad, rising from 0 to 2 pi) and distance X of the wheel's centre (mm): shape (n, 2).
+    """For the cam's `contour`, work angle C (rad, rising from 0 to 2 pi) and distance X of the wheel's centre (mm):
+    shape (n, 2).
 
-    The centre runs on the parallel curve a wheel's radius outside the cam; blocks are so short that even moves in C
-    and X miss it by at most `STEP_TOLERANCE`.
+    The centre of a wheel of `wheel_radius` mm runs on the parallel curve that far outside the cam; blocks are so short
+    that even moves in C and X miss it by at most `STEP_TOLERANCE`.
     """
     if not wheel_radius > 0:
         raise HdoptError(f"the wheel's radius is {wheel_radius:g} mm; it must be above 0 (export.wheel_radius_mm)")
@@ -71,7 +72,8 @@ def _polar(path: ParallelCurve, phi: Array) -> Array:
 
 
 def write_gcode(path: Path, job: Job) -> None:
-    """Write one turn of finish grinding for the cam; `HdoptError` for discs, which are ground round."""
+    """Write one turn of finish grinding for the cam of a `job` to `path`; `HdoptError` for discs, which are ground
+    round."""
     contour = _cam(job)
     radius = job.model.wheel_radius
     nodes = wheel_path(contour, radius)
@@ -97,9 +99,11 @@ def write_gcode(path: Path, job: Job) -> None:
 
 
 def ground_cam(text: str, contour: Contour, points: Array) -> Array:
-    """What the wheel leaves beyond each of `points` (n, 2) of the cam, mm; below 0 where it cuts in; shape (n,).
+    """What the wheel of a program leaves beyond each of `points` (n, 2) of the cam, mm; below 0 where it cuts in; shape
+    (n,).
 
-    Everything is taken from the code: wheel radius, blocks, even moves between them.
+    Everything is taken from the `text` of the program: wheel radius, blocks, even moves between them. The `contour`
+    says which way is out.
     """
     found = re.search(r"WHEEL RADIUS (\d+\.?\d*) MM", text)
     if found is None:
@@ -126,7 +130,8 @@ def ground_cam(text: str, contour: Contour, points: Array) -> Array:
 
 
 def check_gcode(path: Path, job: Job, name: str) -> dict[str, Any]:
-    """Simulate the wheel from the file and compare what it leaves with the cam."""
+    """Simulate the wheel from the file at `path` and compare what it leaves with the cam of the `job`. Raises
+    `CheckFailed`, which calls the file `name`, where that is off by more than `CODE_TOLERANCE`."""
     contour = _cam(job)
     text = path.read_text(encoding="ascii")
     # Angles that no block ends at.

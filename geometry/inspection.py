@@ -53,7 +53,7 @@ class Check:
 
 
 def inspection_plan(job: Job) -> tuple[Check, ...]:
-    """Every dimension with limits, the profile, and every zone of the budgets."""
+    """What is to be measured of a `job`: every dimension with limits, the profile, and every zone of the budgets."""
     found: list[Check] = []
 
     def add(part: str, feature: str, size: tuple[float, float, float] | None, zone: float | None, source: str) -> None:
@@ -98,7 +98,7 @@ def _points(feature: str, zone: float | None) -> int:
 
 
 def write_inspection(path: Path, job: Job) -> None:
-    """Write the plan as CSV."""
+    """Write the inspection plan of a `job` to `path` as CSV."""
     with open(path, "w", encoding="utf-8", newline="") as file:
         file.write(f"# {job.identity.title}: inspection plan; {job.identity.description}; mm at 20 C\n")
         writer = csv.writer(file, lineterminator="\n")
@@ -109,7 +109,8 @@ def write_inspection(path: Path, job: Job) -> None:
 
 
 def check_inspection(path: Path, job: Job, name: str) -> dict[str, Any]:
-    """Read the plan back: each feature of every part that is made, limits in order."""
+    """Read the plan at `path` back: a line at least for every part of the `job` that is made, limits in order. Raises
+    `CheckFailed`, which calls the file `name`, with all that is wrong."""
     with open(path, encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     failures = []

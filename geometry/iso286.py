@@ -56,7 +56,8 @@ class Fit:
 
 
 def fit_of(name: str, nominal: float) -> Fit:
-    """The fit written as 'H6/n5' at a nominal size, mm; `HdoptError` for one that is not in `LADDER`."""
+    """The fit of this `name`, such as 'H6/n5', at a `nominal` size, mm; `HdoptError` for one that is not in
+    `LADDER`."""
     if name not in LADDER:
         raise HdoptError(f"the fit {name!r} is not known; give one of {', '.join(LADDER)}")
     hole, shaft = name.split("/")
@@ -64,7 +65,8 @@ def fit_of(name: str, nominal: float) -> Fit:
 
 
 def deviations(tolerance_class: str, nominal: float) -> tuple[float, float]:
-    """Lower and upper deviation of a class such as 'H7', 'n5' or 'js9' at a nominal size, mm."""
+    """Lower and upper deviation, mm, of a `tolerance_class` such as 'H7', 'n5' or 'js9' at a `nominal` size, mm;
+    `HdoptError` for one that the table does not have."""
     letter, grade = tolerance_class.rstrip("0123456789"), tolerance_class.lstrip("HJSabcdefghijklmnopqrstuvwxyz")
     width = it_grade(f"IT{grade}", nominal).tolerance
     if letter == "H":
@@ -82,5 +84,6 @@ def deviations(tolerance_class: str, nominal: float) -> tuple[float, float]:
 
 
 def loosest_fit(nominal: float, play: float) -> Fit:
-    """The loosest fit of `LADDER` whose largest clearance is at most `play`, mm; the tightest one always presses."""
+    """At a `nominal` size, mm, the loosest fit of `LADDER` whose largest clearance is at most `play`, mm; the tightest
+    one always presses."""
     return next(fit for name in LADDER if (fit := fit_of(name, nominal)).largest_play <= play)

@@ -12,10 +12,11 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from hdopt.drive.geometry import Drive
-from hdopt.geometry.assembly import WaveGeneratorModel, wave_generator_model
+from hdopt.geometry.assembly import wave_generator_model
 from hdopt.geometry.budget import bounds_from
 from hdopt.geometry.dimensions import Dimension, key_dimensions
 from hdopt.geometry.mating import MatingRow, mating_rows
+from hdopt.geometry.model import WaveGeneratorModel
 from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.part import Part
 from hdopt.geometry.step import Identity
@@ -58,7 +59,12 @@ def make_job(
     bounds: Mapping[str, float] | None = None,
     contributors: Mapping[str, Any] | None = None,
 ) -> Job:
-    """Everything that is known before a solid is made: the parts, their key dimensions, and what files will say."""
+    """Everything that is known before a solid is made: the parts, their key dimensions, and what files will say.
+
+    `drive` with its wave generator, `options` the sizes that were given, `name` of the study. `bounds` are tolerances
+    by study key (mm or deg) or contributor, `contributors` the study's callouts. Raises `HdoptError` where the numbers
+    leave no part to make.
+    """
     bounds, contributors = bounds or {}, contributors or {}
     model = wave_generator_model(drive, options, bounds_from(bounds, contributors))
     identity = Identity(f"wave generator {name}", name, fingerprint(drive, options), version("hdopt"))
@@ -67,7 +73,11 @@ def make_job(
 
 
 def fingerprint(drive: Drive, options: ExportOptions) -> str:
-    """Twelve digits that change with any number the solids are made from."""
+    """Twelve hexadecimal digits that change with the wave generator and the clearances of a `drive` and with the
+    `options`.
+
+    What follows from tolerances is not among them: the fits, and the axial gap of slides where no option gives it.
+    """
     plain = json.dumps([_plain(drive.wave_generator), _plain(drive.clearances), asdict(options)], sort_keys=True)
     return hashlib.sha256(plain.encode()).hexdigest()[:12]
 

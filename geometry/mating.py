@@ -13,9 +13,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from hdopt.drive.geometry import Drive
-from hdopt.geometry.assembly import WaveGeneratorModel
 from hdopt.geometry.features import KeywayBore
 from hdopt.geometry.iso286 import deviations
+from hdopt.geometry.model import WaveGeneratorModel
 from hdopt.tolerance.contributors import CALLOUTS
 
 RIM_FACTOR = 1.15
@@ -45,7 +45,11 @@ def mating_rows(
     bounds: Mapping[str, float],
     contributors: Mapping[str, Mapping[str, Any]],
 ) -> tuple[MatingRow, ...]:
-    """The sheet for a drive: shaft, housing, bearing seats. `bounds` by study key (mm or deg) or contributor."""
+    """What the parts that meet the wave generator of a `drive` must keep: shaft, housing, bearing seats.
+
+    `model` has its parts and fits; `bounds` are tolerances by study key (mm or deg) or contributor, `contributors` the
+    study's callouts.
+    """
     return (
         *_shaft(model),
         *_eccentricity(bounds, contributors),

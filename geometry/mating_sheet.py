@@ -13,7 +13,7 @@ COLUMNS = ("part", "feature", "requirement", "value_mm", "over_mm", "feeds", "ta
 
 
 def write_mating(path: Path, job: Job) -> None:
-    """Write the sheet as CSV."""
+    """Write the sheet of a `job` to `path` as CSV."""
     with open(path, "w", encoding="utf-8", newline="") as file:
         file.write(f"# {job.identity.title}: mating parts; {job.identity.description}\n")
         writer = csv.writer(file, lineterminator="\n")
@@ -25,7 +25,8 @@ def write_mating(path: Path, job: Job) -> None:
 
 
 def check_mating(path: Path, job: Job, name: str) -> dict[str, Any]:
-    """Read the sheet back: every row, and sums within the bounds."""
+    """Read the sheet at `path` back: every row of the `job`, and sums within the bounds. Raises `CheckFailed`, which
+    calls the file `name`, with all that is wrong."""
     with open(path, encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     failures = []

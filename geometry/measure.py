@@ -17,7 +17,8 @@ SHARES = tuple((k + 0.5) / 8 for k in range(8))
 
 
 def measured_profile(file: StepFile, bearing_thickness: float, wrap: TwoDisk | None = None) -> MeasuredProfile:
-    """The profile as the file's cam, or its two discs, would give it: the outer wall, outward by the bearing, mm.
+    """The profile as the cam of a `file`, or its two discs, would give it: the outer wall, outward by
+    `bearing_thickness`, mm.
 
     The wall is walked at one height, so its points and their neighbours alone give the normals. Two discs carry the
     flexspline over the wrap angle only; `wrap` then says how the free part runs in between (Eq. (38), moved out to

@@ -44,7 +44,7 @@ def triangles(solid: cq.Solid) -> tuple[Triangles, Array, Index]:
 
 
 def write_stl(path: Path, job: Job) -> None:
-    """Binary STL of every part that is made, in its place."""
+    """Write a binary STL of every part of a `job` that is made, in its place, to `path`."""
     mesh = np.concatenate([triangles(solid)[0] for part, solid in job.solids if not part.context])
     normal = np.cross(mesh[:, 1] - mesh[:, 0], mesh[:, 2] - mesh[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
@@ -56,6 +56,8 @@ def write_stl(path: Path, job: Job) -> None:
 
 
 def check_stl(path: Path, job: Job, name: str) -> dict[str, Any]:
+    """Read the STL at `path` back: its mesh is closed and has the volume and extents of the parts of the `job`. Raises
+    `CheckFailed`, which calls the file `name`, with all that is wrong."""
     content = path.read_bytes()
     count = int(np.frombuffer(content, "<u4", 1, 80)[0])
     records = np.frombuffer(content, [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")], count, 84)
@@ -67,7 +69,8 @@ def check_stl(path: Path, job: Job, name: str) -> dict[str, Any]:
 
 
 def write_3mf(path: Path, job: Job) -> None:
-    """One object a part, with its name and colour, all in one component. CadQuery's own writer has no names."""
+    """Write a 3MF of a `job` to `path`: one object a part, with its name and colour. CadQuery's own writer has no
+    names."""
     made = [(part, solid) for part, solid in job.solids if not part.context]
     model = ElementTree.Element("model", {"xmlns": CORE, "unit": "millimeter", "xml:lang": "en-US"})
     for key, text in (("Title", job.identity.title), ("Description", job.identity.description)):
@@ -108,6 +111,8 @@ def write_3mf(path: Path, job: Job) -> None:
 
 
 def check_3mf(path: Path, job: Job, name: str) -> dict[str, Any]:
+    """Read the 3MF at `path` back: the parts by name, each mesh closed and with the volume and extents of the parts of
+    the `job`. Raises `CheckFailed`, which calls the file `name`, with all that is wrong."""
     with zipfile.ZipFile(path) as archive:
         model = ElementTree.fromstring(archive.read("3D/3dmodel.model"))
     failures = []

@@ -1,6 +1,6 @@
 """What a wave generator's solids need beyond the model of the drive: sizes that a study's `[export]` section may give.
 
-A size that is None was not given; a rule of `hdopt.geometry.assembly` then finds it, and whoever exports is told the
+A size that is None was not given; a rule (`RULES`) then finds it, and whoever exports is told the
 reason that stands here.
 """
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from hdopt.arrays import Array, Mask
 from hdopt.geometry.areas import strip_of_disc
-from hdopt.geometry.contour import Contour
+from hdopt.geometry.contour import Circle, Contour, ParallelCurve
 from hdopt.geometry.features import (
     BoltCircle,
     Bore,
@@ -190,3 +190,11 @@ class Part:
         if self.bolts:
             tools += self.bolts.tool(below, above)
         return tools
+
+
+@dataclass(frozen=True)
+class ProfiledPart(Part):
+    """A part that carries the flexible bearing, the cam or a disc: one prism or several within its `contour`."""
+
+    body: tuple[Prism, ...] = field(kw_only=True)
+    contour: Circle | ParallelCurve = field(kw_only=True)

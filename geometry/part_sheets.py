@@ -63,29 +63,29 @@ NOTES = (
 
 
 def sheets(job: Job) -> list[Sheet]:
-    """The assembly first, then every part in the order of the parts list."""
+    """The sheets of a `job`: the assembly first, then every part in the order of the parts list."""
     made = job.made
     drawn = [_assembly(job)]
     return drawn + [_part_sheet(job, part, solid, number) for number, (part, solid) in enumerate(made, 1)]
 
 
 def mass(part: Part) -> float:
-    """kg, of the assumed material."""
+    """Mass of a `part`, kg, of the assumed material."""
     return part.volume * material(part)[1]
 
 
 def material(part: Part) -> tuple[str, float]:
-    """Name and density (kg/mm^3)."""
+    """Name and density (kg/mm^3) of the material assumed for a `part`."""
     return MATERIALS.get(part.name, CARRIER)
 
 
 def part_number(job: Job, number: int) -> str:
-    """Number of a part: the study's fingerprint and its place in the parts list (0: the assembly)."""
+    """Number of a part of a `job`: the fingerprint and its `number` in the parts list (0: the assembly)."""
     return f"WG-{job.identity.fingerprint[:8].upper()}-{number:02d}"
 
 
 def product_data(job: Job) -> dict[str, ProductData]:
-    """Number, material and callouts of each part that is made, by its name."""
+    """Number, material and callouts of each part of a `job` that is made, by its name."""
     return {
         part.name: ProductData(part_number(job, number), *material(part), callouts_of(part, job.model))
         for number, part in enumerate((part for part in job.model.parts if not part.context), 1)

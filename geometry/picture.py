@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hdopt.arrays import Array, Index
 from hdopt.errors import HdoptError
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.drawing import EXPLODED, pulled_apart
@@ -35,13 +36,14 @@ class NoPicture(HdoptError):
 
 
 def write_png(path: Path, job: Job) -> None:
-    """Render the parts in their colours, with their edges; `NoPicture` where the machine cannot render off screen.
+    """Render the parts of a `job` in their colours, with their edges, to `path`; `NoPicture` where the machine cannot
+    render off screen.
 
     Where OpenGL is missing VTK does not say so but ends the process it runs in, so it is given one of its own.
     """
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / "scene.npz"
-        np.savez(scene, eye=EXPLODED[0], **_scene(job))
+        np.savez(scene, **_scene(job))  # type: ignore[arg-type]  # its keyword allow_pickle is a bool, ours are arrays
         command = [sys.executable, "-m", "hdopt.geometry.render", str(scene), str(path)]
         try:
             done = subprocess.run(command, capture_output=True, timeout=TIME_LIMIT).returncode
@@ -55,7 +57,8 @@ def write_png(path: Path, job: Job) -> None:
 
 
 def check_png(path: Path, job: Job, name: str) -> dict[str, Any]:
-    """Read the picture back: its size, and that something is to be seen."""
+    """Read the picture of a `job` at `path` back: its size, and that something is to be seen. Returns width and height
+    in pixels; raises `CheckFailed`, which calls the file `name`, where it is blank or of another size."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOImage import vtkPNGReader
 
@@ -74,13 +77,14 @@ def check_png(path: Path, job: Job, name: str) -> dict[str, Any]:
     return {"width": width, "height": height}
 
 
-def _scene(job: Job) -> dict[str, np.ndarray]:
-    """Meshes, colours and edges of all parts, as arrays; parts in a context stay in their places."""
+def _scene(job: Job) -> dict[str, Array | Index]:
+    """Where the eye is, and meshes, colours and edges of all parts, as arrays; parts in a context stay in their
+    places."""
     made = [(part, solid) for part, solid in job.solids if not part.context]
-    shapes: list[tuple[Part, cq.Shape]] = list(job.solids)
+    shapes: list[tuple[Part, cq.Solid]] = list(job.solids)
     if len(made) == len(shapes):
         shapes = list(zip((part for part, _ in made), pulled_apart(made), strict=True))
-    arrays: dict[str, np.ndarray] = {}
+    arrays: dict[str, Array | Index] = {"eye": np.array(EXPLODED[0])}
     for index, (part, shape) in enumerate(shapes):
         _, vertices, corners = triangles(shape)
         lines = sharp_edges(shape)

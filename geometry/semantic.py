@@ -77,7 +77,7 @@ def _labels(shapes: Any, whole: TDF_Label, solid: cq.Shape, faces: Sequence[Face
 
 
 def faces_of(solid: cq.Shape, wanted: Face) -> list[TopoDS_Face]:
-    """The faces of a solid that a callout speaks of."""
+    """The faces of a `solid` that match the one `wanted`, as a callout describes it."""
     faces = [face.wrapped for face in solid.Faces()]
     if isinstance(wanted, Cylinder | Level | Flank):
         return [face for face in faces if _is(face, wanted)]

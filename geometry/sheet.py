@@ -310,7 +310,7 @@ FRAME_HEIGHT = 5.6
 
 @lru_cache(maxsize=4096)
 def text_width(content: str, size: float, bold: bool = False) -> float:
-    """Width of a text in DejaVu Sans of a font size, both in mm."""
+    """Width of the text `content` in DejaVu Sans, `bold` or not, at a font `size`, both in mm."""
     from matplotlib.font_manager import FontProperties, findfont, get_font
 
     font = get_font(findfont(FontProperties(family="DejaVu Sans", weight="bold" if bold else "normal")))

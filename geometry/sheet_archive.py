@@ -16,12 +16,12 @@ from hdopt.geometry.sheet_dxf import dxf_of
 
 
 def names(job: Job) -> list[str]:
-    """Names of the sheets, without their endings."""
+    """Names of the sheets of a `job`, without their endings."""
     return ["00-assembly", *(f"{number:02d}-{part.name}" for number, (part, _) in enumerate(job.made, 1))]
 
 
 def write_drawings(path: Path, job: Job) -> None:
-    """Write every sheet as SVG and as DXF into one ZIP."""
+    """Write every sheet of a `job` as SVG and as DXF into one ZIP at `path`."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, sheet in zip(names(job), sheets(job), strict=True):
             for ending, text in (("svg", sheet.svg()), ("dxf", dxf_of(sheet))):
@@ -31,7 +31,8 @@ def write_drawings(path: Path, job: Job) -> None:
 
 
 def check_drawings(path: Path, job: Job, name: str) -> dict[str, Any]:
-    """Read the ZIP back: every sheet in both forms, in mm, naming the study and saying the same texts."""
+    """Read the ZIP at `path` back: every sheet of the `job` in both forms, in mm, naming the study and saying the same
+    texts. Raises `CheckFailed`, which calls the file `name`, with all that is wrong."""
     from ezdxf.filemanagement import read
 
     failures, count = [], 0
@@ -54,7 +55,8 @@ def check_drawings(path: Path, job: Job, name: str) -> dict[str, Any]:
 
 
 def check_pdf(path: Path, job: Job, name: str) -> dict[str, Any]:
-    """Read the PDF back: it is whole, with a page of A3 for every sheet."""
+    """Read the PDF at `path` back: it is whole, with a page for every sheet of the `job`. Raises `CheckFailed`, which
+    calls the file `name`, where it is not."""
     content = path.read_bytes()
     pages = len(re.findall(rb"/Type /Page\b", content))
     failures = []

@@ -14,7 +14,7 @@ LINETYPES = {"hidden": "DASHED", "axis": "CENTER"}
 
 
 def dxf_of(sheet: Sheet) -> str:
-    """Text of the DXF; y points up there."""
+    """Text of the DXF of a `sheet`, in mm; y points up there."""
     from ezdxf import units
     from ezdxf.enums import TextEntityAlignment
     from ezdxf.filemanagement import new

@@ -18,7 +18,7 @@ INCH, POINT = 25.4, 25.4 / 72
 
 
 def write_pdf(path: Path, sheets: Sequence[Sheet]) -> None:
-    """Write the sheets as pages; text stays text, with its font in the file."""
+    """Write the `sheets`, one at least, as pages of a PDF at `path`; text stays text, with its font in the file."""
     import matplotlib
     from matplotlib.backends.backend_pdf import FigureCanvasPdf, PdfPages
     from matplotlib.figure import Figure

@@ -30,7 +30,8 @@ Station = tuple[float, float]
 
 @singledispatch
 def loft(contour: Contour, stations: Sequence[Station]) -> cq.Solid:
-    """The solid whose section at each station's z is the contour's parallel at its inset, straight in between."""
+    """The solid whose section at each of `stations`, (z, inset) in mm with z rising, is the parallel of the `contour`
+    at that inset, straight in between. `TypeError` for a contour of no known kind."""
     raise TypeError(f"no solid is known for a {type(contour).__name__}")
 
 

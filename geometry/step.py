@@ -73,7 +73,11 @@ def write_step(
     schema: str = "AP214",
     products: Mapping[str, ProductData] | None = None,
 ) -> None:
-    """Write an assembly of named, coloured parts, in mm; with `products`, by part, their data and tolerances too."""
+    """Write an assembly of named, coloured `parts`, each with its solid, to `path`, in mm.
+
+    `identity` goes into the header, `schema` is the application protocol, "AP214" or "AP242"; with `products`, by part,
+    their data and tolerances are written too.
+    """
     import cadquery as cq
     from cadquery.occ_impl.assembly import toCAF
     from OCP.IFSelect import IFSelect_ReturnStatus
@@ -169,7 +173,7 @@ def _number_products(model: Any, products: Mapping[str, ProductData]) -> None:
 
 
 def read_step(path: Path) -> StepFile:
-    """Read a STEP file from disk: names, colours and solids in their places."""
+    """Read the STEP file at `path` from disk: names, colours and solids in their places."""
     import cadquery as cq
 
     with open(path, encoding="latin-1") as file:

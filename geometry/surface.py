@@ -39,14 +39,16 @@ class Wall:
 
 
 def walls(solid: cq.Solid, shares: Sequence[float] = BETWEEN) -> list[Wall]:
-    """The rings of upright faces joined to each other, as points at these shares of spline spans; widest first."""
+    """The rings of upright faces of a `solid` that are joined to each other, as points at these `shares` (0 to 1) of
+    spline spans; widest along y first."""
     upright = [face for face in (face.wrapped for face in solid.Faces()) if is_upright(face)]
     rings = [Wall(np.concatenate([_wall_points(face, shares) for face in ring])) for ring in _rings(upright)]
     return sorted(rings, key=lambda wall: -np.ptp(wall.points[:, 1]))
 
 
 def face_points(solid: cq.Solid, per_side: int = 5) -> Array:
-    """Points (n, 3) spread over all faces of a solid, mm; those that fall into a face's holes are left out."""
+    """Points (n, 3) spread over all faces of a `solid`, mm, `per_side` squared of each; those that fall into a face's
+    holes are left out."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.BRepTopAdaptor import BRepTopAdaptor_FClass2d
     from OCP.gp import gp_Pnt2d
@@ -66,6 +68,7 @@ def face_points(solid: cq.Solid, per_side: int = 5) -> Array:
 
 
 def is_upright(face: TopoDS_Face) -> bool:
+    """Whether the normal of a `face` is square to the z axis, at four points of a curved one."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_SurfaceType
     from OCP.gp import gp_Pnt, gp_Vec

@@ -66,7 +66,7 @@ def seen_from(solids: Sequence[cq.Shape], eye: Vector, right: Vector) -> View:
 
 
 def sharp_edges(shape: cq.Shape) -> list[Array]:
-    """Points (n, 3) along every edge at which the surface has a corner."""
+    """Points (n, 3), mm, along every edge of a `shape` at which its surface has a corner; an array an edge."""
     import cadquery as cq
     from OCP.BRep import BRep_Tool
     from OCP.BRepLib import BRepLib

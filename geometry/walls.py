@@ -30,7 +30,7 @@ class Wall:
 
 
 def require_walls(parts: Sequence[Part], least: float) -> None:
-    """`HdoptError` that names both features where a part that is made has a wall below `least` mm."""
+    """Raise an `HdoptError` that names both features where one of `parts` that is made has a wall below `least` mm."""
     # The carrier of the bearing first: other parts' sizes follow from its width where nobody gives them.
     for part in sorted((part for part in parts if not part.context), key=lambda part: part.contour is None):
         for wall in walls_of(part):

@@ -1,7 +1,7 @@
 """The study section `[export]`: what a wave generator's solids need beyond the model of the drive.
 
 Every key may be left out; whoever exports is told which sizes were then found by a rule, and by which
-(`hdopt.geometry.options` holds the reasons, `hdopt.geometry.assembly` the rules).
+(`RULES` in `hdopt.geometry.options`).
 """
 
 from __future__ import annotations

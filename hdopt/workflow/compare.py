@@ -125,12 +125,11 @@ def write_comparison(result: CompareResult, files: Mapping[str, Path], study: St
 
 def _nominal(job: Job, surface: Surface, part: str | None) -> tuple[str, Contour]:
     """The part that was measured and the contour that the points are to lie on."""
-    names = [item.name for item in job.model.profiled]
-    name = part or names[0]
-    if name not in names:
-        raise HdoptError(unknown_name("part with a profile", name, names))
-    contour = job.model.part(name).contour
-    assert contour is not None
+    carriers = {item.name: item.contour for item in job.model.profiled}
+    name = part or next(iter(carriers))
+    if name not in carriers:
+        raise HdoptError(unknown_name("part with a profile", name, carriers))
+    contour = carriers[name]
     if surface == "bearing":
         contour = contour.inward(-(job.drive.wave_generator.bearing_thickness or 0.0))
     return name, contour

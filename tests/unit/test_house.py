@@ -17,7 +17,6 @@ KERNELS: dict[str, str] = {}
 
 UNDESCRIBED = {
     "bench": 36,
-    "geometry": 79,
     "kinematics": 20,
     "simulation": 3,
     "studies": 6,
