@@ -11,7 +11,7 @@ import pytest
 
 import hdopt
 from hdopt.cli.app import COMMANDS
-from hdopt.geometry.export import FORMATS
+from hdopt.geometry.formats import FORMATS
 from hdopt.tolerance.distributions import Normal, Rayleigh
 
 CALLS = {
