@@ -75,10 +75,15 @@ def _lines(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"  next: {diagnosis.separating_test}"
     fit = diagnosis.fit
     yield (
-        f"  held-out: base {fit['heldout_rms_base_arcmin']:.4f}, extended {fit['heldout_rms_extended_arcmin']:.4f}, "
-        f"generic {fit['heldout_rms_generic_arcmin']:.4f}, placebo {fit['heldout_rms_placebo_arcmin']:.4f} arcmin; "
-        f"false alarm p {fit['false_alarm_p']:.3g}"
+        f"  cross-validated: base {fit['heldout_rms_base_arcmin']:.4f}, "
+        f"extended {fit['heldout_rms_extended_arcmin']:.4f}, generic {fit['heldout_rms_generic_arcmin']:.4f}, "
+        f"placebo {fit['heldout_rms_placebo_arcmin']:.4f} arcmin; false alarm p {fit['false_alarm_p']:.3g}"
     )
+    if fit["heldout_nested_rms_arcmin"] is not None:
+        yield (
+            f"  turns that no stage saw: base {fit['heldout_nested_rms_base_arcmin']:.4f}, extended "
+            f"{fit['heldout_nested_rms_arcmin']:.4f} arcmin"
+        )
     if fit["heldout_conditions_rms_base_arcmin"] is not None:
         yield (
             f"  conditions left out: base {fit['heldout_conditions_rms_base_arcmin']:.4f}, extended "

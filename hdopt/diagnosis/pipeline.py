@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from hdopt.diagnosis.checks.assessment import Evidence, assess
+from hdopt.diagnosis.nested import nested_held_out
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
 from hdopt.diagnosis.stages import STAGES, begin
+from hdopt.diagnosis.state import State
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import Recording
 
@@ -20,9 +23,13 @@ def gather_evidence(
 ) -> Evidence:
     """Run all stages on `recordings` with the `base` model (None for a gear without one); random drives are drawn
     with `seed`, and `nuisance` names what is free beside the model (`inference.nuisance`). `settings` are the
-    thresholds.
+    thresholds. All of it is done once more on a part of the turns, and looked at on the others.
     """
-    state = begin(recordings, base, seed, settings, nuisance)
-    for stage in STAGES:
-        state = stage(state)
-    return assess(state)
+
+    def run(some: Sequence[Recording]) -> State:
+        state = begin(some, base, seed, settings, nuisance)
+        for stage in STAGES:
+            state = stage(state)
+        return state
+
+    return replace(assess(run(recordings)), nested=nested_held_out(recordings, run, seed, settings))

@@ -256,6 +256,10 @@ class HeldOutSettings:
         1e-3, "1", "choice: keeps a column that lives in the held-out turns alone from running off"
     )
     fewest_turns: int = threshold(3, "input turns", "theorem: a spread needs that many differences")
+    nested_share: float = threshold(
+        0.2, "1", "choice: share of the turns that a whole diagnosis never sees, as in one of five folds"
+    )
+    nested_training: int = threshold(6, "input turns", "choice: turns that are left to it at least")
     flips: int = threshold(499, "1", "theorem: resolves a chance of 1 in 500")
     locate_flips: int = threshold(199, "1", "theorem: resolves a chance of 1 in 200")
     remainder_orders: int = threshold(3, "1", "choice: orders listed of what is left")

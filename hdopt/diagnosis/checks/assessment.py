@@ -17,6 +17,7 @@ from hdopt.diagnosis.inference.conditions import AcrossConditions, across_condit
 from hdopt.diagnosis.inference.cross_validation import HeldOut, family_wise_p, held_out, paired_t, turn_folds
 from hdopt.diagnosis.inference.fit import Fit, term_columns
 from hdopt.diagnosis.inference.generic_basis import useful_columns
+from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut
 from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import MAD_TO_SIGMA, SMALLEST_POWER, TINY
@@ -74,6 +75,7 @@ class Evidence:
     neighbours_arcmin: float
     sensor_arcmin: float
     scale: Scale | None
+    nested: NestedHeldOut | None = None
 
     @property
     def settings(self) -> DiagnosisSettings:

@@ -39,6 +39,10 @@ class Noise:
             touched[lag:] |= left_out[:-lag]
         return replace(self, root_weight=np.where(touched, 0.0, self.root_weight))
 
+    def on(self, rows: Rows) -> Noise:
+        """The same noise on other `rows`."""
+        return replace(self, root_weight=weights_with_a_past(rows, len(self.ar)))
+
     def whiten(self, values: Array) -> Array:
         """`values` (n,) or (n, q), filtered and weighted along the first axis."""
         if not len(self.ar):
@@ -98,14 +102,19 @@ def estimate(rows: Rows, residual: Array, settings: NoiseSettings = DEFAULT.nois
     ar = without_lines(
         autoregression(_covariance(piece, residual, settings), n, settings), settings.largest_oscillating_pole
     )
-    order = len(ar)
-    valid = np.ones(n, bool)
+    noise = Noise(ar, 1.0, weights_with_a_past(rows, len(ar)))
+    white = noise.whiten(residual)
+    return Noise(ar, float(np.sqrt(np.sum(white**2) / max((noise.root_weight > 0).sum(), 1))), noise.root_weight)
+
+
+def weights_with_a_past(rows: Rows, order: int) -> Array:
+    """Root weights (n,) of the `rows` that have so many (`order`) before them in their own piece; 0 for the others."""
+    piece = rows.piece
+    valid = np.ones(len(piece), bool)
     valid[:order] = False
     for lag in range(1, order + 1):
         valid[lag:] &= piece[lag:] == piece[:-lag]
-    noise = Noise(ar, 1.0, np.where(valid, np.sqrt(rows.weight), 0.0))
-    white = noise.whiten(residual)
-    return Noise(ar, float(np.sqrt(np.sum(white**2) / max(valid.sum(), 1))), noise.root_weight)
+    return np.where(valid, np.sqrt(rows.weight), 0.0)
 
 
 def _covariance(piece: Index, residual: Array, settings: NoiseSettings) -> Array:

@@ -16,13 +16,17 @@ from hdopt.effects.estimate import Parameter
 
 
 class FitNumbers(TypedDict):
-    """The numbers behind a verdict, arcmin rms: held-out errors of base, extended, generic and placebo model, on turns
-    and on whole conditions (None where there is one condition), and the noise floor; the chance of a false alarm."""
+    """The numbers behind a verdict, arcmin rms: cross-validated errors of base, extended, generic and placebo model, on
+    turns that no stage saw (`nested`; None where too few could be spared), and on whole conditions (None where there is
+    one condition), and the noise floor; the chance of a false alarm.
+    """
 
     heldout_rms_base_arcmin: float
     heldout_rms_extended_arcmin: float
     heldout_rms_generic_arcmin: float
     heldout_rms_placebo_arcmin: float
+    heldout_nested_rms_base_arcmin: float | None
+    heldout_nested_rms_arcmin: float | None
     heldout_conditions_rms_base_arcmin: float | None
     heldout_conditions_rms_extended_arcmin: float | None
     noise_floor_arcmin: float

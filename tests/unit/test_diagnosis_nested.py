@@ -1,0 +1,160 @@
+"""The held-out figure is of turns that no stage of the diagnosis saw."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hdopt.diagnosis import diagnose
+from hdopt.diagnosis.inference.cross_validation import held_out, turn_folds
+from hdopt.diagnosis.inference.hidden_turns import hidden_samples, uncut_blocks, without_samples
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.nested import as_seen, nested_held_out
+from hdopt.diagnosis.orientation import AS_COUNTED, turn_round
+from hdopt.diagnosis.search.candidates import Candidate, joint_fit
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.diagnosis.stages import begin, fit_base_in_noise
+from hdopt.drive.geometry import ARCMIN
+from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.rows import gather
+
+TURN = 2 * np.pi
+RATIO, TURNS, RATE, NOISE = 50.0, 40, 48, 0.02
+RAMP = np.arange(TURNS // 2 * RATE) * TURN / RATE
+THETA = np.r_[RAMP, RAMP[::-1]]
+"""Twenty turns there and back."""
+
+
+def record(error, gain=1.0):
+    table = {
+        "time_s": 0.01 * np.arange(len(THETA)),
+        "input_angle_deg": np.degrees(THETA),
+        "output_angle_deg": gain * np.degrees(THETA / RATIO - error * ARCMIN),
+    }
+    return recording_from_table(pd.DataFrame(table), RATIO, name="record")
+
+
+def noise(seed=0):
+    return np.random.default_rng(seed).normal(0, NOISE, len(THETA))
+
+
+def base_alone(recordings):
+    """A diagnosis without a search: fast, and it sees all that it is given."""
+    return fit_base_in_noise(begin(recordings, None, 1, DEFAULT))
+
+
+def hidden_of(recording, seed=1):
+    return hidden_samples([recording], np.random.default_rng(seed), DEFAULT.held_out)
+
+
+def test_whole_turns_are_hidden_and_none_in_which_a_pass_begins_or_ends():
+    """Fault caught: a turn of a reversal hidden, so that nothing knows where it was."""
+    recording = record(noise())
+    rows, (hidden,) = gather([recording]), hidden_of(recording)
+    turns = np.unique(rows.block[hidden])
+    assert len(turns) == round(DEFAULT.held_out.nested_share * rows.blocks)
+    assert hidden.sum() == np.isin(rows.block, turns).sum()
+    ends = {rows.block[0], rows.block[-1], *rows.block[np.flatnonzero(np.diff(rows.direction))]}
+    ends |= set(rows.block[np.flatnonzero(np.diff(rows.direction)) + 1])
+    assert not ends & set(turns)
+    assert set(uncut_blocks(rows)) == set(rows.block) - ends
+
+
+def test_turns_are_drawn_by_the_seed():
+    recording = record(noise())
+    one, again, other = (hidden_of(recording, seed)[0] for seed in (1, 1, 2))
+    assert np.array_equal(one, again) and not np.array_equal(one, other)
+
+
+def test_a_record_that_can_spare_no_turns_has_no_figure():
+    recording = record(noise())
+    few = [np.arange(len(recording)) >= 6 * RATE]
+    assert hidden_samples(without_samples([recording], few), np.random.default_rng(1), DEFAULT.held_out) is None
+
+
+def test_what_is_left_has_a_gap_where_turns_were_and_the_rest_as_it_was():
+    """Fault caught: rows on both sides of a gap taken for neighbours."""
+    recording = record(noise())
+    hidden = hidden_of(recording)
+    (left,) = without_samples([recording], hidden)
+    assert np.array_equal(left.error_arcmin, recording.error_arcmin[~hidden[0]])
+    before, after = gather([recording]), gather([left])
+    at = np.flatnonzero(np.diff(np.flatnonzero(~hidden[0])) > 1)
+    assert len(at) > 3 and np.all(np.diff(after.piece)[at] > 0)
+    np.testing.assert_allclose(after.travel, before.travel[~hidden[0]], atol=1e-9)
+    np.testing.assert_array_equal(after.direction, before.direction[~hidden[0]])
+
+
+def test_what_the_hidden_turns_hold_is_never_learnt():
+    """Their errors exchanged for others: everything that is predicted stays to the last digit, so the figure is that of
+    the others. Fault caught: held-out rows left in any stage or in the last fit.
+    """
+    recording = record(0.3 * np.sin(2 * THETA) + noise())
+    (hidden,) = hidden_of(recording)
+    spoilt = replace(recording, error_arcmin=recording.error_arcmin + np.where(hidden, 5.0, 0.0))
+    states = []
+
+    def seen(recordings):
+        states.append(base_alone(recordings))
+        return states[-1]
+
+    plain, other = (nested_held_out([one], seen, 1, DEFAULT) for one in (recording, spoilt))
+    np.testing.assert_array_equal(states[0].base.prediction, states[1].base.prediction)
+    # All of the hidden rows are 5 arcmin off now, and no other is: their mean square is the old one plus 25 and twice 5
+    # times the old mean error, 0.02/sqrt(384).
+    assert other.extended**2 - plain.extended**2 == pytest.approx(25, rel=0.02)
+    assert plain.turns == other.turns == round(DEFAULT.held_out.nested_share * gather([recording]).blocks)
+
+
+def test_a_choice_that_overfits_shows_in_the_nested_figure_alone():
+    """Pure noise, described by the sixty of six hundred orders that fit it best. Chosen with all turns in sight they
+    predict every fold better than nothing does; chosen on the other turns they predict the hidden ones worse.
+    """
+    orders = np.linspace(2.5, 20.5, 600)
+
+    def overfitting(recordings):
+        state = base_alone(recordings)
+        problem, probe = state.problem, FitProbe(state.base)
+        sine = problem.explanations["_sine_in_angle"]
+        terms = [replace(sine.term(problem.rows, {"order": order}), steps={}) for order in orders]
+        best = sorted(terms, key=probe.gain, reverse=True)[:60]
+        fit = joint_fit(state.base, best)
+        return replace(state, selection=replace(state.selection, candidates=(Candidate(fit, 1.0, 1.0),)))
+
+    recording = record(noise(7))
+    nested = nested_held_out([recording], overfitting, 1, DEFAULT)
+    state = overfitting([recording])
+    folds = turn_folds(state.base, np.random.default_rng(1))
+    chosen_on_all, truth = (held_out(fit, None, folds).rms for fit in (state.selection.best.fit, state.base))
+    assert chosen_on_all < 0.99 * truth
+    assert nested.extended > 1.01 * nested.base
+    assert nested.base == pytest.approx(NOISE, rel=0.1)  # 8 turns of 48 rows: 3.6 %
+    assert nested.effects == ("_sine_in_angle",)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_hidden_turns_are_looked_at_as_the_others_were(turned):
+    """Zero, slope and way of counting of the state that saw the others: kept samples come out as it has them."""
+    recording = record(30.0 + noise(), gain=1.005)
+    hidden = hidden_of(recording)
+    state = base_alone(without_samples([recording], hidden))
+    assert state.nuisances.taken is not None
+    if turned:
+        nuisances = replace(state.nuisances, taken=state.nuisances.taken.turned)
+        counted = replace(AS_COUNTED, input=-1)
+        state = replace(state, recordings=turn_round(state.recordings), nuisances=nuisances, orientation=counted)
+    (seen,) = as_seen([recording], hidden, state)
+    np.testing.assert_allclose(seen.error_arcmin[~hidden[0]], state.recordings[0].error_arcmin, atol=1e-9)
+    np.testing.assert_allclose(seen.input_angle[~hidden[0]], state.recordings[0].input_angle, atol=1e-12)
+    assert np.std(seen.error_arcmin) < 2 * NOISE
+
+
+@pytest.mark.slow
+def test_the_figure_of_a_whole_diagnosis_is_the_noise():
+    """An eccentric input encoder hidden: chosen anew on 32 turns, and the other 8 left with the noise."""
+    diagnosis = diagnose(record(0.3 * np.sin(THETA + 0.4) + noise()), ratio=RATIO)
+    nested = diagnosis.evidence.nested
+    assert nested.effects == ("encoder_input_eccentricity",)
+    assert diagnosis.fit["heldout_nested_rms_arcmin"] == nested.extended == pytest.approx(NOISE, rel=0.1)
+    assert diagnosis.fit["heldout_nested_rms_base_arcmin"] == nested.base == pytest.approx(0.3 / np.sqrt(2), rel=0.1)
