@@ -10,7 +10,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -49,8 +50,8 @@ def run_case(seed: int, effect: str, severity: float, drive: Drive) -> Case | No
     from hdopt.recordings.rows import gather, neighbours_for
     from hdopt.workflow.compensate import compensate
 
-    spec: Any = cases.Spec("single" if effect else "nothing", seed, (effect,) if effect else (), severity)
-    drawn: Any = cases._simulate(spec, np.random.default_rng([seed, 7]))
+    spec = cases.Spec("single" if effect else "nothing", seed, (effect,) if effect else (), severity)
+    drawn = cases.simulate(spec, np.random.default_rng([seed, 7]))
     if drawn is None:
         return None
     seen = [recording_from_table(table, drive.geometry.ratio, name=f"run {k}") for k, table in enumerate(drawn.tables)]
@@ -63,6 +64,7 @@ def run_case(seed: int, effect: str, severity: float, drive: Drive) -> Case | No
     fresh = recording_from_table(table, drive.geometry.ratio)
     truth = read_error(setup, drawn.hidden) / ARCMIN
     if len(truth) != len(fresh):
+        assert fresh.time is not None, "every table of the bench has its time"
         truth = truth[np.searchsorted(table["time_s"].to_numpy(), fresh.time)]
     neighbours = neighbours_for(seen)
     rows = gather([fresh], neighbours)
@@ -112,6 +114,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the cases that `arguments` name and write a line each, then the summary; finished lines are kept."""
     import pandas as pd
 
+    from hdopt.files import to_csv, write_text
     from hdopt.study import load_study
 
     parser = argparse.ArgumentParser(prog="python -m hdopt.studies.compensation", description=__doc__)
@@ -132,7 +135,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         case = run_case(seed, effect, severity, drive)
         if case is not None:
             rows.append({str(key): value for key, value in asdict(case).items()})
-            pd.DataFrame(rows).to_csv(options.out, index=False)
+            write_text(Path(options.out), to_csv(pd.DataFrame(rows)))
     for line in summary(pd.DataFrame(rows)):
         print(line)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pandas as pd
+
 from hdopt.report import KeyFigures, Section, Table, Text
 from hdopt.studies.sections import ConcealedSection
 from hdopt.study import Study
@@ -9,12 +11,11 @@ from hdopt.workflow.steps import Context, StepResult
 
 
 def concealed_physics(study: Study, context: Context) -> StepResult:
-    """Score of a blind proof: false alarms, exact sets, unknowns, intervals, confidences, every failed case.
+    """Score of a blind proof of the `study`, with the diagnosis' seed of the `context`: false alarms, exact sets,
+    unknowns, intervals, confidences, every failed case.
 
     The answer to the study is "no" where a criterion of the frozen gate (`hdopt.bench.thresholds`) is missed.
     """
-    import pandas as pd
-
     from hdopt.bench.proof import prove
     from hdopt.diagnosis import diagnose
     from hdopt.parallel.engine import engine_from, for_large_items
@@ -24,7 +25,7 @@ def concealed_physics(study: Study, context: Context) -> StepResult:
     drive = study.drive
     ratio = drive.geometry.ratio
 
-    def answer(tables):
+    def answer(tables: tuple[pd.DataFrame, ...]) -> dict[str, object]:
         records = [recording_from_table(table, ratio, name=f"recording {i + 1}") for i, table in enumerate(tables)]
         return diagnose(records, drive, seed=context.seed).to_dict()
 
@@ -50,6 +51,11 @@ def concealed_physics(study: Study, context: Context) -> StepResult:
             Text(f"Seed {size.seed}, {size.share:.0%} of the full proof, {len(scores.cases)} cases."),
         ),
     )
-    results = {"seed": size.seed, "share": size.share, "cases": len(scores.cases), "passed": bool(scores.passed)}
+    results: dict[str, object] = {
+        "seed": size.seed,
+        "share": size.share,
+        "cases": len(scores.cases),
+        "passed": bool(scores.passed),
+    }
     results["gate"] = gate.to_dict("records")
     return StepResult((section,), results, says=tuple(scores.summary().splitlines()), answer=bool(scores.passed))

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
+from hdopt.arrays import Array
+from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
 from hdopt.report import Section, Table, Text
 from hdopt.studies.sections import ResidualsSection
 from hdopt.study import Study
 from hdopt.workflow.steps import Context, StepResult
+
+if TYPE_CHECKING:
+    from hdopt.bench.real_residuals import RealResidual
+    from hdopt.diagnosis.verdict.diagnosis import Diagnosis
 
 REVERSING = "planetary-7to1-reversing.csv"
 REVERSING_COLUMNS = "time=time_s:s,input=odrive_pos_rad:rad,output=output_pos_rad:rad"
@@ -33,13 +41,12 @@ def recordings_folder() -> Path:
 
 
 def real_residuals(study: Study, context: Context) -> StepResult:
-    """How often known physics is named in real noise, by severity, and how often physics that is not there.
+    """How often known physics is named in real noise, by severity, and how often physics that is not there; the drive
+    and [residuals] are those of the `study`, the seed of the diagnosis that of the `context`.
 
     Three kinds of cases: a reversing actuator's own motion and residual, and a simulated drive whose only noise is that
     residual, or the difference between star trails of one exposure, scaled to a share of the drive's error.
     """
-    import pandas as pd
-
     size = study.section("residuals", ResidualsSection, "real-residuals")
     cases = pd.DataFrame(list(answered_cases(study.drive, size, recordings_folder(), context.seed)))
     table = (
@@ -79,8 +86,14 @@ def real_residuals(study: Study, context: Context) -> StepResult:
     return StepResult((section,), results, says=tuple(says))
 
 
-def answered_cases(drive, size, folder: Path, seed: int) -> Iterator[dict[str, object]]:
-    """Every case with what was hidden and what was said. `wrong` is a name (or `unknown`) for what is not there."""
+def answered_cases(
+    drive: Drive, size: ResidualsSection, folder: Path, seed: int
+) -> Iterator[dict[str, str | float | bool]]:
+    """Every case with what was hidden and what was said, as `judged` puts it.
+
+    `drive` is the one simulated; `size` says how many cases, what in them and how large, and draws them from its own
+    seed; the recordings are in `folder`; `seed` is that of the diagnosis.
+    """
     from hdopt.bench.cases import CATALOGUE
     from hdopt.bench.real_residuals import ON_REAL_MOTION, on_real_motion, on_simulated_drive
     from hdopt.diagnosis import diagnose
@@ -89,7 +102,7 @@ def answered_cases(drive, size, folder: Path, seed: int) -> Iterator[dict[str, o
     rng = np.random.default_rng(size.seed)
     real = actuator_residual(folder)
 
-    def plan(effects):
+    def plan(effects: Iterable[str]) -> list[tuple[str, float]]:
         wanted = [name for name in effects if not size.effects or name in size.effects]
         return [("", 0.0)] * size.nothing + [(name, severity) for name in wanted for severity in size.severities]
 
@@ -106,8 +119,9 @@ def answered_cases(drive, size, folder: Path, seed: int) -> Iterator[dict[str, o
             yield judged(noise, effect, severity, diagnose(recordings, drive, seed=seed))
 
 
-def judged(noise: str, hidden: str, severity: float, diagnosis) -> dict[str, object]:
-    """One case: answered exactly (nothing said where nothing is), among the explanations offered (said beside more that
+def judged(noise: str, hidden: str, severity: float, diagnosis: Diagnosis) -> dict[str, str | float | bool]:
+    """One case, in this `noise` with the effect `hidden` ("" for none) at this `severity`, and what the `diagnosis`
+    says of it: answered exactly (nothing said where nothing is), among the explanations offered (said beside more that
     is `unknown`, too), `unknown`, or wrong: a name for what is not there."""
     said = tuple(sorted(found.id for found in diagnosis.effects))
     truth = (hidden,) if hidden else ()
@@ -127,8 +141,8 @@ def judged(noise: str, hidden: str, severity: float, diagnosis) -> dict[str, obj
     }
 
 
-def actuator_residual(folder: Path):
-    """What the diagnosis leaves of the reversing actuator's recording, with its motion."""
+def actuator_residual(folder: Path) -> RealResidual:
+    """What the diagnosis leaves of the reversing actuator's recording in `folder`, with its motion."""
     from hdopt.bench.real_residuals import RealResidual
     from hdopt.diagnosis import diagnose
     from hdopt.recordings.read import read_recording
@@ -136,12 +150,12 @@ def actuator_residual(folder: Path):
     recording = read_recording(folder / REVERSING, REVERSING_RATIO, REVERSING_COLUMNS)
     fit = diagnose(recording, None, REVERSING_RATIO).evidence.selection.best.fit
     samples = fit.problem.rows
+    assert samples.time is not None, "the columns of this recording include time"
     return RealResidual(samples.time, samples.theta, fit.residual, REVERSING_RATIO)
 
 
-def trails(folder: Path):
-    """Reading noise of one star trail against the mean of the three, arcsec: the mount's motion is in all of them."""
-    import pandas as pd
-
+def trails(folder: Path) -> Array:
+    """Reading noise of one star trail in `folder` against the mean of the three, arcsec, (n,): the mount's motion is in
+    all of them."""
     table = pd.read_csv(folder / TRAILS)[list(TRAIL_COLUMNS)]
-    return (table[TRAIL_COLUMNS[0]] - table.mean(axis=1)).to_numpy()
+    return (table[TRAIL_COLUMNS[0]] - table.mean(axis=1)).to_numpy(float)

@@ -1,5 +1,7 @@
 """One blind case: what is asked for, the recordings that go out, and the key that stays behind."""
 
+from __future__ import annotations
+
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 
@@ -13,7 +15,7 @@ from hdopt.bench.hidden_drive import BearingPass, Lobing, LocalDefect, LongWave,
 from hdopt.bench.hidden_load import Hysteresis, LostMotion, Resonance, ThermalDrift, Windup
 from hdopt.bench.hidden_outside import Outside
 from hdopt.bench.hidden_sensors import ChannelDelay, Coupling, Eccentricity, Interpolation
-from hdopt.bench.instrument import draw_instrument, record
+from hdopt.bench.instrument import Instrument, draw_instrument, record
 from hdopt.bench.motion import draw_plans, draw_ripple, run
 from hdopt.bench.readings import READINGS, as_read, through
 from hdopt.bench.signal_chain import hidden_wave, joint_rms, read_angles, read_error, set_up
@@ -134,9 +136,12 @@ def _generator(spec):
     return np.random.default_rng([spec.seed, len(spec.effects), int(1000 * spec.severity)])
 
 
-def simulate(spec):
-    """The first draw of `spec`, without a key: a `Simulated`, or None where the physics cannot be so large in it."""
-    return _simulate(spec, _generator(spec))
+def simulate(spec: Spec, rng: np.random.Generator | None = None) -> Simulated | None:
+    """The first draw of `spec`, without a key: a `Simulated`, or None where the physics cannot be so large in it.
+
+    It is drawn from the seed of `spec`, or from `rng`.
+    """
+    return _simulate(spec, _generator(spec) if rng is None else rng)
 
 
 @dataclass(frozen=True)
@@ -147,7 +152,7 @@ class Simulated:
     setups: list
     hidden: list
     waves: list  # of each hidden physics alone, one array a recording
-    instrument: object
+    instrument: Instrument
     tables: tuple[pd.DataFrame, ...]
     noise_rms: float
     base_rms: float

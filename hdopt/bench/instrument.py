@@ -1,5 +1,7 @@
 """From ideal readings to a file's columns: resolution, noise, clocks, missing rows."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +9,7 @@ import pandas as pd
 
 from hdopt.bench import loops
 from hdopt.bench.geometry import ARCMIN
+from hdopt.bench.motion import Plan, Run
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,15 @@ def draw_instrument(rng, recordings, trouble=frozenset()):
     )
 
 
-def record(instrument, rank, plan, run, angles, torque, rng):
+def record(
+    instrument: Instrument,
+    rank: int,
+    plan: Plan,
+    run: Run,
+    angles: tuple[np.ndarray, np.ndarray],
+    torque: np.ndarray,
+    rng: np.random.Generator,
+) -> tuple[pd.DataFrame, np.ndarray]:
     """Recording `rank` as a table, and its noise (rad of kinematic error, mean removed)."""
     input_angle, output_angle = angles
     n = run.time.size

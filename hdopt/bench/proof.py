@@ -1,12 +1,26 @@
 """A whole proof within one process, for a small run in continuous integration or while a diagnosis is being built."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import pandas as pd
+
 from hdopt.bench.cases import generate
 from hdopt.bench.gears import CSF
 from hdopt.bench.score import score
+from hdopt.bench.scores import Scores
 from hdopt.bench.suite import plan
 
 
-def prove(diagnose, seed, spread=map, gears=(CSF.name,), **sizes):
+def prove(
+    diagnose: Callable[[tuple[pd.DataFrame, ...]], dict[str, Any]],
+    seed: int,
+    spread: Callable[..., Iterable[Any]] = map,
+    gears: Sequence[str] = (CSF.name,),
+    **sizes: Any,
+) -> Scores:
     """Scores of `diagnose`, a function from a case's recordings (tuple of tables) to an answer by the contract.
 
     `seed` draws the cases, of the drives `gears`; `sizes` are those of `suite.plan`: families, cases, share. The keys

@@ -5,6 +5,8 @@ play, friction or a delay of this bench on the recording's own motion and residu
 of the bench, with any physics of the catalogue in it, through a chain whose only noise is the real one, scaled.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,7 +57,7 @@ def delay(real, rng):
 ON_REAL_MOTION = {"hysteresis": friction, "lost_motion": play, "channel_delay": delay}
 
 
-def on_real_motion(real, effect, severity, rng):
+def on_real_motion(real: RealResidual, effect: str, severity: float, rng: np.random.Generator) -> pd.DataFrame:
     """Table of the real motion with its own residual and `effect` ("" for none) at `severity` x the residual's rms.
 
     The residual is that of the recording as it is, or with its sign turned.
@@ -88,7 +90,9 @@ def prolonged(residual, samples, rng):
     return (series - series.mean()) / series.std()
 
 
-def on_simulated_drive(residual, effect, severity, noise_share, rng):
+def on_simulated_drive(
+    residual: np.ndarray, effect: str, severity: float, noise_share: float, rng: np.random.Generator
+) -> tuple[pd.DataFrame, ...]:
     """Tables of a bench run whose noise is `residual`, `noise_share` x the base's rms, with `effect` ("" for none) at
     `severity` x the base's rms in it."""
     for _ in range(ATTEMPTS):

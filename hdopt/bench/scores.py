@@ -1,5 +1,7 @@
 """What a blind proof yields: rates with intervals, the gate's criteria, and the text that a reader gets."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import pandas as pd
@@ -112,7 +114,7 @@ class Scores:
     invalid: tuple[str, ...]
 
     @property
-    def failed(self):
+    def failed(self) -> tuple[CaseScore, ...]:
         """Cases without credit."""
         return tuple(case for case in self.cases if case.credit < 1)
 
@@ -126,7 +128,7 @@ class Scores:
             found[effect] = Rate(before.hits + rate.hits, before.n + rate.n)
         return found
 
-    def gate(self):
+    def gate(self) -> tuple[Criterion, ...]:
         """The criteria of the gate, each with its value and limit."""
         return (
             _at_most("false-alarm rate, upper bound", self.false_alarms, t.FALSE_ALARM_BOUND, bound=True),
@@ -181,7 +183,7 @@ class Scores:
         return least and len(self.cases) >= t.CASES and self.drives >= t.DRIVES
 
     @property
-    def passed(self):
+    def passed(self) -> bool:
         """Whether every criterion of the gate holds."""
         return all(criterion.passed for criterion in self.gate())
 
@@ -193,7 +195,7 @@ class Scores:
         """A row a case."""
         return pd.DataFrame([case.__dict__ for case in self.cases]).set_index("id")
 
-    def reliability_frame(self):
+    def reliability_frame(self) -> pd.DataFrame:
         """A row a bin of stated confidences."""
         return pd.DataFrame(
             [
@@ -209,7 +211,7 @@ class Scores:
             ]
         )
 
-    def summary(self):
+    def summary(self) -> str:
         """Everything a reader needs, as text."""
         with pd.option_context(
             "display.width", 160, "display.max_colwidth", 60, "display.float_format", "{:.3f}".format

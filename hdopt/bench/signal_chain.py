@@ -1,6 +1,10 @@
 """The bench: motor, drive, encoders, and the stages at which concealed physics acts on the signal chain."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -76,7 +80,7 @@ def set_up(errors, run, gear=CSF):
     return Setup(run, find_zones(errors, run.theta, gear), errors, gear)
 
 
-def read_angles(setup, hidden=()):
+def read_angles(setup: Setup, hidden: Sequence[Any] = ()) -> tuple[np.ndarray, np.ndarray]:
     """Input and output angles (rad) as ideal electronics would read them, with the `hidden` physics in place."""
     run = setup.run
     gain = np.prod([physics.torque_gain for physics in hidden])
@@ -97,7 +101,7 @@ def read_angles(setup, hidden=()):
     return input_angle, output_angle
 
 
-def read_error(setup, hidden=()):
+def read_error(setup: Setup, hidden: Sequence[Any] = ()) -> np.ndarray:
     """Kinematic error (rad) of the ideal readings: input/N - output."""
     input_angle, output_angle = read_angles(setup, hidden)
     return input_angle / setup.run.ratio - output_angle

@@ -19,7 +19,6 @@ UNDESCRIBED = {
     "bench": 36,
     "kinematics": 20,
     "simulation": 3,
-    "studies": 6,
     "tolerance": 2,
 }
 """Public functions, by room, whose docstring does not name every argument; these numbers only fall. Commands do not
