@@ -375,6 +375,11 @@ class VerdictSettings:
     tie: float = threshold(5.0, "1", "paper: Kass, Raftery 1995: log evidence above 5 is 'very strong'")
     fewest_blocks: int = threshold(6, "input turns", "choice: turns (or parts between reversals) that can be held out")
     fewest_turns: float = threshold(2.0, "input turns", "choice: turns that a record must span")
+    fewest_rows: float = threshold(
+        5.0,
+        "rows/turn",
+        "theorem: twice a turn, a drive's own strongest wave, is sampled above 4 rows a turn (Nyquist)",
+    )
     most_rivals: int = threshold(3, "1", "choice: other explanations listed")
     confounded: float = threshold(0.5, "1", "choice: share of a found effect's power from which an imitator is listed")
     absorbed: float = threshold(1e-3, "1", "choice: length kept by the projection below which a column is rounding")

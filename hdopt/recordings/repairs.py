@@ -21,7 +21,7 @@ LARGEST_LOSS = 0.5
 GAP_FACTOR = 4.0
 """A step longer than this many typical ones is a gap."""
 RESTART_ROWS = 20
-"""So many rows in succession that repeat earlier times are a clock that starts anew, not swapped stamps."""
+"""So many rows in succession, all earlier than the middle one of as many before them, are a clock that starts anew."""
 MOST_JUMPS = 500
 """Backward steps of the clock that are looked at one by one."""
 
@@ -121,16 +121,28 @@ def order_rows_in_time(checks: Checks) -> None:
             f"time runs backward at {int(backward.sum())} of {len(time)} rows; recordings may have been joined: "
             "split the file, or leave time out of --columns"
         )
-    # A restarted clock: many rows after the jump repeat times from before it. A few swapped stamps do not.
-    highest = np.maximum.accumulate(time)
+    # A restarted clock: many rows after the jump repeat times from before it. After a stamp that is swapped with a far
+    # one, all rows are earlier than that stamp, but not than those before it.
     for jump in np.flatnonzero(backward)[:MOST_JUMPS]:
+        before = float(np.median(time[max(jump + 1 - RESTART_ROWS, 0) : jump + 1]))
         following = time[jump + 1 : jump + 1 + RESTART_ROWS]
-        if len(following) == RESTART_ROWS and (following <= highest[jump]).all():
+        if len(following) == RESTART_ROWS and (following <= before).all():
             checks.refuse(
                 f"the clock starts anew at row {int(jump) + 2}; the file joins several recordings: split it there"
             )
-    checks.keep(np.argsort(time, kind="stable"))
+    order = np.argsort(time, kind="stable")
+    if _travel(checks, np.arange(len(time))) < _travel(checks, order):
+        checks.channels["time"] = time[order]
+        checks.warn(f"{int(backward.sum())} time stamps were out of order, the angles were not: the stamps were sorted")
+        return
+    checks.keep(order)
     checks.warn(f"{int(backward.sum())} rows were out of order in time and have been sorted")
+
+
+def _travel(checks: Checks, order: NDArray[Any]) -> float:
+    """How far the angles move in all where the rows stand in `order` (n,)."""
+    angles = (checks.get(channel) for channel in ("input", "output"))
+    return sum(float(np.abs(np.diff(angle[order])).sum()) for angle in angles if angle is not None)
 
 
 def drop_repeated_rows(checks: Checks) -> None:

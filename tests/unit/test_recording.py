@@ -199,6 +199,26 @@ def test_restarted_clock_is_refused(table, tmp_path):
         read(table, tmp_path)
 
 
+@pytest.mark.parametrize("apart", [1, 3, 30, 300])
+def test_a_few_swapped_stamps_are_no_clock_that_starts_anew(table, tmp_path, apart):
+    """Three pairs of rows written in each other's place, near or far: after the first of a pair every row is earlier
+    than it. Fault caught: the latest stamp so far taken for where the clock stood.
+    """
+    order = np.arange(len(table))
+    for row in (60, 150, 400):
+        order[[row, row + apart]] = order[[row + apart, row]]
+    recording = read(table.iloc[order], tmp_path)
+    assert "rows were out of order" in recording.warnings[0]
+    assert error_is_right(recording)
+    stamped = read(table.assign(time_s=table.time_s.to_numpy()[order]), tmp_path)
+    assert "time stamps were out of order" in stamped.warnings[0]
+    # Rows put where the wrong stamps say would be reversals that never were.
+    for one in (recording, stamped):
+        np.testing.assert_allclose(one.input_angle, np.radians(table.input_angle_deg), atol=1e-9)
+        assert np.all(np.diff(one.time) > 0)
+        assert find_passes(one.input_angle).count == 2
+
+
 def test_quantised_encoder_is_told(table, tmp_path):
     table["output_angle_deg"] = (table.output_angle_deg / 0.05).round() * 0.05
     recording = read(table, tmp_path)

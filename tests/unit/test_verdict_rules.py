@@ -4,8 +4,10 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from hdopt.diagnosis import diagnose
 from hdopt.diagnosis.checks.confounding import Confounding
 from hdopt.diagnosis.inference.cross_validation import HeldOut
 from hdopt.diagnosis.settings import DEFAULT
@@ -15,6 +17,7 @@ from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.diagnosis.verdict.rivals import imitating_sets, placebo_as_good
 from hdopt.diagnosis.verdict.rules import RULES, rule_for
 from hdopt.effects.estimate import Parameter
+from hdopt.recordings.read import recording_from_table
 
 CLEAN = Facts(
     settings=DEFAULT.verdict,
@@ -167,3 +170,24 @@ def test_effects_that_carry_most_are_said_beside_what_is_no_noise(monkeypatch, o
     assert conclusion.effects == ((windup,) if named else ())
     assert ("winds up" in conclusion.says) == named
     assert "82 times" in conclusion.says
+
+
+@pytest.mark.parametrize(("rows", "verdict"), [(2, "insufficient"), (4.5, "insufficient"), (12, "adequate")])
+def test_an_envelope_is_not_diagnosed(rows, verdict):
+    """Two readings a turn of a drive whose error has orders 1 and 2: all of it folds onto what it is not, and a wave in
+    it gets no name. Fault caught: `turns_suffice` without the rows a turn.
+    """
+    turns = 60
+    theta = np.arange(int(turns * rows)) * 2 * np.pi / rows
+    hidden = 0.0 if verdict == "adequate" else 0.5
+    error = hidden * np.sin(2 * theta / 50 + 0.3) + np.random.default_rng(1).normal(0, 0.02, len(theta))
+    table = {
+        "time_s": 0.1 * theta,
+        "input_angle_deg": np.degrees(theta),
+        "output_angle_deg": np.degrees(theta / 50) - error / 60,
+    }
+    diagnosis = diagnose(recording_from_table(pd.DataFrame(table), 50.0), ratio=50.0)
+    assert (diagnosis.verdict, diagnosis.effects) == (verdict, ())
+    if verdict == "insufficient":
+        assert "rows an input turn" in diagnosis.says
+        assert "forty times an input turn" in diagnosis.separating_test

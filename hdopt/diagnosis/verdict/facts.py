@@ -188,15 +188,25 @@ def stands_out(high: Candidate, evidence: Evidence) -> bool:
 
 
 def turns_suffice(evidence: Evidence) -> bool:
-    """Whether turns can be held out: otherwise neither a name nor something unknown is claimed. `evidence` is that
-    of the diagnosis.
+    """Whether turns can be held out, and rows show what happens within one: otherwise neither a name nor something
+    unknown is claimed. `evidence` is that of the diagnosis.
     """
-    return evidence.rows.locked or evidence.rows.blocks >= evidence.settings.verdict.fewest_blocks
+    rows, settings = evidence.rows, evidence.settings.verdict
+    return rows.locked or (rows.blocks >= settings.fewest_blocks and not sparse(evidence))
+
+
+def sparse(evidence: Evidence) -> bool:
+    """Whether so few rows a turn were recorded, as of an envelope, that every wave is another's alias. `evidence` is
+    that of the diagnosis.
+    """
+    rows = evidence.rows
+    one_turn = rows.locked or rows.span_turns < evidence.settings.verdict.fewest_turns
+    return not one_turn and rows.rows_per_turn < evidence.settings.verdict.fewest_rows
 
 
 def too_little(evidence: Evidence) -> bool:
-    """Too short for whole turns to be held out, or noise above the base's own size in every average. `evidence` is
-    that of the diagnosis.
+    """Too short for whole turns to be held out, too few rows a turn, or noise above the base's own size in every
+    average. `evidence` is that of the diagnosis.
     """
     rows = evidence.rows
     if rows.locked:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from hdopt.diagnosis.checks.confounding import Confounding
-from hdopt.diagnosis.verdict.facts import Facts, Findings
+from hdopt.diagnosis.verdict.facts import Facts, Findings, sparse
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.diagnosis.verdict.residual_structure import in_what_way, locate_remainder
 from hdopt.diagnosis.verdict.rivals import Sets, separating_measurement, tied_pairs
@@ -171,6 +171,14 @@ def confusable(
 
 def insufficient(findings: Findings) -> Conclusion:
     """The record says nothing. `findings` hold the facts and the evidence behind them."""
+    if sparse(findings.evidence):
+        rows, settings = findings.evidence.rows, findings.facts.settings
+        return Conclusion(
+            "insufficient",
+            f"The recording has {rows.rows_per_turn:.2g} rows an input turn: below {settings.fewest_rows:g} every wave "
+            "of the drive looks like another (an envelope, or a log of single readings?).",
+            separating_test="sample the angles themselves, at least forty times an input turn",
+        )
     return Conclusion(
         "insufficient",
         "The recording is too short or too noisy to say even that the model is adequate.",
