@@ -18,10 +18,13 @@ from typing import Any
 
 from hdopt.drive.geometry import Clearances, Structure
 from hdopt.errors import HdoptError
+from hdopt.files import JsonReady
 from hdopt.geometry.iso286 import Fit, fit_of, loosest_fit
 from hdopt.geometry.part import Part, Prism
 from hdopt.tolerance.contributors import CALLOUTS, ECCENTRICITY, VECTORS
 
+CalloutTables = Mapping[str, Mapping[str, Any]]
+"""A study's [contributors] as its file has them, by name: Any, for a table holds text and numbers."""
 FIT_SHARE = 0.5
 """Part of a bound that the fits may use."""
 
@@ -83,7 +86,7 @@ class Budget:
     def met(self) -> bool:
         return self.spent <= self.allowed * (1 + 1e-9)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> JsonReady:
         """The budget with its unit at the names: mm, or degrees for tilts."""
         factor = math.degrees(1.0) if self.unit == "deg" else 1.0
         return {
@@ -133,7 +136,7 @@ class Plan:
         return min(zones, default=None)
 
 
-def bounds_from(values: Mapping[str, float], contributors: Mapping[str, Mapping[str, Any]]) -> Bounds:
+def bounds_from(values: Mapping[str, float], contributors: CalloutTables) -> Bounds:
     """Bounds of eccentricity and tilt from tolerances by study key (mm or deg) and from contributors.
 
     A contributor's own value is replaced by one under its name in `values`. Contributors that feed the wave

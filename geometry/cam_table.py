@@ -5,12 +5,13 @@ from __future__ import annotations
 import csv
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError
+from hdopt.files import JsonReady
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.contour import Circle, Contour, ParallelCurve
 
@@ -87,7 +88,7 @@ def write_cam(path: Path, job: Job) -> None:
             )
 
 
-def check_cam(path: Path, job: Job, name: str) -> dict[str, Any]:
+def check_cam(path: Path, job: Job, name: str) -> JsonReady:
     """Read the table at `path` back: every point against the analytic curve of the `job`, every normal against the
     chord of its neighbours. Raises `CheckFailed`, which calls the file `name`, with all that is wrong."""
     with open(path, encoding="utf-8") as file:

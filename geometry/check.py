@@ -12,10 +12,11 @@ import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any  # Any: rows of what STEP says, of several kinds
 
 import numpy as np
 
+from hdopt.files import JsonReady
 from hdopt.geometry.callouts import Callout
 from hdopt.geometry.model import WaveGeneratorModel
 from hdopt.geometry.part import Part, Prism
@@ -60,7 +61,7 @@ class PartCheck:
     profile_deviation: float | None
     context: bool
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> JsonReady:
         return {
             "name": self.name,
             "volume_mm3": self.volume,
@@ -83,7 +84,7 @@ class StepCheck:
         """Largest deviation of any profile surface, mm."""
         return max(part.profile_deviation for part in self.parts if part.profile_deviation is not None)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> JsonReady:
         return {
             "parts": [part.to_dict() for part in self.parts],
             "max_profile_deviation_um": self.profile_deviation * 1e3,

@@ -6,7 +6,6 @@ import csv
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -161,7 +160,7 @@ def _require_all_round(points: Array) -> None:
         )
 
 
-def table_of(fit: CamFit) -> list[dict[str, Any]]:
+def table_of(fit: CamFit) -> list[dict[str, float]]:
     """One row a point of a `fit`: angle in degrees, clockwise from the major axis, and deviation in um."""
     rows = zip(np.degrees(fit.angles).tolist(), (1e3 * fit.deviations).tolist(), strict=True)
     return [{"angle_deg": angle, "deviation_um": deviation} for angle, deviation in rows]

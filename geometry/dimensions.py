@@ -6,11 +6,12 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any  # Any: the tables of a study file
 
 from hdopt.drive.errors import AMPLITUDE_NAMES, STUDY_KEYS
 from hdopt.drive.geometry import Structure
-from hdopt.geometry.budget import Plan
+from hdopt.files import JsonReady
+from hdopt.geometry.budget import CalloutTables, Plan
 from hdopt.geometry.contour import Circle
 from hdopt.geometry.features import DBore, KeywayBore
 from hdopt.geometry.iso286 import deviations
@@ -37,7 +38,7 @@ class Dimension:
     upper: float | None = None
     """Deviations from the nominal size, mm; None where the tolerance is a zone."""
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> JsonReady:
         return asdict(self)
 
 
@@ -57,7 +58,7 @@ def key_dimensions(
     model: WaveGeneratorModel,
     width: float,
     bounds: Mapping[str, float],
-    contributors: Mapping[str, Mapping[str, Any]] | None = None,
+    contributors: CalloutTables | None = None,
 ) -> tuple[Dimension, ...]:
     """The table for the parts of a `model`; `width` is the profile's, mm.
 
@@ -177,7 +178,7 @@ def _slides(parts: tuple[Part, ...]) -> list[Dimension]:
 
 
 def _location(
-    structure: Structure, width: float, bounds: Mapping[str, float], contributors: Mapping[str, Mapping[str, Any]]
+    structure: Structure, width: float, bounds: Mapping[str, float], contributors: CalloutTables
 ) -> list[Dimension]:
     """What keeps the profile central and upright: the study's callouts, or what its errors allow."""
     rows, fed = [], set()

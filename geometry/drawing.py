@@ -11,12 +11,13 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import numpy as np
 
 from hdopt.arrays import Array
+from hdopt.files import JsonReady
 from hdopt.geometry.arcs import outline_of_slot, sample
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.contour import Circle
@@ -108,7 +109,7 @@ def views_alone(svg: str) -> str:
     return svg.replace(old, new, 1).replace('<rect width="100%"', f'<rect x="{left:g}" y="{top:g}" width="100%"', 1)
 
 
-def check_drawing(path: Path, job: Job, name: str) -> dict[str, Any]:
+def check_drawing(path: Path, job: Job, name: str) -> JsonReady:
     """Read the drawing at `path` back: well-formed, of its size, naming the study, with every key dimension of the
     `job`. Returns how many there are; raises `CheckFailed`, which calls the file `name`, with all that is wrong."""
     root = ElementTree.parse(path).getroot()

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hdopt.arrays import Array
+from hdopt.files import JsonReady
 from hdopt.geometry.arcs import enclosed_area, outline_of, outline_of_bore, outline_of_slot, sample
 from hdopt.geometry.check import PROFILE_TOLERANCE, CheckFailed
 from hdopt.geometry.contour import Circle, Contour
@@ -101,7 +102,7 @@ def write_dxf(path: Path, job: Job) -> None:
     document.saveas(path)
 
 
-def check_dxf(path: Path, job: Job, name: str) -> dict[str, Any]:
+def check_dxf(path: Path, job: Job, name: str) -> JsonReady:
     """Read the file at `path` back and compare it with the `job`: unit, layers, closed outlines, their area, and their
     distance from the analytic curve.
 

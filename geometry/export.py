@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, MissingLibrary, unknown_name
-from hdopt.files import replacing_all
+from hdopt.files import JsonReady, replacing_all
+from hdopt.geometry.budget import CalloutTables
 from hdopt.geometry.dimensions import Dimension
 from hdopt.geometry.formats import FORMATS
 from hdopt.geometry.job import make_job
@@ -27,7 +27,7 @@ class ExportResult:
     """What was written, as it was found in the files."""
 
     files: Mapping[str, Path]
-    checks: Mapping[str, Mapping[str, Any]]
+    checks: Mapping[str, JsonReady]
     model: WaveGeneratorModel
     dimensions: tuple[Dimension, ...]
     identity: Identity
@@ -41,7 +41,7 @@ class ExportResult:
         found = [check.get("max_profile_deviation_um") for check in self.checks.values()]
         return max((value for value in found if value is not None), default=None)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> JsonReady:
         step = self.checks.get("step", {})
         parts = step.get("parts") or [
             {"name": part.name, "volume_mm3": part.volume, "bounding_box_mm": list(part.size), "context": part.context}
@@ -71,7 +71,7 @@ def export_drive(
     options: ExportOptions | None = None,
     name: str = "wave generator",
     bounds: Mapping[str, float] | None = None,
-    contributors: Mapping[str, Any] | None = None,
+    contributors: CalloutTables | None = None,
 ) -> ExportResult:
     """Write a `drive`'s wave generator to `files` (a key of `FORMATS` -> path) and check each file from disk.
 

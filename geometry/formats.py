@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
+
+from hdopt.files import JsonReady
 
 if TYPE_CHECKING:
     from hdopt.geometry.job import Job
@@ -25,7 +27,7 @@ class Format(Protocol):
 
     def write(self, path: Path, job: Job) -> None: ...
 
-    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+    def check(self, path: Path, job: Job, name: str) -> JsonReady:
         """Read the file back and compare it with the model; `CheckFailed` about the file `name` where it differs."""
 
 
@@ -43,7 +45,7 @@ class Step:
         products = product_data(job) if schema == "AP242" else None
         write_step(path, job.solids, job.identity, schema, products)
 
-    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+    def check(self, path: Path, job: Job, name: str) -> JsonReady:
         from hdopt.geometry.callouts import callouts_of
         from hdopt.geometry.check import CheckFailed, check_step, tolerance_failures
         from hdopt.geometry.step import read_step
@@ -71,7 +73,7 @@ class Dxf:
 
         write_dxf(path, job)
 
-    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+    def check(self, path: Path, job: Job, name: str) -> JsonReady:
         from hdopt.geometry.dxf import check_dxf
 
         return check_dxf(path, job, name)
@@ -87,7 +89,7 @@ class Stl:
 
         write_stl(path, job)
 
-    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+    def check(self, path: Path, job: Job, name: str) -> JsonReady:
         from hdopt.geometry.mesh import check_stl
 
         return check_stl(path, job, name)
@@ -103,7 +105,7 @@ class ThreeMf:
 
         write_3mf(path, job)
 
-    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+    def check(self, path: Path, job: Job, name: str) -> JsonReady:
         from hdopt.geometry.mesh import check_3mf
 
         return check_3mf(path, job, name)
@@ -119,7 +121,7 @@ class Svg:
 
         path.write_text(draw(job), encoding="utf-8")
 
-    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+    def check(self, path: Path, job: Job, name: str) -> JsonReady:
         from hdopt.geometry.drawing import check_drawing
 
         return check_drawing(path, job, name)
@@ -135,7 +137,7 @@ class Png:
 
         write_png(path, job)
 
-    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+    def check(self, path: Path, job: Job, name: str) -> JsonReady:
         from hdopt.geometry.picture import check_png
 
         return check_png(path, job, name)
@@ -151,7 +153,7 @@ class Cam:
 
         write_cam(path, job)
 
-    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+    def check(self, path: Path, job: Job, name: str) -> JsonReady:
         from hdopt.geometry.cam_table import check_cam
 
         return check_cam(path, job, name)
@@ -167,7 +169,7 @@ class Gcode:
 
         write_gcode(path, job)
 
-    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+    def check(self, path: Path, job: Job, name: str) -> JsonReady:
         from hdopt.geometry.grinding import check_gcode
 
         return check_gcode(path, job, name)
@@ -183,7 +185,7 @@ class Inspection:
 
         write_inspection(path, job)
 
-    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+    def check(self, path: Path, job: Job, name: str) -> JsonReady:
         from hdopt.geometry.inspection import check_inspection
 
         return check_inspection(path, job, name)
@@ -199,7 +201,7 @@ class Mating:
 
         write_mating(path, job)
 
-    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+    def check(self, path: Path, job: Job, name: str) -> JsonReady:
         from hdopt.geometry.mating_sheet import check_mating
 
         return check_mating(path, job, name)
@@ -216,7 +218,7 @@ class Pdf:
 
         write_pdf(path, sheets(job))
 
-    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+    def check(self, path: Path, job: Job, name: str) -> JsonReady:
         from hdopt.geometry.sheet_archive import check_pdf
 
         return check_pdf(path, job, name)
@@ -232,7 +234,7 @@ class Drawings:
 
         write_drawings(path, job)
 
-    def check(self, path: Path, job: Job, name: str) -> dict[str, Any]:
+    def check(self, path: Path, job: Job, name: str) -> JsonReady:
         from hdopt.geometry.sheet_archive import check_drawings
 
         return check_drawings(path, job, name)

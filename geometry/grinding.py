@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError
+from hdopt.files import JsonReady
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.contour import Contour, ParallelCurve
 
@@ -129,7 +130,7 @@ def ground_cam(text: str, contour: Contour, points: Array) -> Array:
     return left
 
 
-def check_gcode(path: Path, job: Job, name: str) -> dict[str, Any]:
+def check_gcode(path: Path, job: Job, name: str) -> JsonReady:
     """Simulate the wheel from the file at `path` and compare what it leaves with the cam of the `job`. Raises
     `CheckFailed`, which calls the file `name`, where that is off by more than `CODE_TOLERANCE`."""
     contour = _cam(job)

@@ -6,8 +6,9 @@ import csv
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from hdopt.files import JsonReady
 from hdopt.geometry.check import CheckFailed
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ class Check:
     points: int
     source: str
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> JsonReady:
         return asdict(self)
 
 
@@ -108,7 +109,7 @@ def write_inspection(path: Path, job: Job) -> None:
             writer.writerow(["" if c is None else f"{c:.6f}" if isinstance(c, float) else c for c in cells])
 
 
-def check_inspection(path: Path, job: Job, name: str) -> dict[str, Any]:
+def check_inspection(path: Path, job: Job, name: str) -> JsonReady:
     """Read the plan at `path` back: a line at least for every part of the `job` that is made, limits in order. Raises
     `CheckFailed`, which calls the file `name`, with all that is wrong."""
     with open(path, encoding="utf-8", newline="") as file:

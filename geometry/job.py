@@ -9,11 +9,11 @@ from dataclasses import asdict, dataclass, fields, is_dataclass
 from enum import Enum
 from functools import cached_property
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any  # Any: whatever records hold, on its way into JSON
 
 from hdopt.drive.geometry import Drive
 from hdopt.geometry.assembly import wave_generator_model
-from hdopt.geometry.budget import bounds_from
+from hdopt.geometry.budget import CalloutTables, bounds_from
 from hdopt.geometry.dimensions import Dimension, key_dimensions
 from hdopt.geometry.mating import MatingRow, mating_rows
 from hdopt.geometry.model import WaveGeneratorModel
@@ -35,7 +35,7 @@ class Job:
     dimensions: tuple[Dimension, ...]
     identity: Identity
     bounds: Mapping[str, float]
-    contributors: Mapping[str, Mapping[str, Any]]
+    contributors: CalloutTables
 
     @cached_property
     def solids(self) -> tuple[tuple[Part, cq.Solid], ...]:
@@ -57,7 +57,7 @@ def make_job(
     options: ExportOptions,
     name: str,
     bounds: Mapping[str, float] | None = None,
-    contributors: Mapping[str, Any] | None = None,
+    contributors: CalloutTables | None = None,
 ) -> Job:
     """Everything that is known before a solid is made: the parts, their key dimensions, and what files will say.
 

@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from hdopt.drive.geometry import Drive
+from hdopt.files import JsonReady
+from hdopt.geometry.budget import CalloutTables
 from hdopt.geometry.features import KeywayBore
 from hdopt.geometry.iso286 import deviations
 from hdopt.geometry.model import WaveGeneratorModel
@@ -35,7 +36,7 @@ class MatingRow:
     takes: float | None
     unit: str
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> JsonReady:
         return asdict(self)
 
 
@@ -43,7 +44,7 @@ def mating_rows(
     drive: Drive,
     model: WaveGeneratorModel,
     bounds: Mapping[str, float],
-    contributors: Mapping[str, Mapping[str, Any]],
+    contributors: CalloutTables,
 ) -> tuple[MatingRow, ...]:
     """What the parts that meet the wave generator of a `drive` must keep: shaft, housing, bearing seats.
 
@@ -74,9 +75,7 @@ def _shaft(model: WaveGeneratorModel) -> list[MatingRow]:
     return rows
 
 
-def _fed(
-    name: str, bounds: Mapping[str, float], contributors: Mapping[str, Mapping[str, Any]], unit: str
-) -> list[MatingRow]:
+def _fed(name: str, bounds: Mapping[str, float], contributors: CalloutTables, unit: str) -> list[MatingRow]:
     """The study's own callouts that feed an error of the input axis."""
     rows = []
     for key, spec in contributors.items():
@@ -90,7 +89,7 @@ def _fed(
     return rows
 
 
-def _eccentricity(bounds: Mapping[str, float], contributors: Mapping[str, Mapping[str, Any]]) -> list[MatingRow]:
+def _eccentricity(bounds: Mapping[str, float], contributors: CalloutTables) -> list[MatingRow]:
     if own := _fed("axis_eccentricity", bounds, contributors, "mm"):
         return own
     allowed = bounds.get("axis_eccentricity_mm")
@@ -109,7 +108,7 @@ def _eccentricity(bounds: Mapping[str, float], contributors: Mapping[str, Mappin
     ]
 
 
-def _tilt(drive: Drive, bounds: Mapping[str, float], contributors: Mapping[str, Mapping[str, Any]]) -> list[MatingRow]:
+def _tilt(drive: Drive, bounds: Mapping[str, float], contributors: CalloutTables) -> list[MatingRow]:
     if own := _fed("axis_tilt", bounds, contributors, "deg"):
         return own
     tilts = [bounds[key] for key in ("axis_tilt_y_deg", "axis_tilt_x_deg") if key in bounds]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from typing import Any
 
+from hdopt.files import JsonReady
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.job import Job
 
@@ -24,7 +24,7 @@ def write_mating(path: Path, job: Job) -> None:
             writer.writerow(["" if c is None else f"{c:.6g}" if isinstance(c, float) else c for c in cells])
 
 
-def check_mating(path: Path, job: Job, name: str) -> dict[str, Any]:
+def check_mating(path: Path, job: Job, name: str) -> JsonReady:
     """Read the sheet at `path` back: every row of the `job`, and sums within the bounds. Raises `CheckFailed`, which
     calls the file `name`, with all that is wrong."""
     with open(path, encoding="utf-8", newline="") as file:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import zipfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import numpy as np
 
 from hdopt.arrays import Array, Index
+from hdopt.files import JsonReady
 from hdopt.geometry.check import CheckFailed
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def write_stl(path: Path, job: Job) -> None:
     path.write_bytes(header + np.uint32(len(mesh)).tobytes() + records.tobytes())
 
 
-def check_stl(path: Path, job: Job, name: str) -> dict[str, Any]:
+def check_stl(path: Path, job: Job, name: str) -> JsonReady:
     """Read the STL at `path` back: its mesh is closed and has the volume and extents of the parts of the `job`. Raises
     `CheckFailed`, which calls the file `name`, with all that is wrong."""
     content = path.read_bytes()
@@ -110,7 +111,7 @@ def write_3mf(path: Path, job: Job) -> None:
         archive.writestr("3D/3dmodel.model", declaration + ElementTree.tostring(model, encoding="unicode"))
 
 
-def check_3mf(path: Path, job: Job, name: str) -> dict[str, Any]:
+def check_3mf(path: Path, job: Job, name: str) -> JsonReady:
     """Read the 3MF at `path` back: the parts by name, each mesh closed and with the volume and extents of the parts of
     the `job`. Raises `CheckFailed`, which calls the file `name`, with all that is wrong."""
     with zipfile.ZipFile(path) as archive:

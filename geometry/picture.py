@@ -6,12 +6,13 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hdopt.arrays import Array, Index
 from hdopt.errors import HdoptError
+from hdopt.files import JsonReady
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.drawing import EXPLODED, pulled_apart
 from hdopt.geometry.mesh import triangles
@@ -56,7 +57,7 @@ def write_png(path: Path, job: Job) -> None:
         )
 
 
-def check_png(path: Path, job: Job, name: str) -> dict[str, Any]:
+def check_png(path: Path, job: Job, name: str) -> JsonReady:
     """Read the picture of a `job` at `path` back: its size, and that something is to be seen. Returns width and height
     in pixels; raises `CheckFailed`, which calls the file `name`, where it is blank or of another size."""
     from vtkmodules.util.numpy_support import vtk_to_numpy

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
+from typing import Any  # Any: objects of VTK, which brings no types
 
 import numpy as np
 from numpy.typing import NDArray

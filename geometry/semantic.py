@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any  # Any: objects of OCP whose types it does not name
 
 from hdopt.geometry.callouts import Callout, Cylinder, Face, Flank, Frame, Level
 from hdopt.geometry.surface import is_upright

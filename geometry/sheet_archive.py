@@ -6,9 +6,9 @@ import io
 import re
 import zipfile
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
+from hdopt.files import JsonReady
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.job import Job
 from hdopt.geometry.part_sheets import sheets
@@ -30,7 +30,7 @@ def write_drawings(path: Path, job: Job) -> None:
                 archive.writestr(entry, text)
 
 
-def check_drawings(path: Path, job: Job, name: str) -> dict[str, Any]:
+def check_drawings(path: Path, job: Job, name: str) -> JsonReady:
     """Read the ZIP at `path` back: every sheet of the `job` in both forms, in mm, naming the study and saying the same
     texts. Raises `CheckFailed`, which calls the file `name`, with all that is wrong."""
     from ezdxf.filemanagement import read
@@ -54,7 +54,7 @@ def check_drawings(path: Path, job: Job, name: str) -> dict[str, Any]:
     return {"sheets": len(names(job)), "texts": count}
 
 
-def check_pdf(path: Path, job: Job, name: str) -> dict[str, Any]:
+def check_pdf(path: Path, job: Job, name: str) -> JsonReady:
     """Read the PDF at `path` back: it is whole, with a page for every sheet of the `job`. Raises `CheckFailed`, which
     calls the file `name`, where it is not."""
     content = path.read_bytes()

@@ -30,6 +30,9 @@ LARGEST_TEXT = 16 * 2**20
 """Bytes of the largest study file or JSON input; real ones have a few thousand."""
 STREAMS = ("/dev/fd/", "/dev/stdout", "/dev/stderr", "/proc/self/fd/")
 """Names of open streams: where one leads to a plain file, that file is still written through the stream."""
+JsonReady = dict[str, Any]
+"""What `to_json` writes: numbers, text, arrays, and lists and mappings of them to any depth, which no narrower type
+says in a way that readers of a key could use."""
 PASSING = ".hdopt-passing"
 """End of the names that files bear until they are whole."""
 
