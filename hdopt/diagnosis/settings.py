@@ -47,6 +47,23 @@ class FitSettings:
 
 
 @dataclass(frozen=True)
+class ProfileSettings:
+    """Intervals of parameters whose objective is no parabola."""
+
+    curvature: float = threshold(
+        0.1, "1", "choice: share by which the rise at one standard deviation may miss: 5 % of an interval"
+    )
+    iterations: int = threshold(6, "1", "choice: effort of a refit with one parameter held, from a nearby one")
+    settled: float = threshold(
+        1e-6,
+        "1",
+        "choice: relative drop of the objective at which a refit stands: 0.01 of a rise of one at 10,000 rows",
+    )
+    tolerance: float = threshold(0.02, "standard deviations", "choice: accuracy of an interval's end: 1 % of it")
+    tries: int = threshold(6, "1", "choice: doublings of 1.96 standard deviations after which an end is open")
+
+
+@dataclass(frozen=True)
 class BaseSettings:
     """The kinematic-error model's fit from many drives."""
 
@@ -438,6 +455,7 @@ class DiagnosisSettings:
     """All thresholds of a diagnosis, by what they belong to."""
 
     fit: FitSettings = FitSettings()
+    profile: ProfileSettings = ProfileSettings()
     base: BaseSettings = BaseSettings()
     noise: NoiseSettings = NoiseSettings()
     nuisance: NuisanceSettings = NuisanceSettings()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -32,13 +32,21 @@ def counted(number: float) -> Parameter:
 
 @dataclass(frozen=True)
 class FitEstimate:
-    """Fitted coefficients of one term, then its free shape parameters, with their covariance."""
+    """Fitted coefficients of one term, then its free shape parameters, with their covariance.
+
+    `profiles` has 95 % intervals of numbers (by their place in `values`) for which +-1.96 standard deviations do not
+    serve.
+    """
 
     values: Array
     covariance: Array
+    profiles: Mapping[int, tuple[float, float]] = field(default_factory=dict)
 
     def parameter(self, index: int, unit: str, scale: float = 1.0, offset: float = 0.0) -> Parameter:
-        """Coefficient `index` times `scale` plus `offset`, with its 95 % interval."""
+        """Coefficient `index` times `scale` plus `offset`, with its 95 % interval, in `unit`."""
+        if index in self.profiles:
+            low, high = sorted(scale * end + offset for end in self.profiles[index])
+            return Parameter(float(scale * self.values[index] + offset), low, high, unit)
         return self.derived(lambda v: scale * v[index] + offset, unit)
 
     def derived(self, function: Callable[[Array], float], unit: str) -> Parameter:

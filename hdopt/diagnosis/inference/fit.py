@@ -152,15 +152,29 @@ class Fit:
             precision[:PARAMETERS] = 1 / self.problem.prior**2
         return precision
 
+    @cached_property
+    def _curvature(self) -> tuple[Array, Array, float, Array]:
+        """Whitened design (n, q) and residual (n,), the variance of the latter, arcmin^2, and the covariance (q, q)
+        that the curvature of the objective gives."""
+        design = self.problem.noise.whiten(self.design())
+        residual = self.problem.noise.whiten(self.residual)
+        freedom = max(len(residual) - design.shape[1], 1)
+        sigma2 = max(float(residual @ residual) / freedom, self.problem.settings.fit.variance_floor)
+        normal = design.T @ design / sigma2 + np.diag(self.prior_precision(design.shape[1]))
+        return design, residual, sigma2, np.linalg.pinv(normal, hermitian=True)
+
+    def expected_rises(self) -> Array:
+        """By how much the objective rises as its curvature says, per square of each parameter's change, the others
+        fitted again, (q,)."""
+        _, _, sigma2, inverse = self._curvature
+        rises: Array = sigma2 / np.maximum(np.diag(inverse), TINY)
+        return rises
+
     def covariance(self) -> Array:
         """Covariance of all parameters, robust against what the noise model misses: the larger, parameter by parameter,
         of the model-based one and the sandwich over whole turns."""
         settings = self.problem.settings.fit
-        design = self.problem.noise.whiten(self.design())
-        residual = self.problem.noise.whiten(self.residual)
-        sigma2 = max(float(residual @ residual) / max(len(residual) - design.shape[1], 1), settings.variance_floor)
-        normal = design.T @ design / sigma2 + np.diag(self.prior_precision(design.shape[1]))
-        inverse = np.linalg.pinv(normal, hermitian=True)
+        design, residual, sigma2, inverse = self._curvature
         block = self.problem.rows.block
         scores = np.zeros((block[-1] + 1, design.shape[1]))
         np.add.at(scores, block, design * residual[:, None] / sigma2)
@@ -174,7 +188,8 @@ class Fit:
         blocks = block[-1] + 1
         sandwich *= blocks / max(blocks - 1, 1)
         ratio = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(inverse), TINY), 1.0))
-        return inverse * np.outer(ratio, ratio)
+        robust: Array = inverse * np.outer(ratio, ratio)
+        return robust
 
     def estimates(self) -> list[FitEstimate]:
         """Values and covariance of each term's coefficients and free shape parameters."""
@@ -308,7 +323,8 @@ def _moved(fit: Fit, step: Array, move_shapes: bool) -> Fit:
                 shape[name] += float(np.clip(step[position], -limit, limit))
                 position += 1
             shifted = problem.explanations[term.effect].term(problem.rows, shape, fit.motion)
-            term = replace(shifted, trials=term.trials, odds=term.odds)
+            free = {name: shifted.steps[name] for name in term.steps}  # a parameter that is held stays so
+            term = replace(shifted, trials=term.trials, odds=term.odds, steps=free)
         terms.append(term)
         coefficients.append(c + delta)
     errors = np.clip(fit.errors + step[:wb], -problem.box[:wb], problem.box[:wb])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -97,19 +96,21 @@ class Findings:
     facts: Facts
     high: Candidate | None
     pairs: tuple[Confounding, ...] = ()
+    effects: tuple[NamedEffect, ...] = ()
+    """Every effect that is said, the largest first."""
 
-    @cached_property
-    def effects(self) -> tuple[NamedEffect, ...]:
-        """Every effect that is said, the largest first."""
-        found: list[NamedEffect] = []
-        if self.facts.named:
-            least = resolution(self.evidence)
-            described = describe(self.evidence.selection.best, self.evidence)
-            found += [one for one in described if one.where["rms_arcmin"] >= least]
-        if self.high is not None:
-            said = {one.id for one in found}
-            found += [one for one in describe(self.high, self.evidence, high=True) if one.id not in said]
-        return tuple(sorted(found, key=lambda one: -one.where["rms_arcmin"]))
+
+def effects_said(evidence: Evidence, facts: Facts, high: Candidate | None) -> tuple[NamedEffect, ...]:
+    """Every effect that the `facts` in the `evidence` and what stands out in `high` orders let be said, the largest
+    first."""
+    found: list[NamedEffect] = []
+    if facts.named:
+        least = resolution(evidence)
+        found += [one for one in describe(evidence.selection.best, evidence) if one.where["rms_arcmin"] >= least]
+    if high is not None:
+        said = {one.id for one in found}
+        found += [one for one in describe(high, evidence, high=True) if one.id not in said]
+    return tuple(sorted(found, key=lambda one: -one.where["rms_arcmin"]))
 
 
 def find(evidence: Evidence) -> Findings:
@@ -141,14 +142,14 @@ def find(evidence: Evidence) -> Findings:
         above_resolution=any(power >= resolution(evidence) ** 2 for power in effect_powers(best)),
     )
     pairs = confounded_pairs(evidence, facts.named, high) if facts.said else ()
-    findings = Findings(evidence, facts, high, pairs)
+    effects = effects_said(evidence, facts, high)
     as_good: Sets = ()
     if facts.named:
         as_good = (*rivals(evidence, high), *placebo_as_good(evidence, pairs))
     if facts.said:
-        as_good = (*as_good, *imitating_sets(pairs, [one.id for one in findings.effects], settings))
+        as_good = (*as_good, *imitating_sets(pairs, [one.id for one in effects], settings))
     as_good = tuple(dict.fromkeys(as_good))[: settings.most_rivals]
-    return Findings(evidence, replace(facts, rivals=as_good), high, pairs)
+    return Findings(evidence, replace(facts, rivals=as_good), high, pairs, effects)
 
 
 def effect_powers(candidate: Candidate) -> list[float]:

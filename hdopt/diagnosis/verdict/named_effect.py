@@ -11,6 +11,7 @@ from hdopt.arrays import Array
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.inference.catalogue import is_effect
 from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.inference.profile_interval import profiled_estimates
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.orientation import as_counted
@@ -68,7 +69,7 @@ def confidences(evidence: Evidence) -> dict[str, float]:
 def describe(candidate: Candidate, evidence: Evidence, high: bool = False) -> list[NamedEffect]:
     """The effects of a `candidate`, as they stand in the `evidence`; `high` for one found on the rows as recorded."""
     fit = candidate.fit
-    estimates = fit.estimates()
+    estimates = profiled_estimates(fit)
     confidence = {} if high else confidences(evidence)
     base_power = evidence.base_held_out.variance
     found = []
