@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numba import njit
@@ -18,7 +19,7 @@ from hdopt.arrays import Array, Index
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
-from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
+from hdopt.kinematics.closed_form import ErrorComponents, TipGeometry, tip_geometry
 from hdopt.kinematics.compiled_closed_form import motion_at, rigid_motion, rim_constants, rim_depth, tooth_deviation
 
 CARTESIAN_NAMES = (
@@ -38,8 +39,13 @@ CARTESIAN_NAMES = (
 PARAMETERS = len(CARTESIAN_NAMES)
 
 
+Evaluated: TypeAlias = tuple[Array, Index, Array]
+"""KE (arcmin, n), the driving zone (0 or 1, n) and dKE/derrors (arcmin/mm, n x 12)."""
+
+
 def to_drive_errors(cartesian: Array, half_width: float) -> DriveErrors:
-    """`DriveErrors` from Cartesian errors (12,) in mm; `half_width` is b/2 of the wave generator, mm."""
+    """`DriveErrors` from `cartesian` errors (12,) in mm, in the order of `CARTESIAN_NAMES`; `half_width` is b/2 of the
+    wave generator, mm."""
     p = np.asarray(cartesian, float)
     return DriveErrors(
         axis_eccentricity=math.hypot(p[0], p[1]),
@@ -110,11 +116,11 @@ class CartesianModel:
         advance = self.advance * np.asarray(theta, float)
         return np.column_stack([np.cos(theta), np.sin(theta), np.cos(advance), np.sin(advance)])
 
-    def evaluate(self, theta: Array, errors: Array, extra: Array | None = None) -> tuple[Array, Index, Array]:
+    def evaluate(self, theta: Array, errors: Array, extra: Array | None = None) -> Evaluated:
         """`evaluate_at` for input angles `theta` (n,) rad."""
         return self.evaluate_at(self.rotation(theta), errors, extra)
 
-    def evaluate_at(self, rotation: Array, errors: Array, extra: Array | None = None) -> tuple[Array, Index, Array]:
+    def evaluate_at(self, rotation: Array, errors: Array, extra: Array | None = None) -> Evaluated:
         """KE (arcmin, n), the driving zone (0 or 1, n) and dKE/derrors (arcmin/mm, n x 12) at a `rotation` (n, 4).
 
         `errors` (12,) mm. `extra` (2, n) in mm is added to the deviation of each zone before the
@@ -133,7 +139,7 @@ class CartesianModel:
 
 
 @njit(cache=True, error_model="numpy")
-def _sine_cosine(x):
+def _sine_cosine(x: float) -> tuple[float, float]:
     """sin and cos; below 0.05 rad, where every real drive's offsets lie, by series to 1e-14."""
     if abs(x) > 0.05:
         return math.sin(x), math.cos(x)
@@ -145,16 +151,16 @@ def _sine_cosine(x):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _evaluate(rotation, tip, tan_alpha, scale, p, extra):
+def _evaluate(rotation: Array, tip: TipGeometry, tan_alpha: float, scale: float, p: Array, extra: Array) -> Evaluated:
+    """`CartesianModel.evaluate_at`; `scale` is arcmin per mm of arc, `p` the errors (12,), `extra` (2, n) or (2, 1)."""
     half_width = tip.half_width
     rim = rim_constants(tip)
-    motion = rigid_motion(
-        tip, p[0], p[1], p[2] / half_width, p[3] / half_width, p[4], p[5], p[6] / half_width, p[7] / half_width
+    components = ErrorComponents(
+        p[0], p[1], p[2] / half_width, p[3] / half_width, p[4], p[5], p[6] / half_width, p[7] / half_width
     )
+    motion = rigid_motion(tip, components)
     n = len(rotation)
-    value = np.empty(n)
-    zone = np.empty(n, np.int64)
-    jacobian = np.empty((n, 12))
+    value, zone, jacobian = np.empty(n), np.empty(n, np.int64), np.empty((n, 12))
     has_extra = extra.shape[1] == n
     for i in range(n):
         c, s, cf, sf = rotation[i, 0], rotation[i, 1], rotation[i, 2], rotation[i, 3]

@@ -10,16 +10,19 @@ of the size of the shipped tolerances; the error grows with the third power of t
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hdopt.arrays import Array
-from hdopt.drive.errors import DriveErrors, Values
+from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.drive.profiles import tip_radius_of_curvature
 from hdopt.kinematics.branches import Branches, DeepestPoints, deepest
+
+V = TypeVar("V", float, Array)
+"""Numbers of one drive at one angle, as compiled kernels have them, or arrays of any shapes that broadcast."""
 
 
 class TipGeometry(NamedTuple):
@@ -47,32 +50,56 @@ class RimConstants(NamedTuple):
     """1/L_W, 1/mm."""
 
 
-class RigidMotion(NamedTuple):
+class ErrorComponents(NamedTuple, Generic[V]):
+    """Errors of input axis and wave generator by Cartesian components; eccentricities in mm.
+
+    Angles as in Jia 2021: beta1 to beta3 of the input axis, alpha1 to alpha3 of the wave generator.
+    """
+
+    e1_x: V
+    """e1 sin(beta1), of the input axis."""
+    e1_y: V
+    """e1 cos(beta1)."""
+    tan_tilt_x: V
+    """tan(beta3), of the input axis."""
+    tan_tilt_y: V
+    """tan(beta2)."""
+    e2_major: V
+    """e2 cos(alpha1), of the wave generator along its major axis."""
+    e2_minor: V
+    """e2 sin(alpha1)."""
+    tan_wg_major: V
+    """tan(alpha2), of the wave generator."""
+    tan_wg_minor: V
+    """tan(alpha3)."""
+
+
+class RigidMotion(NamedTuple, Generic[V]):
     """Coefficients of the wave generator's offset and tilt over one turn, mm.
 
     E_a = a_cos cos + a_sin sin + a_0 along the major axis, E_l = l_cos cos + l_sin sin + l_0 along the minor one;
     the same with t for the rim's lift by tilt, T_a and T_l, and for the twist (rad) that two tilts make together.
     """
 
-    ea_cos: Values
-    ea_sin: Values
-    ea_0: Values
-    el_cos: Values
-    el_sin: Values
-    el_0: Values
-    ta_cos: Values
-    ta_sin: Values
-    ta_0: Values
-    tl_cos: Values
-    tl_sin: Values
-    tl_0: Values
-    twist_cos: Values
-    twist_sin: Values
-    twist_0: Values
+    ea_cos: V
+    ea_sin: V
+    ea_0: V
+    el_cos: V
+    el_sin: V
+    el_0: V
+    ta_cos: V
+    ta_sin: V
+    ta_0: V
+    tl_cos: V
+    tl_sin: V
+    tl_0: V
+    twist_cos: V
+    twist_sin: V
+    twist_0: V
 
 
 def tip_geometry(drive: Drive) -> TipGeometry:
-    """The constants of the closed form for this drive's wave generator."""
+    """The constants of the closed form for the wave generator of `drive`; profiles with a smooth tip only."""
     wave_generator = drive.wave_generator
     return TipGeometry(
         semi_major=wave_generator.profile.semi_major,
@@ -84,7 +111,7 @@ def tip_geometry(drive: Drive) -> TipGeometry:
 
 
 def rim_constants(tip: TipGeometry) -> RimConstants:
-    """The constants of `rim_depth` for a wave generator's tip."""
+    """The constants of `rim_depth` for a wave generator's `tip`."""
     flatness, square = tip.semi_major - tip.tip_radius, tip.half_width * tip.half_width
     return RimConstants(
         (tip.semi_major + tip.tip_radius) / 2 / square,
@@ -95,41 +122,30 @@ def rim_constants(tip: TipGeometry) -> RimConstants:
     )
 
 
-def rigid_motion(
-    tip: TipGeometry,
-    e1_x: Values,
-    e1_y: Values,
-    tan_tilt_x: Values,
-    tan_tilt_y: Values,
-    e2_major: Values,
-    e2_minor: Values,
-    tan_wg_major: Values,
-    tan_wg_minor: Values,
-) -> RigidMotion:
-    """`RigidMotion` from error components: (e1 sin beta1, e1 cos beta1), (tan beta3, tan beta2),
-    (e2 cos alpha1, e2 sin alpha1), (tan alpha2, tan alpha3). Projections on u = (sin theta, cos theta) along the major
-    axis and v = (cos theta, -sin theta) along the minor one. Eccentricities in mm."""
-    lift_x, lift_y = tip.half_width * tan_tilt_x, tip.half_width * tan_tilt_y
+def rigid_motion(tip: TipGeometry, errors: ErrorComponents[V]) -> RigidMotion[V]:
+    """The `RigidMotion` that `errors` give the wave generator of `tip`: projections on u = (sin theta, cos theta) along
+    the major axis and v = (cos theta, -sin theta) along the minor one (Jia 2021, Eqs. (16)-(23), to second order)."""
+    lift_x, lift_y = tip.half_width * errors.tan_tilt_x, tip.half_width * errors.tan_tilt_y
     return RigidMotion(
-        ea_cos=tip.passes_major * e1_y,
-        ea_sin=tip.passes_major * e1_x,
-        ea_0=tip.passes_major * e2_major,
-        el_cos=tip.passes_minor * e1_x,
-        el_sin=-tip.passes_minor * e1_y,
-        el_0=tip.passes_minor * e2_minor,
+        ea_cos=tip.passes_major * errors.e1_y,
+        ea_sin=tip.passes_major * errors.e1_x,
+        ea_0=tip.passes_major * errors.e2_major,
+        el_cos=tip.passes_minor * errors.e1_x,
+        el_sin=-tip.passes_minor * errors.e1_y,
+        el_0=tip.passes_minor * errors.e2_minor,
         ta_cos=lift_y,
         ta_sin=lift_x,
-        ta_0=tip.half_width * tan_wg_major,
+        ta_0=tip.half_width * errors.tan_wg_major,
         tl_cos=lift_x,
         tl_sin=-lift_y,
-        tl_0=tip.half_width * tan_wg_minor,
-        twist_cos=(tan_tilt_y * tan_wg_minor - tan_tilt_x * tan_wg_major) * 0.5,
-        twist_sin=(tan_tilt_x * tan_wg_minor + tan_tilt_y * tan_wg_major) * 0.5,
-        twist_0=(tan_tilt_x * tan_tilt_y + tan_wg_major * tan_wg_minor) * 0.5,
+        tl_0=tip.half_width * errors.tan_wg_minor,
+        twist_cos=(errors.tan_tilt_y * errors.tan_wg_minor - errors.tan_tilt_x * errors.tan_wg_major) * 0.5,
+        twist_sin=(errors.tan_tilt_x * errors.tan_wg_minor + errors.tan_tilt_y * errors.tan_wg_major) * 0.5,
+        twist_0=(errors.tan_tilt_x * errors.tan_tilt_y + errors.tan_wg_major * errors.tan_wg_minor) * 0.5,
     )
 
 
-def motion_at(motion: RigidMotion, cos: Array, sin: Array) -> tuple[Array, Array, Array, Array]:
+def motion_at(motion: RigidMotion[V], cos: V, sin: V) -> tuple[V, V, V, V]:
     """E_a, E_l, T_a and T_l, mm, at the input angle with cosine `cos` and sine `sin`; `motion` as in `rigid_motion`.
 
     Two tilts after each other turn the wave generator a little about its axis, by half the area that they span. An
@@ -146,14 +162,13 @@ def motion_at(motion: RigidMotion, cos: Array, sin: Array) -> tuple[Array, Array
     )
 
 
-def rim_depth(
-    rim: RimConstants, e_a: Array, e_l: Array, t_a: Array, t_l: Array, zone_sign: float, rim_sign: float
-) -> tuple[Array, Array, Array]:
+def rim_depth(rim: RimConstants, e_a: V, e_l: V, t_a: V, t_l: V, zone_sign: float, rim_sign: float) -> tuple[V, V, V]:
     """Depth delta (mm) and offsets o, o' (rad) of one rim's outermost point in one zone.
 
-    Jia 2021, Eqs. (16)-(23), to second order in the errors. `e_a`, `e_l`, `t_a`, `t_l` as `motion_at` gives them, mm;
-    `zone_sign` +1 near the + major end, -1 near the opposite one; `rim_sign` +1 or -1, counted along the zone's own
-    direction. o is seen from the CS centre, o' from the wave generator's, both positive toward +v.
+    Jia 2021, Eqs. (16)-(23), to second order in the errors. `rim` has the constants of the wave generator; `e_a`,
+    `e_l`, `t_a`, `t_l` as `motion_at` gives them, mm; `zone_sign` +1 near the + major end, -1 near the opposite one;
+    `rim_sign` +1 or -1, counted along the zone's own direction. o is seen from the CS centre, o' from the wave
+    generator's, both positive toward +v.
     """
     shift = e_l + zone_sign * rim_sign * t_l
     q = shift - zone_sign * rim.tilt_gain * t_a * t_l
@@ -163,38 +178,44 @@ def rim_depth(
 
 
 def tooth_deviation(
-    cos_part: Values, sin_part: Values, cos: Array, sin: Array, zone_sign: float, offset_cos: Array, offset_sin: Array
-) -> Array:
+    cos_part: float | V, sin_part: float | V, cos: V, sin: V, zone_sign: float, offset_cos: V, offset_sin: V
+) -> V:
     """Deviation of a spline's teeth met in one zone, mm of arc (Jia 2021, Eqs. (31a), (31b)).
 
     s a sin(x + phi + s o): `cos_part` = a sin(phi), `sin_part` = a cos(phi), mm; `cos`, `sin` of the tooth angle x,
     theta for the CS and Z_CS/Z_FS theta for the FS; `offset_cos`, `offset_sin` of the offset, o (CS) or o' (FS).
-    The half turn to zone 2 is not scaled, so that it is the sign alone.
+    s is `zone_sign`, +1 near the + major end and -1 near the opposite one: the half turn to zone 2 is not scaled, so
+    that it is the sign alone.
     """
     here = cos_part * cos + sin_part * sin
     ahead = sin_part * cos - cos_part * sin
     return zone_sign * here * offset_cos + ahead * offset_sin
 
 
+def error_components(errors: DriveErrors) -> ErrorComponents[Array]:
+    """The components of `errors` of one drive or of many, in arrays of their shapes."""
+    e = errors
+    return ErrorComponents(
+        e1_x=np.asarray(e.axis_eccentricity * np.sin(e.axis_eccentricity_direction)),
+        e1_y=np.asarray(e.axis_eccentricity * np.cos(e.axis_eccentricity_direction)),
+        tan_tilt_x=np.asarray(np.tan(e.axis_tilt_x)),
+        tan_tilt_y=np.asarray(np.tan(e.axis_tilt_y)),
+        e2_major=np.asarray(e.wg_eccentricity * np.cos(e.wg_eccentricity_direction)),
+        e2_minor=np.asarray(e.wg_eccentricity * np.sin(e.wg_eccentricity_direction)),
+        tan_wg_major=np.asarray(np.tan(e.wg_tilt_major)),
+        tan_wg_minor=np.asarray(np.tan(e.wg_tilt_minor)),
+    )
+
+
 def branches(drive: Drive, errors: DriveErrors, theta: ArrayLike) -> Branches:
-    """Every rim's outermost point in both zones at input angles `theta`, rad; `errors` and `theta` broadcast, results
-    have shape (2, 2, ...).
+    """Every rim's outermost point in both zones of a `drive` with `errors` at input angles `theta`, rad; the two
+    broadcast, results have shape (2, 2, ...).
 
     Valid for drives whose profile has a smooth tip (`tip_is_smooth`) and errors up to about three times the shipped
     tolerances.
     """
-    tip, e = tip_geometry(drive), errors
-    motion = rigid_motion(
-        tip,
-        e.axis_eccentricity * np.sin(e.axis_eccentricity_direction),
-        e.axis_eccentricity * np.cos(e.axis_eccentricity_direction),
-        np.tan(e.axis_tilt_x),
-        np.tan(e.axis_tilt_y),
-        e.wg_eccentricity * np.cos(e.wg_eccentricity_direction),
-        e.wg_eccentricity * np.sin(e.wg_eccentricity_direction),
-        np.tan(e.wg_tilt_major),
-        np.tan(e.wg_tilt_minor),
-    )
+    tip = tip_geometry(drive)
+    motion = rigid_motion(tip, error_components(errors))
     where = motion_at(motion, np.cos(theta), np.sin(theta))
     rim = rim_constants(tip)
     signs = (1.0, -1.0)

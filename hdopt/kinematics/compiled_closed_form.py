@@ -3,19 +3,37 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
 
 from numba import njit
 
 from hdopt.arrays import Array
 from hdopt.kinematics import closed_form
-from hdopt.kinematics.closed_form import RigidMotion, TipGeometry
+from hdopt.kinematics.closed_form import ErrorComponents, RigidMotion, TipGeometry
+
+Function = TypeVar("Function", bound=Callable[..., object])
 
 # Division by zero gives an infinity that the kernels' comparisons expect; sums keep their order, so that results do not
 # depend on how the compiler vectorizes.
+# (Any: numba's options are of several kinds.)
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "afn"}}
-inlined = njit(inline="always", **OPTIONS)
-compiled = njit(**OPTIONS)
+
+
+def inlined(function: Function) -> Function:
+    """`function` compiled into each of its callers. Numba's own types lose a function that takes numbers or arrays."""
+    return cast("Function", njit(inline="always", **OPTIONS)(function))
+
+
+def entry(function: Function) -> Function:
+    """`function` compiled for Python to call: kept on disk, and run beside other threads."""
+    return cast("Function", njit(cache=True, nogil=True, **OPTIONS)(function))
+
+
+def compiled(function: Function) -> Function:
+    """`function` compiled once, called by other compiled ones."""
+    return cast("Function", njit(**OPTIONS)(function))
+
 
 rigid_motion = inlined(closed_form.rigid_motion)
 rim_constants = inlined(closed_form.rim_constants)
@@ -24,13 +42,12 @@ rim_depth = inlined(closed_form.rim_depth)
 tooth_deviation = inlined(closed_form.tooth_deviation)
 
 
-def _motion_of_row(tip: TipGeometry, row: Array) -> tuple[RigidMotion, float, float]:
+def _motion_of_row(tip: TipGeometry, row: Array) -> tuple[RigidMotion[float], float, float]:
     """The rigid motion of one drive, and the cosine and sine part (mm of arc) of its CS tooth term.
 
     `tip` has the wave generator's constants, `row` (12,) the errors in the order of ERROR_NAMES, mm and rad.
     """
-    motion = rigid_motion(
-        tip,
+    components = ErrorComponents(
         row[0] * math.sin(row[1]),
         row[0] * math.cos(row[1]),
         math.tan(row[3]),
@@ -40,6 +57,7 @@ def _motion_of_row(tip: TipGeometry, row: Array) -> tuple[RigidMotion, float, fl
         math.tan(row[6]),
         math.tan(row[7]),
     )
+    motion = rigid_motion(tip, components)
     return motion, row[8] * math.sin(row[9]), row[8] * math.cos(row[9])
 
 

@@ -15,13 +15,10 @@ import numpy as np
 from numba import njit
 
 from hdopt.arrays import Array, Index
-from hdopt.kinematics import closed_form
 from hdopt.kinematics.branches import TIE_MM
+from hdopt.kinematics.compiled_closed_form import tooth_deviation
 
-OPTIONS = {"error_model": "numpy"}
-inlined = njit(inline="always", **OPTIONS)
-compiled = njit(cache=True, nogil=True, **OPTIONS)
-tooth_deviation = inlined(closed_form.tooth_deviation)
+compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 BISECTIONS = 50
 GOLDEN = (math.sqrt(5) - 1) / 2
@@ -63,12 +60,15 @@ class Sampled(NamedTuple):
 
 @compiled
 def between(values: Array, place: float) -> float:
-    """Cubic through the four neighbours on an even periodic grid; `place` in cells."""
+    """Cubic through the four neighbours of a `place`, in cells, among `values` (n,) on an even periodic grid."""
     n = len(values)
     whole = math.floor(place)
     x = place - whole
     j = int(whole) % n
-    a, b, c, d = values[j - 1], values[j], values[(j + 1) % n], values[(j + 2) % n]
+    a: float = values[j - 1]
+    b: float = values[j]
+    c: float = values[(j + 1) % n]
+    d: float = values[(j + 2) % n]
     if x == 0.0:
         return b
     return (
@@ -133,7 +133,7 @@ def _rim_changes(gaps: Array, found: Array, count: int) -> int:
 
 
 @compiled
-def _node(mesh, rims, place, out):
+def _node(mesh: Sampled, rims: Index, place: float, out: Array) -> None:
     """Fill `out` (2, 4) for both zones at a `place`: deviation without FS teeth, FS sine's cosine and sine part over
     the phase, and the angle on the FS."""
     teeth = mesh.teeth
@@ -154,14 +154,16 @@ def _node(mesh, rims, place, out):
 
 
 @compiled
-def _zone_value(node, zone, phase, teeth):
+def _zone_value(node: Array, zone: int, phase: float, teeth: Teeth) -> float:
     """A zone's deviation at a node for the FS phase in rad, mm of arc."""
-    value = node[zone, 0] + node[zone, 1] * math.cos(phase) + node[zone, 2] * math.sin(phase)
+    value: float = node[zone, 0] + node[zone, 1] * math.cos(phase) + node[zone, 2] * math.sin(phase)
     return value + _on_table(teeth.fs_table, node[zone, 3] + phase)
 
 
 @compiled
-def _extreme_in_cell(mesh, rims, phase, low, high, zone, node):
+def _extreme_in_cell(
+    mesh: Sampled, rims: Index, phase: float, low: float, high: float, zone: int, node: Array
+) -> float:
     """Least driving deviation in a cell (`zone` < 0), or the largest of one zone, by golden section."""
     x, y = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
     at_x = at_y = best = 0.0
@@ -187,8 +189,8 @@ def _extreme_in_cell(mesh, rims, phase, low, high, zone, node):
     return best
 
 
-@inlined
-def _least_of_lines(one_a, two_a, one_b, two_b):
+@njit(inline="always", error_model="numpy")
+def _least_of_lines(one_a: float, two_a: float, one_b: float, two_b: float) -> float:
     """Least of the larger of two lines between their ends."""
     least = min(max(one_a, two_a), max(one_b, two_b))
     apart_a, apart_b = one_a - two_a, one_b - two_b
@@ -198,7 +200,7 @@ def _least_of_lines(one_a, two_a, one_b, two_b):
 
 
 @compiled
-def _scan_piece(mesh, rims, places, nodes, values, best):
+def _scan_piece(mesh: Sampled, rims: Index, places: Array, nodes: Array, values: Array, best: Array) -> float:
     """Walk one stretch, given by its `places`; `best` (2,) holds the least and the largest deviation so far."""
     n, phases, teeth = len(places), mesh.phases, mesh.teeth
     for i in range(n):
@@ -226,7 +228,10 @@ def _scan_piece(mesh, rims, places, nodes, values, best):
 
 
 @compiled
-def _refine_piece(mesh, rims, places, values, margin, best, node):
+def _refine_piece(
+    mesh: Sampled, rims: Index, places: Array, values: Array, margin: float, best: Array, node: Array
+) -> None:
+    """Follow the cells whose extremes, within the `margin`, may pass the `best` found so far."""
     for p in range(mesh.phases):
         phase = 2 * math.pi * p / mesh.phases
         for i in range(len(places) - 1):

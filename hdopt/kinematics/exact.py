@@ -108,8 +108,8 @@ class _Rims:
 
 
 def branches(drive: Drive, errors: DriveErrors, theta: ArrayLike) -> Branches:
-    """Every rim's outermost point in both zones at input angles `theta`, rad, shape (n,): results (2, 2, ..., n), where
-    `errors` have the shape (...).
+    """Every rim's outermost point in both zones of `drive` at input angles `theta`, rad, shape (n,): results
+    (2, 2, ..., n), where `errors` have the shape (...).
 
     Jia 2021, Eqs. (16)-(23). Valid for any profile with a second derivative, and for errors that keep the deepest point
     within 60 deg of its end of the major axis. Newton steps start from the closed form's place where the tips are
@@ -140,6 +140,6 @@ def branches(drive: Drive, errors: DriveErrors, theta: ArrayLike) -> Branches:
 
 
 def deepest_points(drive: Drive, errors: DriveErrors, theta: ArrayLike) -> DeepestPoints:
-    """Deepest points at input angles `theta`, rad, shape (n,); results have shape (2, ..., n) for `errors` of shape
-    (...). The geometry is that of `branches`."""
+    """Deepest points of `drive` at input angles `theta`, rad, shape (n,); results have shape (2, ..., n) for `errors`
+    of shape (...). The geometry is that of `branches`."""
     return deepest(branches(drive, errors, theta))

@@ -20,10 +20,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from hdopt.arrays import Array
+from hdopt.arrays import Array, Index, Mask
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
-from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
+from hdopt.kinematics.closed_form import RigidMotion, TipGeometry, tip_geometry
 from hdopt.kinematics.compiled_closed_form import motion_at, motion_of_row, rim_constants, rim_depth, tooth_deviation
 from hdopt.parallel.shared_memory import in_parts
 
@@ -51,9 +51,22 @@ class Extremes(NamedTuple):
     low_slopes: Array
 
 
+class ZoneTerms(NamedTuple):
+    """All that the deviation of a zone depends on but the angle: wave generator, its motion, the CS teeth's cosine and
+    sine part (mm of arc), tan(alpha), and the amplitude a of the FS teeth (mm of arc)."""
+
+    tip: TipGeometry
+    motion: RigidMotion[float]
+    cs_cos: float
+    cs_sin: float
+    tan_alpha: float
+    a_fs: float
+
+
 @njit(cache=True, nogil=True)
-def _branch(tip, motion, cs_cos, cs_sin, tan_alpha, theta, s, k, out):
+def _branch(terms: ZoneTerms, theta: float, s: float, k: float, out: Array) -> None:
     """Fill `out` (3, 6): tau without FS term, offset o' and depth of zone s and rim k, with all slopes."""
+    tip, motion, cs_cos, cs_sin, tan_alpha, _ = terms
     cos, sin = math.cos(theta), math.sin(theta)
     major, rho, half = tip.semi_major, tip.tip_radius, tip.half_width
     e_a, e_l, t_a, t_l = motion_at(motion, cos, sin)
@@ -93,7 +106,7 @@ def _branch(tip, motion, cs_cos, cs_sin, tan_alpha, theta, s, k, out):
 
 
 @njit(cache=True, nogil=True)
-def _zones(tip, motion, cs_cos, cs_sin, tan_alpha, theta, side, work):
+def _zones(terms: ZoneTerms, theta: float, side: Array, work: Array) -> tuple[float, float]:
     """Deepest rim of both zones into `work` rows 0 and 1; `side` (2,) forces a rim (+-1) or, 0, lets the depth decide.
 
     Returns by how much the upper rim lies deeper than the lower one in each zone, where the depth decided.
@@ -104,7 +117,7 @@ def _zones(tip, motion, cs_cos, cs_sin, tan_alpha, theta, side, work):
         if side[zone] == -k:
             continue
         into = zone if side[zone] == k or k > 0 else 2
-        _branch(tip, motion, cs_cos, cs_sin, tan_alpha, theta, 1.0 - 2.0 * zone, k, work[into])
+        _branch(terms, theta, 1.0 - 2.0 * zone, k, work[into])
         if into == 2:
             gap = work[zone, 2, VALUE] - work[2, 2, VALUE]
             if gap < 0.0:
@@ -117,7 +130,7 @@ def _zones(tip, motion, cs_cos, cs_sin, tan_alpha, theta, side, work):
 
 
 @njit(cache=True, nogil=True)
-def _lowest(work, a_fs, out):
+def _lowest(work: Array, a_fs: float, out: Array) -> None:
     """l and its slopes from both zones' rows of `work` into `out` (6,)."""
     first, second = work[0, 0], work[1, 0]
     h = (work[0, 1, VALUE] + work[1, 1, VALUE]) / 2
@@ -141,9 +154,10 @@ def _lowest(work, a_fs, out):
 
 
 @njit(cache=True, nogil=True)
-def _maxima(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, work, values, slopes):
+def _maxima(terms: ZoneTerms, work: Array, values: Array, slopes: Array) -> None:
     """Four smooth maxima, one a zone and rim: Newton from the first-order peak. A branch that is not the deeper rim
     at its own peak lies below another branch there, so it never wins and does no harm."""
+    _, motion, cs_cos, cs_sin, tan_alpha, a_fs = terms
     index = 0
     for zone in range(2):
         s = 1.0 if zone == 0 else -1.0
@@ -156,29 +170,29 @@ def _maxima(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, work, values, slopes):
             best, best_theta = -math.inf, theta
             step = 1e-4
             for _ in range(NEWTON):
-                _branch(tip, motion, cs_cos, cs_sin, tan_alpha, theta, s, k, work[zone])
+                _branch(terms, theta, s, k, work[zone])
                 value, slope = work[zone, 0, VALUE], work[zone, 0, THETA]
                 if value > best:
                     best, best_theta = value, theta
-                _branch(tip, motion, cs_cos, cs_sin, tan_alpha, theta + step, s, k, work[2])
+                _branch(terms, theta + step, s, k, work[2])
                 bend = (work[2, 0, THETA] - slope) / step
                 if bend >= -1e-3 * size or abs(slope) < 1e-13 * size:
                     break
                 theta += min(max(-slope / bend, -0.3), 0.3)
-            _branch(tip, motion, cs_cos, cs_sin, tan_alpha, best_theta, s, k, work[zone])
+            _branch(terms, best_theta, s, k, work[zone])
             values[index] = work[zone, 0, VALUE] + a_fs
             slopes[index] = work[zone, 0, MAJOR:]
             index += 1
 
 
 @njit(cache=True, nogil=True)
-def _rim_change(tip, motion, cs_cos, cs_sin, tan_alpha, zone, low, high, work):
+def _rim_change(terms: ZoneTerms, zone: int, low: float, high: float, work: Array) -> float:
     """Angle between `low` and `high` where the deepest rim of a zone changes, by bisection."""
     free = np.zeros(2)
     start = False
     for step in range(54):
         middle = low if step == 0 else (low + high) / 2
-        gaps = _zones(tip, motion, cs_cos, cs_sin, tan_alpha, middle, free, work)
+        gaps = _zones(terms, middle, free, work)
         upper = gaps[zone] >= 0
         if step == 0:
             start = upper
@@ -190,17 +204,19 @@ def _rim_change(tip, motion, cs_cos, cs_sin, tan_alpha, zone, low, high, work):
 
 
 @njit(cache=True, nogil=True)
-def _value(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, theta, side, work, out):
-    _zones(tip, motion, cs_cos, cs_sin, tan_alpha, theta, side, work)
-    _lowest(work, a_fs, out)
-    return out[VALUE]
+def _value(terms: ZoneTerms, theta: float, side: Array, work: Array, out: Array) -> float:
+    """Fill `out` (6,) with l and its slopes at `theta`; l."""
+    _zones(terms, theta, side, work)
+    _lowest(work, terms.a_fs, out)
+    value: float = out[VALUE]
+    return value
 
 
 @njit(cache=True, nogil=True)
-def _move_with_change(tip, motion, cs_cos, cs_sin, tan_alpha, theta, zone, work, out):
+def _move_with_change(terms: ZoneTerms, theta: float, zone: int, work: Array, out: Array) -> None:
     """Add to the slopes of l at the angle where a zone's rim changes what that angle's own motion does."""
     for rim in range(2):
-        _branch(tip, motion, cs_cos, cs_sin, tan_alpha, theta, 1.0 - 2.0 * zone, 1.0 - 2.0 * rim, work[rim])
+        _branch(terms, theta, 1.0 - 2.0 * zone, 1.0 - 2.0 * rim, work[rim])
     apart = work[0, 2] - work[1, 2]
     if apart[THETA] != 0.0:
         for j in range(2, 6):
@@ -208,13 +224,15 @@ def _move_with_change(tip, motion, cs_cos, cs_sin, tan_alpha, theta, zone, work,
 
 
 @njit(cache=True, nogil=True)
-def _minimum_between(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, low, high, ends, work, out, other):
+def _minimum_between(
+    terms: ZoneTerms, low: float, high: float, ends: Index, work: Array, out: Array, other: Array
+) -> None:
     """Least l between two angles with the same rims inside; `ends` the zone whose rim changes there, -1 for none.
 
     Fills `out` (6,) with value and design slopes. The rims are those of the middle, so that ends are one-sided limits.
     """
     side, free = np.zeros(2), np.zeros(2)
-    gaps = _zones(tip, motion, cs_cos, cs_sin, tan_alpha, (low + high) / 2, free, work)
+    gaps = _zones(terms, (low + high) / 2, free, work)
     for zone in range(2):
         side[zone] = 1.0 if gaps[zone] >= 0 else -1.0
     golden = (math.sqrt(5.0) - 1) / 2
@@ -228,7 +246,7 @@ def _minimum_between(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, low, high, en
         # The two inner points first, then one a step, at last both ends.
         last = step >= GOLDEN + 2
         place = (low if step == GOLDEN + 2 else high) if last else x1 if at_1 else x2
-        value = _value(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, place, side, work, out)
+        value = _value(terms, place, side, work, out)
         if value < best or (last and value <= best + 1e-15):
             best, theta = value, place
         if last:
@@ -251,11 +269,11 @@ def _minimum_between(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, low, high, en
         changed = ends[0] if theta == low else ends[1]
     for step in range(2):
         beside = 0.0 if changed >= 0 else BESIDE * (2 * step - 1)
-        _value(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, theta + beside, side, work, out)
+        _value(terms, theta + beside, side, work, out)
         if step == 0:
             other[:] = out
     if changed >= 0:
-        _move_with_change(tip, motion, cs_cos, cs_sin, tan_alpha, theta, changed, work, out)
+        _move_with_change(terms, theta, changed, work, out)
         return
     rising, falling = out[THETA], other[THETA]
     share = rising / (rising - falling) if rising > STEEP and falling < -STEEP else 0.5
@@ -265,17 +283,25 @@ def _minimum_between(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, low, high, en
 
 
 @njit(cache=True, nogil=True)
-def _minima(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, work, values, slopes):
-    """The lowest local minima of l, at most as many as `values` holds, sorted upward."""
-    marks, level, upper = np.empty(SCAN + 1), np.empty(SCAN + 1), np.empty((SCAN + 1, 2), np.bool_)
-    out, other, free = np.empty(6), np.empty(6), np.zeros(2)
+def _scan(terms: ZoneTerms, work: Array, out: Array, marks: Array, level: Array, upper: Mask) -> None:
+    """Fill `marks` (SCAN + 1,) with even angles of one turn, `level` with l there, and `upper` (SCAN + 1, 2) with
+    whether the upper rim is the deepest one of each zone."""
+    free = np.zeros(2)
     step = 2 * math.pi / SCAN
     for i in range(SCAN + 1):
         marks[i] = i * step
-        gaps = _zones(tip, motion, cs_cos, cs_sin, tan_alpha, marks[i], free, work)
+        gaps = _zones(terms, marks[i], free, work)
         upper[i, 0], upper[i, 1] = gaps[0] >= 0, gaps[1] >= 0
-        _lowest(work, a_fs, out)
+        _lowest(work, terms.a_fs, out)
         level[i] = out[VALUE]
+
+
+@njit(cache=True, nogil=True)
+def _minima(terms: ZoneTerms, work: Array, values: Array, slopes: Array) -> None:
+    """The lowest local minima of l, at most as many as `values` holds, sorted upward."""
+    marks, level, upper = np.empty(SCAN + 1), np.empty(SCAN + 1), np.empty((SCAN + 1, 2), np.bool_)
+    out, other = np.empty(6), np.empty(6)
+    _scan(terms, work, out, marks, level, upper)
     highest_kept = level.min() + KEPT_RANGE * (level.max() - level.min())
     values[:] = math.inf
     ends = np.empty(2, np.int64)
@@ -286,9 +312,9 @@ def _minima(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, work, values, slopes):
         after = level[i + 2] if i < SCAN - 1 else level[1]
         change0 = change1 = math.nan
         if upper[i, 0] != upper[i + 1, 0]:
-            change0 = _rim_change(tip, motion, cs_cos, cs_sin, tan_alpha, 0, marks[i], marks[i + 1], work)
+            change0 = _rim_change(terms, 0, marks[i], marks[i + 1], work)
         if upper[i, 1] != upper[i + 1, 1]:
-            change1 = _rim_change(tip, motion, cs_cos, cs_sin, tan_alpha, 1, marks[i], marks[i + 1], work)
+            change1 = _rim_change(terms, 1, marks[i], marks[i + 1], work)
         dips = (level[i] <= before and level[i] <= level[i + 1]) or (level[i + 1] <= level[i] and level[i + 1] <= after)
         if not dips and math.isnan(change0) and math.isnan(change1):
             continue
@@ -310,7 +336,7 @@ def _minima(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, work, values, slopes):
                 high, zone_high = marks[i + 1], -1
             if high > low:
                 ends[0], ends[1] = zone_low, zone_high
-                _minimum_between(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, low, high, ends, work, out, other)
+                _minimum_between(terms, low, high, ends, work, out, other)
                 _insert(values, slopes, out)
             low, zone_low = high, zone_high
     last = 0
@@ -323,7 +349,7 @@ def _minima(tip, motion, cs_cos, cs_sin, tan_alpha, a_fs, work, values, slopes):
 
 
 @njit(cache=True, nogil=True)
-def _insert(values, slopes, found):
+def _insert(values: Array, slopes: Array, found: Array) -> None:
     """Keep `found` among the lowest, sorted."""
     place = len(values)
     while place > 0 and found[VALUE] < values[place - 1]:
@@ -337,13 +363,14 @@ def _insert(values, slopes, found):
 
 
 @njit(cache=True, nogil=True)
-def _extremes(tip, tan_alpha, rows, highs, high_slopes, lows, low_slopes):
+def _extremes(tip: TipGeometry, tan_alpha: float, rows: Array, found: Extremes) -> None:
+    """Fill the arrays of `found` for each of `rows` (n, 12)."""
     work = np.empty((3, 3, 6))
     for i in range(rows.shape[0]):
-        row = rows[i]
-        motion, cs_cos, cs_sin = motion_of_row(tip, row)
-        _maxima(tip, motion, cs_cos, cs_sin, tan_alpha, row[10], work, highs[i], high_slopes[i])
-        _minima(tip, motion, cs_cos, cs_sin, tan_alpha, row[10], work, lows[i], low_slopes[i])
+        motion, cs_cos, cs_sin = motion_of_row(tip, rows[i])
+        terms = ZoneTerms(tip, motion, cs_cos, cs_sin, tan_alpha, rows[i, 10])
+        _maxima(terms, work, found.highs[i], found.high_slopes[i])
+        _minima(terms, work, found.lows[i], found.low_slopes[i])
 
 
 def extremes(drive: Drive, errors: DriveErrors) -> Extremes:
@@ -356,9 +383,10 @@ def extremes(drive: Drive, errors: DriveErrors) -> Extremes:
 
 
 def extremes_of(tip: TipGeometry, tan_alpha: float, rows: Array) -> Extremes:
-    """The same from the constants of the closed form and rows of `DriveErrors.to_matrix`."""
+    """The same from the constants `tip` of the closed form, `tan_alpha` of the pressure angle, and `rows` (n, 12) of
+    `DriveErrors.to_matrix`."""
     rows = np.ascontiguousarray(rows, float)
     n = len(rows)
     found = Extremes(np.empty((n, HIGHS)), np.empty((n, HIGHS, 4)), np.empty((n, LOWS)), np.empty((n, LOWS, 4)))
-    in_parts(n, lambda part: _extremes(tip, tan_alpha, rows[part], *(array[part] for array in found)))
+    in_parts(n, lambda part: _extremes(tip, tan_alpha, rows[part], Extremes(*(array[part] for array in found))))
     return found

@@ -15,14 +15,15 @@ included, for the FS phases next to where both zones drive equally.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numba import njit
 
+from hdopt.arrays import Array
+from hdopt.kinematics.closed_form import ErrorComponents, RigidMotion, RimConstants, TipGeometry
 from hdopt.kinematics.compiled_closed_form import (
-    OPTIONS,
     compiled,
+    entry,
     inlined,
     motion_at,
     rigid_motion,
@@ -45,7 +46,7 @@ SCRATCH = (16, 3)
 
 
 @inlined
-def _angle(sin, cos):
+def _angle(sin: float, cos: float) -> float:
     """atan2 to 2e-7 rad by a polynomial, several times faster: a phase needs no more."""
     steep = abs(sin) > abs(cos)
     x = abs(cos) / abs(sin) if steep else abs(sin) / abs(cos)
@@ -64,12 +65,16 @@ def _angle(sin, cos):
 
 
 @inlined
-def _tan(x):
+def _tan(x: float) -> float:
     """tan, by its series where that is exact to rounding (tilts are small)."""
     x2 = x * x
     if x2 > 1e-3:
         return math.tan(x)
     return x * (1 + x2 / 3 * (1 + x2 * 0.4 * (1 + x2 * 17 / 42)))
+
+
+Sinusoid: TypeAlias = tuple[float, float, float]
+"""Cosine part, sine part and constant over the input angle."""
 
 
 class Rim(NamedTuple):
@@ -84,12 +89,22 @@ class Rim(NamedTuple):
 
 
 @inlined
-def _sinusoid_derivative(cos_part, sin_part, cos, sin):
+def _sinusoid_derivative(cos_part: float, sin_part: float, cos: float, sin: float) -> float:
     return sin_part * cos - cos_part * sin
 
 
 @inlined
-def _rim(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, s, k):
+def _rim(
+    rim: RimConstants,
+    motion: RigidMotion[float],
+    cs_cos: float,
+    cs_sin: float,
+    tan_alpha: float,
+    cos: float,
+    sin: float,
+    s: float,
+    k: float,
+) -> Rim:
     """tau without its FS term, its slope and curvature over theta, the FS offset o' and the depth, of zone s, rim k."""
     e_a, e_l, t_a, t_l = motion_at(motion, cos, sin)
     e_a1 = _sinusoid_derivative(motion.ea_cos, motion.ea_sin, cos, sin)
@@ -108,7 +123,7 @@ def _rim(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, s, k):
 
 
 @inlined
-def _rotate(cos, sin, x):
+def _rotate(cos: float, sin: float, x: float) -> tuple[float, float]:
     """(cos, sin) turned by a small angle x (series to x^5; |x| <= 0.25 keeps 3e-7)."""
     x2 = x * x
     c = 1 - x2 / 2 * (1 - x2 / 12)
@@ -117,20 +132,28 @@ def _rotate(cos, sin, x):
 
 
 @inlined
-def _switch(upper, lower):
+def _switch(upper: Rim, lower: Rim) -> float:
     """Where, seen from here, the deepest rim changes; infinite where it does not."""
     rate = upper.depth_slope - lower.depth_slope
     return (lower.depth - upper.depth) / rate if rate != 0.0 else math.inf
 
 
 @inlined
-def _deeper(upper, lower, x):
+def _deeper(upper: Rim, lower: Rim, x: float) -> bool:
     """Whether the upper rim is the deeper one at a distance x from here."""
     return upper.depth + x * upper.depth_slope >= lower.depth + x * lower.depth_slope
 
 
 @inlined
-def _four_rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin):
+def _four_rims(
+    rim: RimConstants,
+    motion: RigidMotion[float],
+    cs_cos: float,
+    cs_sin: float,
+    tan_alpha: float,
+    cos: float,
+    sin: float,
+) -> tuple[tuple[Rim, Rim, Rim, Rim], float, float]:
     """Both rims of zone 1, then of zone 2, and the two distances from here, sorted, at which a deepest rim changes."""
     a = _rim(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, 1.0, 1.0)
     b = _rim(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, 1.0, -1.0)
@@ -160,7 +183,7 @@ class Piece(NamedTuple):
 
 
 @inlined
-def _piece(rims, low, high):
+def _piece(rims: tuple[Rim, Rim, Rim, Rim], low: float, high: float) -> Piece:
     middle = (low + high) / 2
     one = rims[0] if _deeper(rims[0], rims[1], middle) else rims[1]
     two = rims[2] if _deeper(rims[2], rims[3], middle) else rims[3]
@@ -179,7 +202,7 @@ def _piece(rims, low, high):
 
 
 @inlined
-def _lowest_of_piece(piece, a_fs, advance, cos, sin):
+def _lowest_of_piece(piece: Piece, a_fs: float, advance: float, cos: float, sin: float) -> tuple[float, float]:
     """The lowest driving deviation on one piece and where it lies, with the FS phase (cos, sin) at x = 0."""
     mean = piece.mean + a_fs * cos * piece.h
     gap = piece.gap + a_fs * (sin + cos * piece.d)
@@ -202,14 +225,16 @@ def _lowest_of_piece(piece, a_fs, advance, cos, sin):
 
 
 @inlined
-def _pieces(rims, first, second, reach):
+def _pieces(rims: tuple[Rim, Rim, Rim, Rim], first: float, second: float, reach: float) -> tuple[Piece, Piece, Piece]:
     """The three stretches within `reach`, between the two angles where a deepest rim changes."""
     first, second = min(reach, max(-reach, first)), min(reach, max(-reach, second))
     return _piece(rims, -reach, first), _piece(rims, first, second), _piece(rims, second, reach)
 
 
 @inlined
-def _lowest(pieces, a_fs, advance, cos, sin):
+def _lowest(
+    pieces: tuple[Piece, Piece, Piece], a_fs: float, advance: float, cos: float, sin: float
+) -> tuple[float, float]:
     """The lowest driving deviation on all three pieces and where, with the FS phase (cos, sin) at x = 0."""
     best, place = _lowest_of_piece(pieces[0], a_fs, advance, cos, sin)
     value, x = _lowest_of_piece(pieces[1], a_fs, advance, cos, sin)
@@ -222,7 +247,20 @@ def _lowest(pieces, a_fs, advance, cos, sin):
 
 
 @compiled
-def _polished(rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, advance, cos, sin, fs_cos, fs_sin, x):
+def _polished(
+    rim: RimConstants,
+    motion: RigidMotion[float],
+    cs_cos: float,
+    cs_sin: float,
+    tan_alpha: float,
+    a_fs: float,
+    advance: float,
+    cos: float,
+    sin: float,
+    fs_cos: float,
+    fs_sin: float,
+    x: float,
+) -> float:
     """The lowest driving deviation near a distance x from (cos, sin), found anew from there, twice."""
     value = math.inf
     for step in range(POLISHES):
@@ -235,7 +273,7 @@ def _polished(rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, advance, cos, sin, f
 
 
 @inlined
-def _first_order_minima(t, d, a_fs, scratch):
+def _first_order_minima(t: Sinusoid, d: Sinusoid, a_fs: float, scratch: Array) -> tuple[int, int]:
     """Fill `scratch` with the angles where the first-order minimum can lie; their number, and the most promising."""
     t_cos, t_sin, t_0 = t
     d_cos, d_sin, d_0 = d
@@ -279,7 +317,21 @@ def _first_order_minima(t, d, a_fs, scratch):
 
 
 @compiled
-def _least(rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phases, t, d, second_order, scratch):
+def _least(
+    rim: RimConstants,
+    motion: RigidMotion[float],
+    cs_cos: float,
+    cs_sin: float,
+    tan_alpha: float,
+    a_fs: float,
+    fs_phase: float,
+    advance: float,
+    phases: float,
+    t: Sinusoid,
+    d: Sinusoid,
+    second_order: float,
+    scratch: Array,
+) -> float:
     """Infimum over one full relative turn, mm of arc. `t`, `d`: (cos, sin, constant) of the first-order parts."""
     d_cos, d_sin, d_0 = d
     count, first_place = _first_order_minima(t, d, a_fs, scratch)
@@ -316,7 +368,7 @@ def _least(rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phas
 
 
 @inlined
-def _uphill(at, a_fs, advance, x):
+def _uphill(at: Rim, a_fs: float, advance: float, x: float) -> tuple[float, float]:
     """The Newton step to the peak of a branch whose FS phase is `x` beyond its own peak, and what it gains."""
     pull = at.slope - a_fs * advance * math.sin(x)
     stiffness = a_fs * advance * advance * math.cos(x) - at.bend
@@ -325,7 +377,20 @@ def _uphill(at, a_fs, advance, x):
 
 
 @compiled
-def _greatest(rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, phases, t, d, second_order):
+def _greatest(
+    rim: RimConstants,
+    motion: RigidMotion[float],
+    cs_cos: float,
+    cs_sin: float,
+    tan_alpha: float,
+    a_fs: float,
+    fs_phase: float,
+    advance: float,
+    phases: float,
+    t: Sinusoid,
+    d: Sinusoid,
+    second_order: float,
+) -> float:
     """Supremum over one full relative turn, mm of arc."""
     t_cos, t_sin, t_0 = t
     d_cos, d_sin, d_0 = d
@@ -361,11 +426,10 @@ def _greatest(rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, p
 
 
 @compiled
-def _one(tip, tan_alpha, advance, phases, row, scratch):
+def _one(tip: TipGeometry, tan_alpha: float, advance: float, phases: float, row: Array, scratch: Array) -> float:
     """Peak-to-peak of one drive, mm of arc; `row` holds its errors in the order of ERROR_NAMES."""
     beta1, alpha1, phi_cs, a_fs = row[1], row[5], row[9], row[10]
-    motion = rigid_motion(
-        tip,
+    components = ErrorComponents(
         row[0] * math.sin(beta1),
         row[0] * math.cos(beta1),
         _tan(row[3]),
@@ -375,6 +439,7 @@ def _one(tip, tan_alpha, advance, phases, row, scratch):
         _tan(row[6]),
         _tan(row[7]),
     )
+    motion = rigid_motion(tip, components)
     cs_cos, cs_sin = row[8] * math.sin(phi_cs), row[8] * math.cos(phi_cs)
     t = tan_alpha * motion.ta_cos, tan_alpha * motion.ta_sin, tan_alpha * motion.ta_0
     d = tan_alpha * motion.ea_cos + cs_cos, tan_alpha * motion.ea_sin + cs_sin, tan_alpha * motion.ea_0
@@ -390,9 +455,16 @@ def _one(tip, tan_alpha, advance, phases, row, scratch):
     return high - low
 
 
-@njit(cache=True, nogil=True, **OPTIONS)
-def peak_to_peak_block(tip, tan_alpha, advance, phases, matrix, out):
-    """Fill `out` (n,) with the peak-to-peak of each row of `matrix` (n, 12), mm of arc."""
+@entry
+def peak_to_peak_block(
+    tip: TipGeometry, tan_alpha: float, advance: float, phases: float, matrix: Array, out: Array
+) -> None:
+    """Fill `out` (n,) with the peak-to-peak of each row of `matrix` (n, 12), mm of arc.
+
+    `tip` has the wave generator's constants, `tan_alpha` is the tangent of the pressure angle, `advance` Z_CS/Z_FS and
+    `phases` the number of FS phases of the beat. Rows hold errors in the order of ERROR_NAMES, mm and rad; valid where
+    the closed form is.
+    """
     scratch = np.empty(SCRATCH)
     for i in range(matrix.shape[0]):
         out[i] = _one(tip, tan_alpha, advance, phases, matrix[i], scratch)

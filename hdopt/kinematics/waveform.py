@@ -102,10 +102,12 @@ def kinematic_error_arcmin(
     geometry: str = DEFAULT_METHOD,
     homogenization: float = 1.0,
 ) -> Array:
-    """Kinematic error over input angles `theta` (rad), arcmin, same shape: k_e (2 pi/l_FS) max(tau_1, tau_2), Eq. (32).
+    """Kinematic error over input angles `theta` (rad), arcmin, same shape: k_e (2 pi/l_FS) max(tau_1, tau_2), Jia 2021,
+    Eq. (32).
 
-    The zone with the larger deviation drives. The values are those of the model, their mean is kept. `homogenization`
-    is k_e: 1 for a single pair of teeth. `geometry`: "exact" or "closed form".
+    tau_1 and tau_2 are the deviations of both zones of `drive` with the `errors` of one drive. The zone with the larger
+    deviation drives. The values are those of the model, their mean is kept. `homogenization` is k_e: 1 for a single
+    pair of teeth. `geometry`: "exact" or "closed form".
     """
     deviation = zone_deviation(drive, errors, theta, geometry)
     error: Array = homogenization * drive.geometry.arcmin_per_mm * np.max(deviation, axis=0)

@@ -13,7 +13,7 @@ from hdopt.arrays import Array, Index
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
-from hdopt.kinematics.closed_form import tip_geometry
+from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
 from hdopt.kinematics.waveform import full_turn
 from hdopt.parallel.shared_memory import in_blocks
 from hdopt.simulation.effect_values import EffectValues
@@ -133,7 +133,8 @@ class LocalExtremes:
 
     def values(self, drive: Drive, row: Array, added: AddedTable) -> Array:
         """The extremes (arcmin) of a drive that differs a little from the one they were found for; shape (k,)."""
-        return self.sign * _near(drive, row, added, self, NEAR)[0]
+        lowest: Array = _near(drive, row, added, self, NEAR)[0]
+        return self.sign * lowest
 
 
 def local_extremes(drive: Drive, row: Array, added: AddedTable, most: int) -> tuple[LocalExtremes, LocalExtremes]:
@@ -152,7 +153,7 @@ def local_extremes(drive: Drive, row: Array, added: AddedTable, most: int) -> tu
         ways, places = np.nonzero(local)
         order = np.argsort(signed[ways, places])
         ways, theta = ways[order], places[order] * step
-        best = []
+        best: list[tuple[float, int]] = []
         while len(theta) and len(best) < most:
             turned = np.mod(theta - theta[0] + np.pi, 2 * np.pi) - np.pi
             alike = np.abs(turned) < CLOSEST
@@ -174,7 +175,7 @@ def _near(drive: Drive, row: Array, added: AddedTable, at: LocalExtremes, half: 
     )
 
 
-def _constants(drive: Drive, homogenization: float = 1.0):
+def _constants(drive: Drive, homogenization: float = 1.0) -> tuple[TipGeometry, float, float, int, float]:
     """What the compiled walk knows of a drive besides its errors."""
     gear = drive.geometry
     advance = gear.flexspline_advance

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hdopt.arrays import Array
@@ -35,16 +37,15 @@ def _of_pass(model: ExtendedModel, direction: float) -> tuple[float, float]:
     theta, values = coarse.relative_turn(direction)
     if fine:
         order = max(effect.highest_order(model.ratio) for effect in fine)
-        return tuple(
-            sign * _lowest_with_ripple(lambda x, s=sign: s * model.waveform(x, direction), theta, sign * values, order)
-            for sign in (1.0, -1.0)
-        )
+        low = _lowest_with_ripple(lambda x: model.waveform(x, direction), theta, values, order)
+        high = -_lowest_with_ripple(lambda x: -model.waveform(x, direction), theta, -values, order)
+        return low, high
     low = zoom_lowest(lambda x: model.waveform(x, direction), theta, values, model.span)
     high = -zoom_lowest(lambda x: -model.waveform(x, direction), theta, -values, model.span)
     return low, high
 
 
-def _lowest_with_ripple(function, theta: Array, values: Array, order: float) -> float:
+def _lowest_with_ripple(function: Callable[[Array], Array], theta: Array, values: Array, order: float) -> float:
     """Least value of `function` near the lowest local minima of the coarse `values`, ripple by ripple."""
     local = np.flatnonzero((values <= np.roll(values, 1)) & (values <= np.roll(values, -1)))
     local = local[np.argsort(values[local])[:CANDIDATES]]

@@ -8,13 +8,15 @@ angles first, then by golden section around the best local extremes. The base is
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from hdopt.arrays import Array, Index
+from hdopt.kinematics.closed_form import RigidMotion, RimConstants, TipGeometry
 from hdopt.kinematics.compiled_closed_form import (
-    OPTIONS,
     compiled,
+    entry,
     inlined,
     motion_at,
     motion_of_row,
@@ -35,24 +37,43 @@ EDGE = 1e-9
 """Distance from a change of rim (rad) at which either side is evaluated: slopes of 10 arcmin/rad move it by 1e-8."""
 
 
+class WalkedDrive(NamedTuple):
+    """All that the kinematic error at one angle needs: constants and motion of the wave generator, the CS teeth's
+    cosine and sine part (mm of arc), tan(alpha), amplitude (mm of arc) and phase (rad) of the FS teeth, Z_CS/Z_FS,
+    arcmin per mm of arc times k_e, and the full relative turn (rad of input angle)."""
+
+    rim: RimConstants
+    motion: RigidMotion[float]
+    cs_cos: float
+    cs_sin: float
+    tan_alpha: float
+    a_fs: float
+    fs_phase: float
+    advance: float
+    scale: float
+    span: float
+
+
 @inlined
-def _rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, s):
+def _rims(drive: WalkedDrive, cos: float, sin: float, s: float) -> tuple[float, float]:
     """Deviation (mm of arc) of zone s (+1, -1) without its FS teeth, and the FS offset o', at the deeper rim."""
-    e_a, e_l, t_a, t_l = motion_at(motion, cos, sin)
+    rim = drive.rim
+    e_a, e_l, t_a, t_l = motion_at(drive.motion, cos, sin)
     depth, o, o_fs = rim_depth(rim, e_a, e_l, t_a, t_l, s, 1.0)
     other, o_other, o_fs_other = rim_depth(rim, e_a, e_l, t_a, t_l, s, -1.0)
     if other > depth:
         depth, o, o_fs = other, o_other, o_fs_other
-    return tan_alpha * depth + tooth_deviation(cs_cos, cs_sin, cos, sin, s, math.cos(o), math.sin(o)), o_fs
+    teeth = tooth_deviation(drive.cs_cos, drive.cs_sin, cos, sin, s, math.cos(o), math.sin(o))
+    return drive.tan_alpha * depth + teeth, o_fs
 
 
 @compiled
-def _at(drive, theta, zones, beside):
+def _at(drive: WalkedDrive, theta: float, zones: Array, beside: Array) -> float:
     """Kinematic error (arcmin) at `theta` (rad), with effects interpolated in `zones` (2, n, mm) and `beside` (n)."""
-    rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, scale, span = drive
+    a_fs, fs_phase, advance, scale, span = drive.a_fs, drive.fs_phase, drive.advance, drive.scale, drive.span
     cos, sin = math.cos(theta), math.sin(theta)
-    one, o_one = _rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, 1.0)
-    two, o_two = _rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, -1.0)
+    one, o_one = _rims(drive, cos, sin, 1.0)
+    two, o_two = _rims(drive, cos, sin, -1.0)
     n = len(beside)
     place = theta / span
     place = (place - math.floor(place)) * n
@@ -62,20 +83,21 @@ def _at(drive, theta, zones, beside):
     phase = advance * theta + fs_phase
     one += a_fs * math.sin(phase + o_one) + zones[0, i] + share * (zones[0, j] - zones[0, i])
     two += -a_fs * math.sin(phase - o_two) + zones[1, i] + share * (zones[1, j] - zones[1, i])
-    return scale * max(one, two) + beside[i] + share * (beside[j] - beside[i])
+    error: float = scale * max(one, two) + beside[i] + share * (beside[j] - beside[i])
+    return error
 
 
 @inlined
-def _rims_apart(drive, theta, s):
+def _rims_apart(drive: WalkedDrive, theta: float, s: float) -> float:
     """How much deeper (mm) rim 1 than rim 2 lies in zone s at `theta`."""
-    e_a, e_l, t_a, t_l = motion_at(drive[1], math.cos(theta), math.sin(theta))
-    depth, _, _ = rim_depth(drive[0], e_a, e_l, t_a, t_l, s, 1.0)
-    other, _, _ = rim_depth(drive[0], e_a, e_l, t_a, t_l, s, -1.0)
+    e_a, e_l, t_a, t_l = motion_at(drive.motion, math.cos(theta), math.sin(theta))
+    depth, _, _ = rim_depth(drive.rim, e_a, e_l, t_a, t_l, s, 1.0)
+    other, _, _ = rim_depth(drive.rim, e_a, e_l, t_a, t_l, s, -1.0)
     return depth - other
 
 
 @compiled
-def _switches(drive, cuts):
+def _switches(drive: WalkedDrive, cuts: Array) -> int:
     """Angles of an input turn (rad) at which the deeper rim of a zone changes, into `cuts`; how many.
 
     There the deepest point jumps along the tooth, and with it what the teeth add: an extreme may stand at either side.
@@ -101,7 +123,7 @@ def _switches(drive, cuts):
 
 
 @compiled
-def _between(cuts, centre, half, ends):
+def _between(cuts: Array, centre: float, half: float, ends: Array) -> int:
     """`centre` - `half`, those of `cuts` (one turn's) that lie within, rising, and `centre` + `half`; how many."""
     ends[0] = centre - half
     found = 1
@@ -120,7 +142,9 @@ def _between(cuts, centre, half, ends):
 
 
 @compiled
-def _lowest_between(drive, low, high, sign, zones, beside, steps):
+def _lowest_between(
+    drive: WalkedDrive, low: float, high: float, sign: float, zones: Array, beside: Array, steps: int
+) -> tuple[float, float]:
     """Least of sign times the kinematic error between `low` and `high`, ends included, and where, by golden section."""
     left, right = sign * _at(drive, low, zones, beside), sign * _at(drive, high, zones, beside)
     least, where = (left, low) if left < right else (right, high)
@@ -140,7 +164,9 @@ def _lowest_between(drive, low, high, sign, zones, beside, steps):
 
 
 @compiled
-def _lowest_near(drive, cuts, centre, half, sign, zones, beside, steps):
+def _lowest_near(
+    drive: WalkedDrive, cuts: Array, centre: float, half: float, sign: float, zones: Array, beside: Array, steps: int
+) -> tuple[float, float]:
     """Least of sign times the kinematic error within `half` of `centre`, and where: between the changes of rim."""
     ends = np.empty(len(cuts) + 2)
     count = _between(cuts, centre, half, ends)
@@ -155,7 +181,17 @@ def _lowest_near(drive, cuts, centre, half, sign, zones, beside, steps):
 
 
 @compiled
-def _follow(drive, cuts, values, sign, zones, beside, best, places, least):
+def _follow(
+    drive: WalkedDrive,
+    cuts: Array,
+    values: Array,
+    sign: float,
+    zones: Array,
+    beside: Array,
+    best: Array,
+    places: Index,
+    least: float,
+) -> float:
     """Least of sign times the kinematic error over the turn, from its `values` on an even grid of the turn; `least` is
     one that is known already.
 
@@ -179,7 +215,7 @@ def _follow(drive, cuts, values, sign, zones, beside, best, places, least):
         kept = min(kept + 1, CANDIDATES)
         if kept == CANDIDATES:
             worst_kept = best[kept - 1]
-    step = drive[9] / n
+    step = drive.span / n
     for k in range(kept):
         if best[k] >= least:
             break
@@ -189,17 +225,19 @@ def _follow(drive, cuts, values, sign, zones, beside, best, places, least):
 
 
 @compiled
-def _extremes_at_switches(drive, cuts, turns, zones, beside):
+def _extremes_at_switches(
+    drive: WalkedDrive, cuts: Array, turns: int, zones: Array, beside: Array
+) -> tuple[float, float]:
     """Least and largest kinematic error (arcmin) at either side of every change of rim, over all turns: these lie at
     the same input angles in every turn, and only the phase of the FS teeth moves on.
     """
-    rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, scale, span = drive
+    a_fs, fs_phase, advance, scale, span = drive.a_fs, drive.fs_phase, drive.advance, drive.scale, drive.span
     n, least, largest = len(beside), math.inf, -math.inf
     for k in range(2 * len(cuts)):
         theta = cuts[k // 2] + (EDGE if k % 2 else -EDGE)
         cos, sin = math.cos(theta), math.sin(theta)
-        one, o_one = _rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, 1.0)
-        two, o_two = _rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, -1.0)
+        one, o_one = _rims(drive, cos, sin, 1.0)
+        two, o_two = _rims(drive, cos, sin, -1.0)
         phase = advance * theta + fs_phase
         one_sin, one_cos = a_fs * math.sin(phase + o_one), a_fs * math.cos(phase + o_one)
         two_sin, two_cos = -a_fs * math.sin(phase - o_two), -a_fs * math.cos(phase - o_two)
@@ -221,18 +259,20 @@ def _extremes_at_switches(drive, cuts, turns, zones, beside):
 
 
 @compiled
-def _walk(drive, per_turn, turns, zones, beside, grid, values):
+def _walk(
+    drive: WalkedDrive, per_turn: int, turns: int, zones: Array, beside: Array, grid: Array, values: Array
+) -> None:
     """Fill `values` (turns * per_turn) with the kinematic error (arcmin) on an even grid of the relative turn.
 
     Without its FS teeth a zone repeats every input turn; their phase moves on by as much from turn to turn. `grid`
     (6, per_turn) holds, for both zones, that part and the FS teeth's sine and cosine part.
     """
-    rim, motion, cs_cos, cs_sin, tan_alpha, a_fs, fs_phase, advance, scale, _ = drive
+    a_fs, fs_phase, advance, scale = drive.a_fs, drive.fs_phase, drive.advance, drive.scale
     for g in range(per_turn):
         theta = 2 * math.pi * g / per_turn
         cos, sin = math.cos(theta), math.sin(theta)
-        one, o_one = _rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, 1.0)
-        two, o_two = _rims(rim, motion, cs_cos, cs_sin, tan_alpha, cos, sin, -1.0)
+        one, o_one = _rims(drive, cos, sin, 1.0)
+        two, o_two = _rims(drive, cos, sin, -1.0)
         phase = advance * theta + fs_phase
         grid[0, g], grid[1, g] = one, two
         grid[2, g], grid[3, g] = a_fs * math.sin(phase + o_one), a_fs * math.cos(phase + o_one)
@@ -249,18 +289,33 @@ def _walk(drive, per_turn, turns, zones, beside, grid, values):
 
 
 @compiled
-def _drive_of(tip, tan_alpha, advance, turns, scale, e):
+def _drive_of(tip: TipGeometry, tan_alpha: float, advance: float, turns: int, scale: float, e: Array) -> WalkedDrive:
     """All that the kinematic error at one angle needs; `e` (12) holds the errors as in ERROR_NAMES."""
     motion, cs_cos, cs_sin = motion_of_row(tip, e)
-    return (rim_constants(tip), motion, cs_cos, cs_sin, tan_alpha, e[10], e[11], advance, scale, 2 * math.pi * turns)
+    span = 2 * math.pi * turns
+    return WalkedDrive(rim_constants(tip), motion, cs_cos, cs_sin, tan_alpha, e[10], e[11], advance, scale, span)
 
 
-@njit(cache=True, nogil=True, **OPTIONS)
-def extended_block(tip, tan_alpha, advance, turns, scale, matrix, zones, beside, coarse_zones, coarse_beside, out):
+@entry
+def extended_block(
+    tip: TipGeometry,
+    tan_alpha: float,
+    advance: float,
+    turns: int,
+    scale: float,
+    matrix: Array,
+    zones: Array,
+    beside: Array,
+    coarse_zones: Array,
+    coarse_beside: Array,
+    out: Array,
+) -> None:
     """Fill `out` (n,) with the peak-to-peak (arcmin) of each row of `matrix` (n, 12), errors as in ERROR_NAMES.
 
-    `zones` (d, 2, m) in mm and `beside` (d, m) in arcmin are the effects on an even grid of the relative turn of
-    `turns` input turns, for each of d directions of motion; `coarse_...` the same on the grid that is walked first.
+    `tip`, `tan_alpha` and `advance` (Z_CS/Z_FS) are the drive's; `scale` is arcmin per mm of arc, times k_e. `zones`
+    (d, 2, m) in mm and `beside` (d, m) in arcmin are the effects on an even grid of the relative turn of `turns` input
+    turns, for each of d directions of motion; `coarse_zones` and `coarse_beside` the same on the grid that is walked
+    first.
     """
     directions, walked = coarse_beside.shape
     per_turn = walked // turns
@@ -278,9 +333,22 @@ def extended_block(tip, tan_alpha, advance, turns, scale, matrix, zones, beside,
         out[row] = highest - lowest
 
 
-@njit(cache=True, nogil=True, **OPTIONS)
-def extended_walk(tip, tan_alpha, advance, turns, scale, row, coarse_zones, coarse_beside):
-    """Kinematic error (arcmin) of one drive on the grid of the first walk, for each direction: shape (d, walked)."""
+@entry
+def extended_walk(
+    tip: TipGeometry,
+    tan_alpha: float,
+    advance: float,
+    turns: int,
+    scale: float,
+    row: Array,
+    coarse_zones: Array,
+    coarse_beside: Array,
+) -> Array:
+    """Kinematic error (arcmin) of one drive on the grid of the first walk, for each direction: shape (d, walked).
+
+    `row` (12,) holds its errors as in ERROR_NAMES; `tip`, `tan_alpha`, `advance`, `turns`, `scale`, `coarse_zones` and
+    `coarse_beside` as in `extended_block`.
+    """
     directions, walked = coarse_beside.shape
     values, grid = np.empty((directions, walked)), np.empty((6, walked // turns))
     drive = _drive_of(tip, tan_alpha, advance, turns, scale, row)
@@ -289,10 +357,28 @@ def extended_walk(tip, tan_alpha, advance, turns, scale, row, coarse_zones, coar
     return values
 
 
-@njit(cache=True, nogil=True, **OPTIONS)
-def extended_near(tip, tan_alpha, advance, turns, scale, row, zones, beside, way, theta, half, sign, steps):
+@entry
+def extended_near(
+    tip: TipGeometry,
+    tan_alpha: float,
+    advance: float,
+    turns: int,
+    scale: float,
+    row: Array,
+    zones: Array,
+    beside: Array,
+    way: Index,
+    theta: Array,
+    half: float,
+    sign: float,
+    steps: int,
+) -> Array:
     """Least of sign times the kinematic error (arcmin) within `half` (rad) of each of `theta` (k) in the direction
-    `way` (k), and where: shape (2, k)."""
+    `way` (k), and where: shape (2, k).
+
+    `row` (12,) holds the drive's errors as in ERROR_NAMES; `tip`, `tan_alpha`, `advance`, `turns`, `scale`, `zones` and
+    `beside` as in `extended_block`. `steps` is the number of golden-section steps.
+    """
     found = np.empty((2, len(theta)))
     drive = _drive_of(tip, tan_alpha, advance, turns, scale, row)
     every_cut = np.empty(MOST_CUTS)

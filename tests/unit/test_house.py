@@ -17,8 +17,6 @@ KERNELS: dict[str, str] = {}
 
 UNDESCRIBED = {
     "bench": 36,
-    "kinematics": 20,
-    "simulation": 3,
     "tolerance": 2,
 }
 """Public functions, by room, whose docstring does not name every argument; these numbers only fall. Commands do not
