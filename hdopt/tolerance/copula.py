@@ -87,7 +87,7 @@ class GaussianCopula:
         u = u.copy()
         for group in self.groups:
             columns = self._columns(group)
-            scores = special.ndtri(u[:, columns]) @ np.linalg.cholesky(group.matrix).T
+            scores = special.ndtri(u[:, columns]) @ np.linalg.cholesky(np.asarray(group.matrix, float)).T
             u[:, columns] = special.ndtr(scores)
         return u
 
@@ -104,6 +104,6 @@ class GaussianCopula:
             mean = scores[:, given] @ gain
             covariance = r[np.ix_(free, free)] - r[np.ix_(free, given)] @ gain
         else:
-            mean, covariance = 0.0, r[np.ix_(free, free)]
+            mean, covariance = np.zeros(len(free)), r[np.ix_(free, free)]
         result[:, free] = mean + noise[:, free] @ np.linalg.cholesky(covariance).T
         return result

@@ -31,6 +31,9 @@ class Distribution(Protocol):
     """What a sampler needs of an input: where it can lie, and its inverse distribution function."""
 
     @property
+    def name(self) -> str: ...
+
+    @property
     def support(self) -> tuple[float, float]:
         """Smallest and largest value, infinite where there is no bound."""
 
@@ -39,6 +42,7 @@ class Distribution(Protocol):
 
 
 def require(condition: bool, message: str) -> None:
+    """Raise `HdoptError` with `message` unless `condition` holds."""
     if not condition:
         raise HdoptError(message)
 
@@ -54,7 +58,6 @@ class Truncated:
     lower: float = -INFINITY
     upper: float = INFINITY
     name = "truncated"
-    natural = (-INFINITY, INFINITY)
 
     def __post_init__(self) -> None:
         self.check()
@@ -73,6 +76,11 @@ class Truncated:
             self._mass > 1e-300,
             f"{where} is inconsistent: no probability is left in [{self.lower:g}, {self.upper:g}]; widen the bounds",
         )
+
+    @property
+    def natural(self) -> tuple[float, float]:
+        """Where the untruncated distribution lies."""
+        return -INFINITY, INFINITY
 
     def check(self) -> None:
         """Raise `HdoptError` for parameters the family does not allow."""
@@ -99,10 +107,10 @@ class Truncated:
         lower, upper = self.support
         return np.clip(self._inverse_tail(tail), lower, upper)
 
-    def _tail(self, x: ArrayLike) -> Array:
+    def _tail(self, x: float) -> float:
         raise NotImplementedError
 
-    def _inverse_tail(self, q: ArrayLike) -> Array:
+    def _inverse_tail(self, q: Array) -> Array:
         raise NotImplementedError
 
 
@@ -157,8 +165,8 @@ class Uniform(Truncated):
     def check(self) -> None:
         _check_finite(self.name, lower=self.lower, upper=self.upper)
 
-    def _tail(self, x: ArrayLike) -> Array:
-        return (self.upper - np.asarray(x)) / (self.upper - self.lower)
+    def _tail(self, x: float) -> float:
+        return (self.upper - x) / (self.upper - self.lower)
 
     def quantile(self, u: ArrayLike) -> Array:
         return self.lower + (self.upper - self.lower) * np.asarray(u, float)
@@ -185,16 +193,14 @@ class Triangular(Truncated):
     def natural(self) -> tuple[float, float]:
         return self.minimum, self.maximum
 
-    def _tail(self, x: ArrayLike) -> Array:
+    def _tail(self, x: float) -> float:
         width = self.maximum - self.minimum
-        x = np.asarray(x, float)
-        rising = 1 - (x - self.minimum) ** 2 / (width * max(self.mode - self.minimum, 1e-300))
-        falling = (self.maximum - x) ** 2 / (width * max(self.maximum - self.mode, 1e-300))
-        return np.where(x < self.mode, rising, falling)
+        if x < self.mode:
+            return 1 - (x - self.minimum) ** 2 / (width * max(self.mode - self.minimum, 1e-300))
+        return (self.maximum - x) ** 2 / (width * max(self.maximum - self.mode, 1e-300))
 
-    def _inverse_tail(self, q: ArrayLike) -> Array:
+    def _inverse_tail(self, q: Array) -> Array:
         width = self.maximum - self.minimum
-        q = np.asarray(q, float)
         rising = self.minimum + np.sqrt(np.maximum(1 - q, 0) * width * (self.mode - self.minimum))
         falling = self.maximum - np.sqrt(q * width * (self.maximum - self.mode))
         return np.where(q > (self.maximum - self.mode) / width, rising, falling)
@@ -211,11 +217,12 @@ class Rayleigh(Truncated):
     def check(self) -> None:
         _check_positive(self.name, scale=self.scale)
 
-    def _tail(self, x: ArrayLike) -> Array:
-        return np.exp(-0.5 * (np.asarray(x) / self.scale) ** 2)
+    def _tail(self, x: float) -> float:
+        return float(np.exp(-0.5 * (x / self.scale) ** 2))
 
-    def _inverse_tail(self, q: ArrayLike) -> Array:
-        return self.scale * np.sqrt(np.maximum(-2 * np.log(q), 0))
+    def _inverse_tail(self, q: Array) -> Array:
+        length: Array = self.scale * np.sqrt(np.maximum(-2 * np.log(q), 0))
+        return length
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -229,11 +236,11 @@ class HalfNormal(Truncated):
     def check(self) -> None:
         _check_positive(self.name, scale=self.scale)
 
-    def _tail(self, x: ArrayLike) -> Array:
-        return 2 * special.ndtr(-np.asarray(x) / self.scale)
+    def _tail(self, x: float) -> float:
+        return float(2 * special.ndtr(-x / self.scale))
 
-    def _inverse_tail(self, q: ArrayLike) -> Array:
-        return -self.scale * special.ndtri(np.asarray(q) / 2)
+    def _inverse_tail(self, q: Array) -> Array:
+        return -self.scale * special.ndtri(q / 2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -248,10 +255,10 @@ class LogNormal(Truncated):
     def check(self) -> None:
         _check_positive(self.name, median=self.median, log_std=self.log_std)
 
-    def _tail(self, x: ArrayLike) -> Array:
-        return special.ndtr(-np.log(np.asarray(x) / self.median) / self.log_std)
+    def _tail(self, x: float) -> float:
+        return float(special.ndtr(-np.log(x / self.median) / self.log_std))
 
-    def _inverse_tail(self, q: ArrayLike) -> Array:
+    def _inverse_tail(self, q: Array) -> Array:
         return self.median * np.exp(-self.log_std * special.ndtri(q))
 
 
@@ -278,11 +285,12 @@ class Beta(Truncated):
     def natural(self) -> tuple[float, float]:
         return self.minimum, self.maximum
 
-    def _tail(self, x: ArrayLike) -> Array:
-        return special.betaincc(self.a, self.b, (np.asarray(x) - self.minimum) / (self.maximum - self.minimum))
+    def _tail(self, x: float) -> float:
+        return float(special.betaincc(self.a, self.b, (x - self.minimum) / (self.maximum - self.minimum)))
 
-    def _inverse_tail(self, q: ArrayLike) -> Array:
-        return self.minimum + (self.maximum - self.minimum) * special.betainccinv(self.a, self.b, q)
+    def _inverse_tail(self, q: Array) -> Array:
+        share = np.asarray(special.betainccinv(self.a, self.b, q), float)
+        return self.minimum + (self.maximum - self.minimum) * share
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -332,16 +340,22 @@ class MeasuredSample(Truncated):
                 )
         return cls(values=values, source=str(path), lower=lower, upper=upper)
 
+    @cached_property
+    def _kept(self) -> Array:
+        """The values within the bounds, sorted, which `check` puts in place of those given."""
+        return np.asarray(self.values, float)
+
     @property
     def natural(self) -> tuple[float, float]:
-        return float(self.values[0]), float(self.values[-1])
+        return float(self._kept[0]), float(self._kept[-1])
 
     @cached_property
     def _mass(self) -> float:
         return 1.0
 
     def quantile(self, u: ArrayLike) -> Array:
-        return np.interp(np.asarray(u, float) * (len(self.values) - 1), np.arange(len(self.values)), self.values)
+        place = np.asarray(u, float) * (len(self._kept) - 1)
+        return np.asarray(np.interp(place, np.arange(len(self._kept)), self._kept))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -394,7 +408,8 @@ FAMILIES: dict[str, type] = {
 
 
 def moments_of(distribution: Distribution, absolute: bool = False, points: int = 4096) -> tuple[float, float]:
-    """Mean and standard deviation of the distribution, or of its absolute value, by the midpoint rule in probability.
+    """Mean and standard deviation of the `distribution`, or of its `absolute` value, by the midpoint rule in
+    probability with so many `points`.
 
     The rule's own error is about 1e-4 of the standard deviation for unbounded tails, less for bounded ones.
     """

@@ -17,7 +17,6 @@ KERNELS: dict[str, str] = {}
 
 UNDESCRIBED = {
     "bench": 36,
-    "tolerance": 2,
 }
 """Public functions, by room, whose docstring does not name every argument; these numbers only fall. Commands do not
 count: their arguments are described by their options."""
