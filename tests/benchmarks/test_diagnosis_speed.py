@@ -17,7 +17,10 @@ import pytest
 from hdopt.kinematics.waveform import kinematic_error_arcmin
 from hdopt.study import load_study
 
-pytestmark = pytest.mark.benchmark(group="diagnosis of 200 input turns x 400 samples, whole process")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.benchmark(group="diagnosis of 200 input turns x 400 samples, whole process"),
+]
 
 TURN = 2 * np.pi
 LIMIT_KIB = 1024**2

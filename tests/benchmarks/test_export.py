@@ -8,6 +8,8 @@ import sys
 import cases
 import pytest
 
+pytestmark = pytest.mark.slow
+
 LIMIT = 1.0
 """The promise: a first export in a fresh process, with everything it imports besides CadQuery, over the processor time
 that importing CadQuery takes in the same process. It took 0.71 to 0.85 of it where this was set.

@@ -14,7 +14,10 @@ from hdopt.kinematics.closed_form import deepest_points
 from hdopt.kinematics.extremes import extremes_arcmin, walked_peak_to_peak_arcmin
 from hdopt.parallel.engine import engine_in_force
 
-pytestmark = pytest.mark.benchmark(group="converged peak-to-peak, time for one drive = mean / drives")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.benchmark(group="converged peak-to-peak, time for one drive = mean / drives"),
+]
 
 DRIVES = 1_000_000
 

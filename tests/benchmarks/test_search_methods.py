@@ -17,6 +17,8 @@ from hdopt.optimize.nlopt_adapter import Effort
 from hdopt.study import load_study
 from hdopt.workflow.search_setup import setup_of
 
+pytestmark = pytest.mark.slow
+
 PROFILES = ("ellipse", "resal", "two_disk")
 LOCALS = ("LD_SLSQP", "LD_MMA", "LD_CCSAQ", "LN_COBYLA")
 GLOBALS = ("GN_DIRECT_L", "GN_CRS2_LM", "GN_ISRES", "GN_ESCH")
@@ -31,7 +33,6 @@ def problem(profile: str):
     return setup.problem(Combination(profile, Structure.AUTOMATIC), "peak_to_peak_arcmin")
 
 
-@pytest.mark.slow
 def test_the_local_method_misses_nothing_and_needs_the_fewest_evaluations():
     table = {}
     for algorithm in LOCALS:
@@ -51,7 +52,6 @@ def test_the_local_method_misses_nothing_and_needs_the_fewest_evaluations():
     assert table[LOCAL][0] == min(median for median, _ in table.values())
 
 
-@pytest.mark.slow
 def test_the_global_method_gives_starts_that_are_no_worse_than_the_others_median():
     print()
     for profile in PROFILES:

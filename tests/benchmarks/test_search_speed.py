@@ -17,6 +17,8 @@ from hdopt.optimize.objectives import Point
 from hdopt.study import load_study
 from hdopt.workflow.search_setup import setup_of
 
+pytestmark = pytest.mark.slow
+
 TWO_DISK = Combination("two_disk", Structure.AUTOMATIC)
 
 
@@ -44,7 +46,6 @@ def test_envelope(benchmark):
     assert found.finite
 
 
-@pytest.mark.slow
 @pytest.mark.benchmark(group="one design with slopes")
 def test_exact_geometry(benchmark):
     at = problem("peak_to_peak_arcmin")

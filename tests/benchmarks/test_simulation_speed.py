@@ -7,7 +7,7 @@ from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin as base_pea
 from hdopt.simulation import EffectValues, Operation
 from hdopt.simulation.batch import matrix_peak_to_peak_arcmin, tabulate
 
-pytestmark = pytest.mark.benchmark(group="peak-to-peak of 1000 drives with effects, one thread")
+pytestmark = [pytest.mark.slow, pytest.mark.benchmark(group="peak-to-peak of 1000 drives with effects, one thread")]
 
 EFFECTS = {
     "lobing": EffectValues("circular_spline_lobing", {"lobes": 6}, (0.001, 0.0005)),

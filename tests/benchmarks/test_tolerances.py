@@ -14,6 +14,8 @@ from hdopt.tolerance.sensitivity import run_sobol
 from hdopt.tolerance.space import InputSpace, Tolerance
 from hdopt.workflow.stack import study_problem
 
+pytestmark = pytest.mark.slow
+
 STACK = "from hdopt.cli import main; main(['stack', 'csf-25-80', '-n', '1000000'])"
 YARDSTICK = "import numpy, scipy.stats, numba"
 
@@ -24,7 +26,6 @@ def seconds(code: str) -> float:
     return time.perf_counter() - start
 
 
-@pytest.mark.slow
 def test_stack_of_a_million_drives_as_a_process():
     """Within 4 times the import of numpy, scipy.stats and numba. Best of three each: other load only ever adds time."""
     seconds(STACK)  # compile once, as an installation does
@@ -32,7 +33,6 @@ def test_stack_of_a_million_drives_as_a_process():
     assert stack < 4 * yardstick, f"{stack:.2f} s against {yardstick:.2f} s"
 
 
-@pytest.mark.slow
 def test_sobol_against_salib_with_its_bootstrap():
     """Indices and intervals of 12 inputs at 2^14 base points with second order: 20 times faster than SALib's `analyze`
     with 100 resamples on the same number of responses, and with the responses of the drive computed still faster."""

@@ -15,6 +15,8 @@ from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.export import export_drive
 from hdopt.geometry.options import ExportOptions
 
+pytestmark = pytest.mark.slow
+
 
 def coarse_splines(monkeypatch):
     """Splines of 8 spans: a fine-looking cam, a micrometre off."""

@@ -8,6 +8,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 HDOPT = (sys.executable, "-c", "from hdopt.cli import main; main()")
 
 

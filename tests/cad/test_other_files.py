@@ -21,6 +21,8 @@ from hdopt.geometry.export import export_drive
 from hdopt.geometry.features import DBore, KeywayBore, Slot
 from hdopt.geometry.options import ExportOptions
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("profile", ["ellipse", "resal", "two_disk", "measured"])
 def test_dxf_has_closed_outlines_on_layers_in_mm(profile, tmp_path):

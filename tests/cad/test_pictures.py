@@ -17,6 +17,8 @@ from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.views import section_at_minor_axis_zero, seen_from
 from hdopt.report.sections.geometry import geometry_section
 
+pytestmark = pytest.mark.slow
+
 BOUNDS = {"wg_eccentricity_mm": 0.0075, "wg_tilt_major_deg": 0.1, "wg_tilt_minor_deg": 0.1}
 
 
@@ -84,7 +86,6 @@ def render(tmp_path, **options):
         pytest.skip(str(reason))
 
 
-@pytest.mark.slow
 def test_picture_shows_the_cam_in_its_colour_and_a_blank_one_fails(tmp_path, monkeypatch):
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOImage import vtkPNGReader
@@ -135,7 +136,6 @@ def test_report_section_shows_drawing_parts_and_tolerances(tmp_path):
     assert "axis within diameter 0.015" in set(tables["geometry-dimensions"]["tolerance"])
 
 
-@pytest.mark.slow
 def test_step_of_a_run_writes_files_and_a_section(tmp_path):
     from hdopt.study import load_study
     from hdopt.workflow.steps import Context, find_step

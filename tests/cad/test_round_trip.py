@@ -14,14 +14,13 @@ from hdopt.geometry.measure import measured_profile
 from hdopt.geometry.step import read_step
 from hdopt.kinematics.extremes import peak_to_peak_by_search_arcmin
 
+pytestmark = pytest.mark.slow
+
 SAME = 1e-4
 """What the round trip may change in the peak-to-peak, arcmin; both sides take the exact geometry."""
 
 
-SLOW = [pytest.param(profile, marks=pytest.mark.slow) for profile in ("resal", "measured")]
-
-
-@pytest.mark.parametrize("profile", ["ellipse", "two_disk", *SLOW])
+@pytest.mark.parametrize("profile", ["ellipse", "two_disk", "resal", "measured"])
 def test_file_gives_the_same_kinematic_error(exported, profile):
     original = drive(profile)
     generator = original.wave_generator

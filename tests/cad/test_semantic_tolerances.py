@@ -14,6 +14,8 @@ from hdopt.geometry.export import export_drive
 from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.part21 import Part21, StatedSize, StatedTolerance
 
+pytestmark = pytest.mark.slow
+
 BOUNDS = {"wg_eccentricity_mm": 0.0075, "wg_tilt_major_deg": 0.1, "wg_tilt_minor_deg": 0.1}
 
 
@@ -44,7 +46,6 @@ def test_zones_sizes_datums_and_products_stand_in_the_text(tmp_path):
     assert "density measure" in text and result.checks["step"]["tolerances"] == 6
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("profile", "structure"), [("two_disk", Structure.INTEGRAL), ("ellipse", Structure.AUTOMATIC)])
 def test_every_structure_carries_its_tolerances(profile, structure, tmp_path):
     target = tmp_path / "wave.step"

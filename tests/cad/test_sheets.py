@@ -16,15 +16,17 @@ from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.part_sheets import HEIGHT, WIDTH, sheets
 from hdopt.geometry.sheet import label_box, text_width
 
+pytestmark = pytest.mark.slow
+
 BOUNDS = {"wg_eccentricity_mm": 0.0075, "wg_tilt_major_deg": 0.1, "wg_tilt_minor_deg": 0.1}
 
 CASES = [
     ("ellipse", Structure.INTEGRAL, 1.0),
     ("two_disk", Structure.AUTOMATIC, 0.4),
-    pytest.param("two_disk", Structure.INTEGRAL, 4.0, marks=pytest.mark.slow),
-    pytest.param("ellipse", Structure.ONE_WAY_MAJOR, 4.0, marks=pytest.mark.slow),
-    pytest.param("ellipse", Structure.INTEGRAL, 0.4, marks=pytest.mark.slow),
-    pytest.param("resal", Structure.ONE_WAY_MINOR, 1.0, marks=pytest.mark.slow),
+    ("two_disk", Structure.INTEGRAL, 4.0),
+    ("ellipse", Structure.ONE_WAY_MAJOR, 4.0),
+    ("ellipse", Structure.INTEGRAL, 0.4),
+    ("resal", Structure.ONE_WAY_MINOR, 1.0),
 ]
 
 
