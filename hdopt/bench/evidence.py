@@ -206,6 +206,7 @@ def orthonormal(columns):
 
 
 def waves(angle, orders):
+    """Cosine and sine of each of `orders` (k) times `angle` (n,), rad: shape (n, 2 k), each cosine before its sine."""
     return np.column_stack([f(k * angle) for k in orders for f in (np.cos, np.sin)])
 
 
@@ -217,7 +218,8 @@ class OneOf:
 
 
 def pulses(angle, teeth):
-    """A pulse at each tooth, two pitches to either side."""
+    """A pulse at each of so many `teeth`, falling to 0 within two pitches to either side, met at `angle` (n,), rad on
+    the spline; one column a tooth."""
     place = (angle * teeth / TURN)[:, None] - np.arange(teeth)
     distance = np.abs((place + teeth / 2) % teeth - teeth / 2)
     return OneOf(np.clip(1 - distance / 2, 0, None))

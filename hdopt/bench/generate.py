@@ -72,6 +72,7 @@ def write(out, seed, families=(), workers=1, progress=lambda done, total: None, 
 
 
 def main(arguments=None):
+    """Write the cases that the command line's `arguments` ask for (those of this process if None)."""
     parser = argparse.ArgumentParser(prog="python -m hdopt.bench.generate", description=__doc__)
     parser.add_argument("--out", required=True, type=Path)
     parser.add_argument("--seed", required=True, type=int)

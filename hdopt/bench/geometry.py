@@ -66,7 +66,11 @@ def _below(draw, upper):
 
 
 def draw_errors(rng):
-    """Errors of one drive from the tolerances that ship with csf-25-80."""
+    """Errors of one drive, drawn by `rng` from the tolerances that ship with csf-25-80.
+
+    Eccentricities are Rayleigh and tilts normal, both cut at their bound (`ERROR_BOUNDS`); amplitudes of the teeth are
+    uniform from 1 to 3 um, directions and phases over the turn.
+    """
     turn = 2 * np.pi
     tilt = np.deg2rad([0.2, 0.1])
     return BaseErrors.from_polar(
@@ -100,7 +104,8 @@ class Zones:
 
 
 def find_zones(errors, theta, gear=CSF):
-    """Deepest point of each zone, over both rims, at wave-generator angles `theta` (rad, unwrapped) of `gear`."""
+    """Deepest point of each zone, over both rims, at wave-generator angles `theta` (n,) (rad, unwrapped) of `gear` with
+    `errors` (Jia 2021, Eqs. (16)-(23), exactly)."""
     theta = np.asarray(theta, dtype=float)
     sin, cos = np.sin(theta), np.cos(theta)
     axis_frame = _tilt_frame(errors.axis_tilt_y, errors.axis_tilt_x)
@@ -157,7 +162,10 @@ def base_teeth(errors, gear=CSF):
 
 
 def at_angle(teeth_mm, angle):
-    """Deviation at `angle` (rad), interpolated between the teeth around it."""
+    """Deviation of a spline at `angle` (rad), interpolated between the teeth around it; the shape of `angle`.
+
+    `teeth_mm` (z,) holds the deviation of each tooth, the first at 0 rad.
+    """
     place = np.asarray(angle) * (teeth_mm.size / (2 * np.pi))
     below = np.floor(place)
     part = place - below
@@ -167,7 +175,11 @@ def at_angle(teeth_mm, angle):
 
 
 def zone_deviation_mm(zones, cs_teeth_mm, fs_teeth_mm, extra_depth_mm=0.0):
-    """Tangential deviation tau (mm) of both zones."""
+    """Tangential deviation tau (mm) of both `zones`, shape (2, n): depth times tan(alpha), and the teeth.
+
+    `cs_teeth_mm` and `fs_teeth_mm` are per-tooth deviations of both splines; `extra_depth_mm` is added to the meshing
+    depth, one number or (2, n).
+    """
     depth = (zones.depth_mm + extra_depth_mm) * np.tan(PRESSURE_ANGLE)
     return depth + at_angle(cs_teeth_mm, zones.cs_angle) + at_angle(fs_teeth_mm, zones.fs_angle)
 

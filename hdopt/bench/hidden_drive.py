@@ -11,7 +11,12 @@ from hdopt.bench.signal_chain import Hidden, Parameter
 
 
 def long_wave_array(rng, teeth, kind):
-    """Per-tooth deviation of unit rms without the two lowest orders, which belong to the base, and what it is."""
+    """Per-tooth deviation of unit rms for so many `teeth`, drawn by `rng`, without the two lowest orders, which belong
+    to the base.
+
+    `kind` is one of `LONG_WAVE`: one to three harmonics of orders 2 to 8; a random wave correlated over 3 to 8 % of the
+    circumference to either side; or segments cut in three to six settings, with a run-out ramp in each.
+    """
     place = np.arange(teeth)
     angle = TURN * place / teeth
     if kind == "harmonics":

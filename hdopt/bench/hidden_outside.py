@@ -51,19 +51,30 @@ def _samples_per_turn(run):
 
 
 def belt_order(run, turn_hz, machine, chance):
-    """A belt stage ahead of the input: its tooth-count ratio gives an order locked to nothing in the drive."""
+    """A belt stage ahead of the input: its tooth-count ratio gives an order locked to nothing in the drive.
+
+    It turns with the input of `run`; `machine` draws order, one to three harmonics and their phases. The speed
+    `turn_hz` and `chance` have no part in it.
+    """
     order, harmonics = foreign_order(machine, run.ratio), machine.integers(1, 4)
     return sum(np.cos(k * order * run.theta + machine.uniform(0, TURN)) / k**1.5 for k in range(1, harmonics + 1))
 
 
 def auxiliary_gear(run, turn_hz, machine, chance):
-    """A gear pair between output and its encoder: run-out of the second gear, and its pitch cut in two settings."""
+    """A gear pair between output and its encoder: run-out of the second gear, and its pitch cut in two settings.
+
+    It turns with the input of `run`; `machine` draws its order and two phases. `turn_hz` and `chance` have no part.
+    """
     shaft = foreign_order(machine, run.ratio) * run.theta
     return np.cos(shaft + machine.uniform(0, TURN)) + np.abs(np.sin(shaft / 2 + machine.uniform(0, TURN)))
 
 
 def hub_slip(run, turn_hz, machine, chance):
-    """A coupling hub that slips: jumps at random instants, to either side, each taking a few samples."""
+    """A coupling hub that slips: jumps at random instants, to either side, each taking a few samples.
+
+    `chance` draws 6 to 14 jumps over the time of `run`, each a thousandth of it wide, and their sizes; `machine` and
+    `turn_hz` have no part.
+    """
     jumps = chance.integers(6, 15)
     at = chance.uniform(0, run.time[-1], jumps)
     width = run.time[-1] * 1e-3
@@ -74,14 +85,21 @@ def hub_slip(run, turn_hz, machine, chance):
 
 
 def one_off_bump(run, turn_hz, machine, chance):
-    """A chip drawn through once: one bump, gone after a turn or two."""
+    """A chip drawn through once: one bump, gone after a turn or two.
+
+    `chance` draws its place within the middle of `run` and its width; `machine` and `turn_hz` have no part.
+    """
     at = chance.uniform(0.2, 0.8) * run.time.size
     place = (np.arange(run.time.size) - at) / (chance.uniform(0.5, 1.5) * _samples_per_turn(run))
     return np.exp(-0.5 * place**2) * np.cos(2.5 * place)
 
 
 def modulated_order(run, turn_hz, machine, chance):
-    """A motor's cogging behind a slipping clutch: an order whose amplitude and phase wander."""
+    """A motor's cogging behind a slipping clutch: an order whose amplitude and phase wander.
+
+    `machine` draws the order, over the input of `run`, and `chance` how it wanders, slowly over three turns; `turn_hz`
+    has no part.
+    """
     order = foreign_order(machine, run.ratio) * run.theta
     wander = gaussian_filter1d(chance.standard_normal((2, run.time.size)), 3 * _samples_per_turn(run), axis=1)
     wander /= wander.std(axis=1, keepdims=True)
@@ -89,7 +107,11 @@ def modulated_order(run, turn_hz, machine, chance):
 
 
 def mains(run, turn_hz, machine, chance):
-    """Mains pick-up: 50 Hz and its third harmonic in time, folded where the sampling is slower."""
+    """Mains pick-up: 50 Hz and its third harmonic in time, folded where the sampling is slower.
+
+    `machine` draws the exact frequency and the harmonic's share, `chance` the phases in this `run`; `turn_hz` has no
+    part.
+    """
     frequency = 50 * (1 + 1e-4 * machine.standard_normal())
     third = machine.uniform(0, 0.6)
     phase = chance.uniform(0, TURN, 2)
@@ -97,7 +119,11 @@ def mains(run, turn_hz, machine, chance):
 
 
 def floor_vibration(run, turn_hz, machine, chance):
-    """A narrow band of the building's vibration, fixed in Hz, random in amplitude."""
+    """A narrow band of the building's vibration, fixed in Hz, random in amplitude.
+
+    `machine` draws its centre between the harmonics of `turn_hz`, the highest input speed of the case in turns a
+    second; `chance` draws the noise in this `run` that the band is cut from, 6 % of the centre wide.
+    """
     # Away from the harmonics of the highest input speed, where the drive has its own orders.
     centre = (machine.integers(1, 6) + machine.uniform(0.35, 0.65)) * turn_hz
     hz = np.fft.rfftfreq(run.time.size, run.step)
@@ -107,14 +133,20 @@ def floor_vibration(run, turn_hz, machine, chance):
 
 
 def slow_wave(run, turn_hz, machine, chance):
-    """The room's air conditioning on the bench: slow cycles in time with nothing logged that would show them."""
+    """The room's air conditioning on the bench: slow cycles in time with nothing logged that would show them.
+
+    `chance` draws 1.6 to 4.5 cycles over `run`, how they quicken, and the phase; `machine` and `turn_hz` have no part.
+    """
     part = run.time / run.time[-1]
     cycles = chance.uniform(1.6, 4.5)
     return np.sin(TURN * (cycles * part + chance.uniform(-0.3, 0.3) * part**2) + chance.uniform(0, TURN))
 
 
 def stick_slip(run, turn_hz, machine, chance):
-    """Relaxation oscillation of a dry seal: saw teeth of irregular length along the path of the input."""
+    """Relaxation oscillation of a dry seal: saw teeth of irregular length along the path of the input of `run`.
+
+    `chance` draws each tooth's length, 0.15 to 1.6 turns, and its height; `machine` and `turn_hz` have no part.
+    """
     path = np.concatenate([[0], np.cumsum(np.abs(np.diff(run.theta)))]) / TURN
     edges = np.concatenate([[0], np.cumsum(chance.uniform(0.15, 1.6, int(path[-1] * 4) + 20))])
     rank = np.searchsorted(edges, path, side="right") - 1

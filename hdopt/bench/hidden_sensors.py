@@ -19,8 +19,9 @@ def _near(turned, angle):
 def off_centre_reading(angle, eccentricity, direction, stretch=0.0, stretch_direction=0.0):
     """Angle read by one head off a code disc whose pattern is off-centre (share of its radius) and oval.
 
-    In the disc's frame the head stands at -`angle`; the pattern counts its angle about its own centre, in coordinates
-    that the stretch along `stretch_direction` has undone.
+    `eccentricity` is a share of the disc's radius, `direction` (rad) where the pattern's centre lies; `stretch` is by
+    how much the pattern is too long. In the disc's frame the head stands at -`angle` (rad); the pattern counts its
+    angle about its own centre, in coordinates that the stretch along `stretch_direction` has undone.
     """
     x = np.cos(-angle) - eccentricity * np.cos(direction)
     y = np.sin(-angle) - eccentricity * np.sin(direction)

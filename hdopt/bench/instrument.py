@@ -38,7 +38,11 @@ class Instrument:
 
 
 def draw_instrument(rng, recordings, trouble=frozenset()):
-    """A measuring chain; `trouble` may hold "coloured", "gaps", "coarse", "clock"."""
+    """A measuring chain for so many `recordings`, drawn by `rng`.
+
+    `trouble` may hold "coloured" (more noise, correlated over 20 to 150 samples), "gaps" (rows and values missing),
+    "coarse" (an output encoder of 18 bits) and "clock" (a jitter of 5 to 30 % of a sampling step).
+    """
     zero = rng.uniform(-20, 20)
     zeros = [zero] * recordings if rng.random() < 0.7 else list(rng.uniform(-20, 20, recordings))
     coloured = "coloured" in trouble
@@ -66,7 +70,11 @@ def record(
     torque: np.ndarray,
     rng: np.random.Generator,
 ) -> tuple[pd.DataFrame, np.ndarray]:
-    """Recording `rank` as a table, and its noise (rad of kinematic error, mean removed)."""
+    """Recording `rank` as a table, and its noise (rad of kinematic error, mean removed).
+
+    `instrument` writes what `plan` and `run` are and the ideal readings `angles` (input and output, (n,) rad each); a
+    loaded plan has a column of `torque` (n,), Nm. Noise, skew and gaps come from `rng`.
+    """
     input_angle, output_angle = angles
     n = run.time.size
     noise = instrument.noise_arcmin * ARCMIN * loops.first_order_noise(rng.standard_normal(n), instrument.noise_keep)

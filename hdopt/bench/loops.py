@@ -6,7 +6,8 @@ import numpy as np
 
 @numba.njit(cache=True)
 def play(position, gap):
-    """Follower of a play (backlash) operator whose full width `gap` may change from sample to sample."""
+    """Follower (n,) of a play (backlash) operator on a path `position` (n,), whose full width `gap` (n,), in the unit
+    of the path, may change from sample to sample. It starts at the side that the first twenty samples press against."""
     follower = np.empty_like(position)
     y = position[0] - 0.5 * gap[0] * np.sign(position[min(20, position.size - 1)] - position[0])
     for i in range(position.size):
@@ -17,7 +18,8 @@ def play(position, gap):
 
 @numba.njit(cache=True)
 def maxwell_slip(position, slip, weight):
-    """Force of Jenkins elements in parallel: element k slips at a deflection of slip[k] with force weight[k]."""
+    """Force (n,) of Jenkins elements in parallel along a path `position` (n,): element k slips at a deflection of
+    `slip`[k], in the unit of the path, with a force `weight`[k]. All start without deflection."""
     force = np.empty_like(position)
     deflection = np.zeros(slip.size)
     last = position[0]
@@ -34,7 +36,11 @@ def maxwell_slip(position, slip, weight):
 
 @numba.njit(cache=True)
 def bouc_wen(position, length, exponent, beta):
-    """Bouc-Wen force, +-1 when it slips; each sample's move in short steps, so that it depends on the path alone."""
+    """Bouc-Wen force z (n,) along a path `position` x (n,), +-1 when it slips.
+
+    dz/dx = (1 - |z|^n (1 - beta + beta sign(z dx)))/`length`, n the `exponent`, `beta` how much unloading differs.
+    Each sample's move is made in short steps, so that the force depends on the path alone.
+    """
     force = np.empty_like(position)
     z = 0.0
     last = position[0]
@@ -55,7 +61,8 @@ def bouc_wen(position, length, exponent, beta):
 
 @numba.njit(cache=True)
 def first_order_noise(white, keep):
-    """AR(1) noise of unit variance from white noise of unit variance."""
+    """AR(1) noise of unit variance from `white` noise (n,) of unit variance; `keep` (0 to 1) is what a sample keeps of
+    the one before."""
     coloured = np.empty_like(white)
     x = white[0]
     drive = np.sqrt(1 - keep * keep)

@@ -151,7 +151,11 @@ def improvement(answer: dict[str, Any], key: dict[str, Any]) -> tuple[float, boo
 
 
 def covered(parameter, name, truth):
-    """Whether a stated interval holds the true value."""
+    """Whether the interval of a stated `parameter` (its low and high) holds the value of the key's `truth`.
+
+    By its `name` an angle counts modulo 360 deg, and of a delay only the size counts. An interval without ends does not
+    hold it.
+    """
     low, high, value = parameter["low"], parameter["high"], truth["value"]
     if low is None or high is None:
         return False

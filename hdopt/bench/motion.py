@@ -211,6 +211,8 @@ def _draw_legs(rng, turns, rpm, reversal):
 
 
 def draw_ripple(rng, size):
+    """Ripple of the motor's speed, drawn by `rng`: (order, relative amplitude, phase) of the orders 1, 2 and 6, the
+    amplitudes up to `size` and falling with the root of the order."""
     return tuple((k, size * rng.uniform(0.2, 1) / np.sqrt(k), rng.uniform(0, TURN)) for k in (1, 2, 6))
 
 

@@ -37,19 +37,19 @@ class RealResidual:
 
 
 def friction(real, rng):
-    """Maxwell slip of unit half loop over a fifth to half a degree of output."""
+    """Maxwell slip of unit half loop on the motion of `real`, over a fifth to half a degree of output by `rng`."""
     slip = np.deg2rad(0.5 * rng.uniform(0.2, 0.5)) * np.geomspace(0.3, 2, 8)
     return -loops.maxwell_slip(real.input_angle / real.ratio, slip, np.full(8, 1 / 8))
 
 
 def play(real, rng):
-    """A follower in a play of one arcmin."""
+    """A follower in a play of one arcmin on the motion of `real`; nothing in it is left to `rng`."""
     position = real.input_angle / real.ratio
     return (loops.play(position, np.full(position.size, ARCMIN)) - position) / ARCMIN
 
 
 def delay(real, rng):
-    """The output read a millisecond before the input, by interpolation in the recording."""
+    """The output read a millisecond before the input, by interpolation in the recording `real`; `rng` has no part."""
     output = real.input_angle / real.ratio
     return (output - np.interp(real.time + 1e-3, real.time, output)) / ARCMIN
 
@@ -58,9 +58,10 @@ ON_REAL_MOTION = {"hysteresis": friction, "lost_motion": play, "channel_delay": 
 
 
 def on_real_motion(real: RealResidual, effect: str, severity: float, rng: np.random.Generator) -> pd.DataFrame:
-    """Table of the real motion with its own residual and `effect` ("" for none) at `severity` x the residual's rms.
+    """Table of the motion of `real` with its own residual and `effect` ("" for none) at `severity` x the residual's
+    rms.
 
-    The residual is that of the recording as it is, or with its sign turned.
+    The residual is that of the recording as it is, or with its sign turned, by `rng`; so is the effect.
     """
     error = rng.choice([-1.0, 1.0]) * real.residual
     if effect:
@@ -77,7 +78,7 @@ def on_real_motion(real: RealResidual, effect: str, severity: float, rng: np.ran
 
 
 def prolonged(residual, samples, rng):
-    """`samples` values made of random blocks of a real residual, a hundred samples long on average; unit rms.
+    """`samples` values made of blocks of a real `residual` (m,), drawn by `rng`, a hundred long on average; unit rms.
 
     The stationary bootstrap (Politis, Romano, J. Am. Stat. Assoc. 89, 1994): colour and steps stay, and no line comes
     in that a repeated record would have.
@@ -94,7 +95,11 @@ def on_simulated_drive(
     residual: np.ndarray, effect: str, severity: float, noise_share: float, rng: np.random.Generator
 ) -> tuple[pd.DataFrame, ...]:
     """Tables of a bench run whose noise is `residual`, `noise_share` x the base's rms, with `effect` ("" for none) at
-    `severity` x the base's rms in it."""
+    `severity` x the base's rms in it.
+
+    Drive, plan and the blocks of the residual are drawn by `rng`. Raises `RuntimeError` where no draw of 14 allows an
+    effect so large.
+    """
     for _ in range(ATTEMPTS):
         errors = draw_errors(rng)
         hidden = [CATALOGUE[effect](rng)] if effect else []

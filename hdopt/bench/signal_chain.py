@@ -81,7 +81,8 @@ def set_up(errors, run, gear=CSF):
 
 
 def read_angles(setup: Setup, hidden: Sequence[Any] = ()) -> tuple[np.ndarray, np.ndarray]:
-    """Input and output angles (rad) as ideal electronics would read them, with the `hidden` physics in place."""
+    """Input and output angles (n,) (rad) of the recording `setup` as ideal electronics would read them, with the
+    `hidden` physics in place, in the order of the chain: load, teeth, depth, lag, encoders, clock."""
     run = setup.run
     gain = np.prod([physics.torque_gain for physics in hidden])
     run = replace(run, torque=run.torque * gain)
@@ -102,18 +103,18 @@ def read_angles(setup: Setup, hidden: Sequence[Any] = ()) -> tuple[np.ndarray, n
 
 
 def read_error(setup: Setup, hidden: Sequence[Any] = ()) -> np.ndarray:
-    """Kinematic error (rad) of the ideal readings: input/N - output."""
+    """Kinematic error (n,) (rad) of the ideal readings of `setup` with the `hidden` physics: input/N - output."""
     input_angle, output_angle = read_angles(setup, hidden)
     return input_angle / setup.run.ratio - output_angle
 
 
 def hidden_wave(setup, hidden):
-    """What the hidden physics adds to the recorded kinematic error (rad), mean removed."""
+    """What the `hidden` physics adds to the recorded kinematic error of `setup`, (n,) rad, mean removed."""
     wave = read_error(setup, hidden) - read_error(setup)
     return wave - wave.mean()
 
 
 def joint_rms(waves):
-    """Rms over all recordings of a case, each with its mean removed."""
+    """Rms over all recordings of a case, whose `waves` are one array each, with each one's mean removed."""
     centred = np.concatenate([wave - wave.mean() for wave in waves])
     return float(np.sqrt(np.mean(centred**2)))

@@ -16,7 +16,6 @@ KERNELS: dict[str, str] = {}
 """Compiled functions that may be longer, with the reason."""
 
 UNDESCRIBED = {
-    "bench": 36,
 }
 """Public functions, by room, whose docstring does not name every argument; these numbers only fall. Commands do not
 count: their arguments are described by their options."""
