@@ -35,6 +35,15 @@ class FitSettings:
     damping_least: float = threshold(1e-9, "1", "choice: smallest damping")
     shape_share: float = threshold(0.3, "1", "choice: largest step of a shape parameter over its value")
     shape_steps: float = threshold(20.0, "1", "choice: largest step of a shape parameter over its derivative's step")
+    shape_rounds: int = threshold(4, "1", "choice: effort; shapes moved one by one, then together")
+    shape_strides: tuple[float, ...] = threshold(
+        (0.1, 0.3, 1.0, 3.0, 6.0), "steps", "choice: moves of one shape alone, from a jag to a node of the grid"
+    )
+    profile_reach: tuple[float, ...] = threshold(
+        (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 14.0),
+        "steps",
+        "choice: places where a profile is looked at",
+    )
     scale_floor: float = threshold(1e-12, "arcmin^2", "choice: power below which a column has no scale of its own")
     variance_floor: float = threshold(1e-18, "arcmin^2", "choice: smallest residual variance in the covariance")
     lags_turns: int = threshold(10, "input turns", "paper: Newey, West 1987; wander of the bench outlasts a few turns")

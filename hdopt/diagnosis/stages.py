@@ -15,6 +15,7 @@ from hdopt.diagnosis.inference.generic_basis import generic_columns
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.nuisance import nuisances_for, with_time_warp
 from hdopt.diagnosis.inference.residual_noise import measure_noise
+from hdopt.diagnosis.inference.settled_shapes import settled
 from hdopt.diagnosis.orientation import Orientation, is_decisive, preference, turn_round
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.high_order import find_ripple, strong_ripple, subtract, subtracted_terms
@@ -273,6 +274,17 @@ def search_without_ripple(state: State) -> State:
     return state
 
 
+def settle_shapes(state: State) -> State:
+    """Of a locked input: what is said must not stand on a node of the search's grid. `state` is where the work
+    stands.
+    """
+    best = state.selection.best.fit
+    if not state.problem.rows.locked:
+        return state
+    fit = settled(best)
+    return state if fit is best else replace(state, selection=state.selection.with_best_fit(fit))
+
+
 def on_problem(fit: Fit, problem: FitProblem) -> Fit:
     """The parameters of `fit` on another problem's rows and noise."""
     terms = [
@@ -298,5 +310,6 @@ STAGES: tuple[Callable[[State], State], ...] = (
     measure_noise_again,
     search_high_orders,
     search_without_ripple,
+    settle_shapes,
 )
 """A diagnosis, in the order of its work, after `begin`; `checks.assessment.assess` takes the last state."""

@@ -13,6 +13,7 @@ from hdopt.diagnosis.inference.catalogue import is_effect
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.profile_interval import profiled_estimates
 from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.inference.settled_shapes import estimates_by_profile
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.orientation import as_counted
 from hdopt.diagnosis.search.candidates import Candidate
@@ -69,7 +70,9 @@ def confidences(evidence: Evidence) -> dict[str, float]:
 def describe(candidate: Candidate, evidence: Evidence, high: bool = False) -> list[NamedEffect]:
     """The effects of a `candidate`, as they stand in the `evidence`; `high` for one found on the rows as recorded."""
     fit = candidate.fit
-    estimates = profiled_estimates(fit)
+    # A root of a jagged profile is the edge of a jag: with the input locked, places are compared instead.
+    locked = fit.problem.rows.locked
+    estimates = estimates_by_profile(fit, evidence.inflation) if locked else profiled_estimates(fit)
     confidence = {} if high else confidences(evidence)
     base_power = evidence.base_held_out.variance
     found = []
