@@ -13,8 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hdopt.cli import main
+from hdopt.errors import HdoptError
 from hdopt.geometry.compare import fit_cam
 from hdopt.geometry.contour import Circle, ParallelCurve
+from hdopt.study import load_study
+from hdopt.workflow.compare import compare, write_measured_study
 
 BEARING = 3.0
 CAM = ParallelCurve(TABLE_1_ELLIPSE, BEARING)
@@ -106,6 +109,16 @@ def test_measured_cam_goes_on_to_kinematic_error(surface, distance, tmp_path, ca
         kinematic_error(load_study(source)).to_dict()["peak_to_peak_arcmin"] for source in (study, "csf-25-80")
     )
     assert own == pytest.approx(design, abs=2e-4)
+
+
+def test_a_study_that_cannot_be_written_leaves_no_table_behind(tmp_path):
+    save(tmp_path / "cam.csv", measured())
+    study = load_study("csf-25-80")
+    result = compare(study, tmp_path / "cam.csv")
+    (tmp_path / "taken.toml").mkdir()
+    with pytest.raises(HdoptError, match="it is a folder"):
+        write_measured_study(study, result, tmp_path / "taken.toml")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cam.csv", "taken.toml"]
 
 
 @pytest.mark.parametrize(
