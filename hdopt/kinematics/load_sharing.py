@@ -86,3 +86,12 @@ def mesh_tables(drive: Drive) -> tuple[Array, Array]:
         NO_TABLE if drive.cs_teeth is None else sharing.table(drive.cs_teeth),
         NO_TABLE if drive.fs_teeth is None else sharing.table(drive.fs_teeth),
     )
+
+
+def mesh_range(drive: Drive) -> float:
+    """How far the measured teeth of `drive` can move the driving deviation, mm of arc: the ranges of both tables, and
+    what a cubic can pass the places of a table by. 0 without measured teeth."""
+    from hdopt.kinematics.beat_lanes import second_difference
+
+    tables = [table for table in mesh_tables(drive) if len(table)]
+    return float(sum(np.ptp(table) + second_difference(table, 1) / 2 for table in tables))

@@ -110,7 +110,11 @@ class DriveResponse:
         if not self.drive.wave_generator.profile.tip_is_smooth:
             return None
         bound = peak_to_peak_bound_arcmin(self.drive, self.widest_errors(lower, upper))
-        return None if bound is None else self.homogenization * bound
+        if bound is None:
+            return None
+        from hdopt.kinematics.load_sharing import mesh_range
+
+        return self.homogenization * (bound + mesh_range(self.drive) * self.drive.geometry.arcmin_per_mm)
 
     def widest_errors(self, lower: Array, upper: Array) -> DriveErrors:
         """The largest absolute value of every error over the box of inputs between `lower` and `upper`, (d,) each.

@@ -4,11 +4,15 @@ The walks are what the kernel replaces: 80 input turns at 1 degree in NumPy, dri
 closed formulas of the beat at 180 fixed angles, vectorized.
 """
 
+import time
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from cases import drive, random_errors
 
 from hdopt.drive.errors import DriveErrors
+from hdopt.drive.teeth import MeasuredTeeth
 from hdopt.kinematics import peak_to_peak_arcmin
 from hdopt.kinematics.closed_form import deepest_points
 from hdopt.kinematics.extremes import extremes_arcmin, walked_peak_to_peak_arcmin
@@ -88,3 +92,28 @@ def test_against_the_exact_geometry(benchmark, request):
     }
     assert np.mean(difference < 1e-3) >= 0.99
     assert difference.max() < 5e-3
+
+
+def test_measured_teeth_cost_at_most_twenty_sines(benchmark, request):
+    """The full beat of 160 + 162 measured teeth against the sines' converged peak-to-peak, per drive on one thread."""
+    in_a_run = in_earnest(request)
+    rng = np.random.default_rng(3)
+    teeth = [MeasuredTeeth.of(rng.normal(0, 0.004, z), "single") for z in (162, 160)]
+    design = replace(drive(), cs_teeth=teeth[0], fs_teeth=teeth[1])
+    errors = random_errors(20_000 if in_a_run else 200, seed=0)
+    without_sines = errors.with_(cs_tooth_amplitude=0.0, fs_tooth_amplitude=0.0)
+
+    def seconds(which, of):
+        start = time.process_time()
+        peak_to_peak_arcmin(which, of)
+        return time.process_time() - start
+
+    def ratio():
+        pairs = [(seconds(design, without_sines), seconds(drive(), errors)) for _ in range(7)]
+        return min(pair[0] for pair in pairs) / min(pair[1] for pair in pairs)
+
+    with engine_in_force("threads:1"):
+        ratio()
+        found = benchmark.pedantic(ratio, rounds=1, iterations=1)
+    benchmark.extra_info["times_the_sine"] = found
+    assert not in_a_run or found <= 20

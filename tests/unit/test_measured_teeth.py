@@ -12,7 +12,7 @@ from hdopt.drive.teeth import MeasuredTeeth, read_teeth
 from hdopt.drive.values import DriveError
 from hdopt.errors import HdoptError
 from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin, extremes_arcmin
-from hdopt.kinematics.load_sharing import LoadSharing, mesh_tables
+from hdopt.kinematics.load_sharing import LoadSharing, mesh_range, mesh_tables
 from hdopt.kinematics.waveform import kinematic_error_arcmin
 from hdopt.mechanics.contact import contact_angle, meshing_teeth
 from hdopt.study import load_study
@@ -151,6 +151,17 @@ def test_a_study_takes_measured_teeth(study_with_teeth):
     one = DriveErrors.from_matrix(problem.response.matrix(inputs)[0])
     expected = converged_peak_to_peak_arcmin(study.drive, one, "closed form")
     assert problem.response(inputs) == pytest.approx([expected], abs=1e-9)
+
+
+def test_what_is_proven_counts_the_tables_too(study_with_teeth):
+    """Without them some of these drives lie above what no drive exceeds."""
+    problem = study_problem(load_study(study_with_teeth))
+    points = np.random.default_rng(4).random((64, problem.space.dimension))
+    inputs = problem.space.sample(points)
+    worst = problem.response(inputs)
+    bound = problem.response.upper_bound(inputs.min(axis=0), inputs.max(axis=0))
+    assert worst.max() <= bound
+    assert worst.max() > bound - mesh_range(problem.response.drive) * problem.response.drive.geometry.arcmin_per_mm
 
 
 def test_a_study_that_evens_out_measured_teeth_twice_is_refused(study_with_teeth):
