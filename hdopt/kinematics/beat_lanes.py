@@ -447,27 +447,29 @@ def _least_of_lines(one_a: float, two_a: float, one_b: float, two_b: float) -> f
 
 
 @compiled
-def _follow(walk: Walk, nodes: Nodes, i: int, lanes: Array, margin: float, best: Array) -> None:
-    """Follow every phase that can win in the cell after node `i`."""
+def _follow_least(walk: Walk, nodes: Nodes, i: int, lanes: Array, margin: float, best: Array) -> None:
+    """Follow every phase that can hold the least of all in the cell after node `i`."""
     rims, cell = (nodes.rims[i, 0], nodes.rims[i, 1]), (nodes.place[i], nodes.place[i + 1])
-    work = np.empty((2, 3))
+    work = np.zeros((2, 3))
     for p in range(lanes.shape[2]):
         one_a, two_a, one_b, two_b = lanes[0, 0, p], lanes[0, 1, p], lanes[1, 0, p], lanes[1, 1, p]
-        # The least of both zones, then the largest of each.
-        for zone in range(-1, 2):
-            if zone < 0:
-                wins = max(min(one_a, one_b), min(two_a, two_b)) - margin < best[0]
-                wins = wins and _least_of_lines(one_a, two_a, one_b, two_b) - margin < best[0]
-            else:
-                wins = max(lanes[0, zone, p], lanes[1, zone, p]) + margin > best[1]
-            if not wins:
-                continue
+        if max(min(one_a, one_b), min(two_a, two_b)) - margin >= best[0]:
+            continue
+        if _least_of_lines(one_a, two_a, one_b, two_b) - margin < best[0]:
             work[0, 0], work[0, 2], work[1, 0], work[1, 2] = one_a, one_b, two_a, two_b
-            found = _extreme_in_cell(walk, rims, cell, p, zone, work)
-            if zone < 0:
-                best[0] = min(best[0], found)
-            else:
-                best[1] = max(best[1], found)
+            best[0] = min(best[0], _extreme_in_cell(walk, rims, cell, p, -1, work))
+
+
+@compiled
+def _follow_largest(walk: Walk, nodes: Nodes, i: int, lanes: Array, margin: float, best: Array) -> None:
+    """Follow every phase that can hold the largest of all in the cell after node `i`."""
+    rims, cell = (nodes.rims[i, 0], nodes.rims[i, 1]), (nodes.place[i], nodes.place[i + 1])
+    work = np.zeros((2, 3))
+    for zone in range(2):
+        for p in range(lanes.shape[2]):
+            if max(lanes[0, zone, p], lanes[1, zone, p]) + margin > best[1]:
+                work[zone, 0], work[zone, 2] = lanes[0, zone, p], lanes[1, zone, p]
+                best[1] = max(best[1], _extreme_in_cell(walk, rims, cell, p, zone, work))
 
 
 @compiled
@@ -495,6 +497,8 @@ def extremes_in_lanes(walk: Walk, nodes: Nodes, lanes: Array) -> tuple[float, fl
                 _lanes(comb.rows, nodes.value[i + end, zone], nodes.angle[i + end, zone], lanes[end, zone])
         known = i + 1
         least, largest = _ends(lanes, folds, best)
-        if least - margin < best[0] or largest + margin > best[1]:
-            _follow(walk, nodes, i, lanes, margin, best)
+        if least - margin < best[0]:
+            _follow_least(walk, nodes, i, lanes, margin, best)
+        if largest + margin > best[1]:
+            _follow_largest(walk, nodes, i, lanes, margin, best)
     return best[0], best[1]

@@ -9,7 +9,7 @@ input axis's tilt as rim lift (b/2)(tan beta3, tan beta2), (e2 cos alpha1, e2 si
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -18,9 +18,10 @@ from numba import njit
 from hdopt.arrays import Array, Index
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
-from hdopt.errors import HdoptError
 from hdopt.kinematics.closed_form import ErrorComponents, TipGeometry, tip_geometry
 from hdopt.kinematics.compiled_closed_form import motion_at, rigid_motion, rim_constants, rim_depth, tooth_deviation
+from hdopt.kinematics.essential import between
+from hdopt.kinematics.load_sharing import NO_TABLE, mesh_tables
 
 CARTESIAN_NAMES = (
     "axis eccentricity x",
@@ -37,6 +38,8 @@ CARTESIAN_NAMES = (
     "FS tooth cosine",
 )
 PARAMETERS = len(CARTESIAN_NAMES)
+SLOPE_CELLS = 0.01
+"""Half the step, in places of a table of measured teeth, over which its slope is taken."""
 
 
 Evaluated: TypeAlias = tuple[Array, Index, Array]
@@ -86,24 +89,26 @@ def to_cartesian(errors: DriveErrors, half_width: float) -> Array:
 
 @dataclass(frozen=True)
 class CartesianModel:
-    """Constants of one drive: its wave generator's `tip`, tan of the pressure angle, arcmin per mm of arc, and the
-    `advance` Z_CS/Z_FS of the FS teeth."""
+    """Constants of one drive: its wave generator's `tip`, tan of the pressure angle, arcmin per mm of arc, the
+    `advance` Z_CS/Z_FS of the FS teeth, and the tables of measured teeth over one turn of each spline (mm of arc; empty
+    where a spline's teeth are not measured), which stand beside the errors and are not fitted."""
 
     tip: TipGeometry
     tan_alpha: float
     arcmin_per_mm: float
     advance: float
+    cs_table: Array = field(default_factory=lambda: NO_TABLE)
+    fs_table: Array = field(default_factory=lambda: NO_TABLE)
 
     @classmethod
     def of(cls, drive: Drive) -> CartesianModel:
-        if drive.has_measured_teeth:
-            raise HdoptError("a diagnosis takes no measured teeth; leave [cs_teeth] and [fs_teeth] out of the study")
         geometry = drive.geometry
         return cls(
             tip_geometry(drive),
             math.tan(geometry.pressure_angle),
             float(geometry.arcmin_per_mm),
             geometry.flexspline_advance,
+            *mesh_tables(drive),
         )
 
     @property
@@ -135,6 +140,8 @@ class CartesianModel:
             self.arcmin_per_mm,
             np.asarray(errors, float),
             np.ascontiguousarray(extra),
+            self.cs_table,
+            self.fs_table,
         )
 
 
@@ -150,9 +157,24 @@ def _sine_cosine(x: float) -> tuple[float, float]:
     )
 
 
+@njit(cache=True, error_model="numpy")
+def _measured(table: Array, sin: float, cos: float, beyond: float) -> tuple[float, float]:
+    """A table of measured teeth (mm of arc) at the angle of this `sin` and `cos`, `beyond` (rad) further, and its slope
+    (mm/rad); 0 for an empty one."""
+    n = len(table)
+    if n == 0:
+        return 0.0, 0.0
+    place = (math.atan2(sin, cos) + beyond) / (2 * math.pi) * n
+    rise = between(table, place + SLOPE_CELLS) - between(table, place - SLOPE_CELLS)
+    return between(table, place), rise / (2 * SLOPE_CELLS) * n / (2 * math.pi)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def _evaluate(rotation: Array, tip: TipGeometry, tan_alpha: float, scale: float, p: Array, extra: Array) -> Evaluated:
-    """`CartesianModel.evaluate_at`; `scale` is arcmin per mm of arc, `p` the errors (12,), `extra` (2, n) or (2, 1)."""
+def _evaluate(
+    rotation: Array, tip: TipGeometry, tan_alpha: float, scale: float, p: Array, extra: Array, cs: Array, fs: Array
+) -> Evaluated:
+    """`CartesianModel.evaluate_at`; `scale` is arcmin per mm of arc, `p` the errors (12,), `extra` (2, n) or (2, 1);
+    `cs`, `fs` the tables of measured teeth."""
     half_width = tip.half_width
     rim = rim_constants(tip)
     components = ErrorComponents(
@@ -166,7 +188,7 @@ def _evaluate(rotation: Array, tip: TipGeometry, tan_alpha: float, scale: float,
         c, s, cf, sf = rotation[i, 0], rotation[i, 1], rotation[i, 2], rotation[i, 3]
         e_a, e_l, t_a, t_l = motion_at(motion, c, s)
         best, z, k, o = -math.inf, 1.0, 1.0, 0.0
-        sin_o = sin_of = 0.0
+        sin_o = sin_of = rise_cs = rise_fs = 0.0
         cos_o = cos_of = 1.0
         for z_now in (1.0, -1.0):
             depth, o_now, of_now = rim_depth(rim, e_a, e_l, t_a, t_l, z_now, 1.0)
@@ -178,10 +200,15 @@ def _evaluate(rotation: Array, tip: TipGeometry, tan_alpha: float, scale: float,
             sin_f_now, cos_f_now = _sine_cosine(of_now)
             tau = depth * tan_alpha + tooth_deviation(p[9], p[8], c, s, z_now, cos_now, sin_now)
             tau += tooth_deviation(p[11], p[10], cf, sf, z_now, cos_f_now, sin_f_now)
+            away = 0.0 if z_now > 0 else math.pi
+            on_cs, rise_cs_now = _measured(cs, s, c, z_now * o_now + away)
+            on_fs, rise_fs_now = _measured(fs, sf, cf, z_now * of_now + away)
+            tau += on_cs + on_fs
             if has_extra:
                 tau += extra[0 if z_now > 0 else 1, i]
             if tau > best:
                 best, z, k, o = tau, z_now, k_now, o_now
+                rise_cs, rise_fs = rise_cs_now, rise_fs_now
                 sin_o, cos_o, sin_of, cos_of = sin_now, cos_now, sin_f_now, cos_f_now
         value[i] = scale * best
         zone[i] = 0 if z > 0 else 1
@@ -189,24 +216,17 @@ def _evaluate(rotation: Array, tip: TipGeometry, tan_alpha: float, scale: float,
         sof, cof = sf * cos_of + z * cf * sin_of, cf * cos_of - z * sf * sin_of
         # d tau = tan_alpha d depth + (d tau/d o) d o + (d tau/d o') d o', where o = q/flatness and o' = o - shift/L_W,
         # first by the motions e_a, e_l, t_a, t_l of the rim.
-        slope_cs = p[8] * co - p[9] * so
-        slope_fs = p[10] * cof - p[11] * sof
+        slope_cs = p[8] * co - p[9] * so + z * rise_cs
+        slope_fs = p[10] * cof - p[11] * sof + z * rise_fs
         by_q = tan_alpha * o + (slope_cs + slope_fs) * rim.per_flatness
         by_shift = by_q - slope_fs / tip.semi_major
         by_e_a = scale * tan_alpha * z * tip.passes_major
         by_e_l = scale * by_shift * tip.passes_minor
         by_t_a = scale * (tan_alpha * (k - 2 * rim.bow * t_a) - by_q * z * rim.tilt_gain * t_l)
         by_t_l = scale * (by_shift * z * k - by_q * z * rim.tilt_gain * t_a)
-        jacobian[i, 0] = by_e_a * s + by_e_l * c
-        jacobian[i, 1] = by_e_a * c - by_e_l * s
-        jacobian[i, 2] = by_t_a * s + by_t_l * c
-        jacobian[i, 3] = by_t_a * c - by_t_l * s
-        jacobian[i, 4] = by_e_a
-        jacobian[i, 5] = by_e_l
-        jacobian[i, 6] = by_t_a
-        jacobian[i, 7] = by_t_l
-        jacobian[i, 8] = scale * z * so
-        jacobian[i, 9] = scale * z * co
-        jacobian[i, 10] = scale * z * sof
-        jacobian[i, 11] = scale * z * cof
+        jacobian[i, 0], jacobian[i, 1] = by_e_a * s + by_e_l * c, by_e_a * c - by_e_l * s
+        jacobian[i, 2], jacobian[i, 3] = by_t_a * s + by_t_l * c, by_t_a * c - by_t_l * s
+        jacobian[i, 4], jacobian[i, 5], jacobian[i, 6], jacobian[i, 7] = by_e_a, by_e_l, by_t_a, by_t_l
+        jacobian[i, 8], jacobian[i, 9] = scale * z * so, scale * z * co
+        jacobian[i, 10], jacobian[i, 11] = scale * z * sof, scale * z * cof
     return value, zone, jacobian

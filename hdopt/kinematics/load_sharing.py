@@ -88,6 +88,12 @@ def mesh_tables(drive: Drive) -> tuple[Array, Array]:
     )
 
 
+def misalignment_share(drive: Drive) -> float:
+    """What is left of the arc that misalignment makes where the teeth in contact of `drive` share it: the mean of one
+    wave a turn. It is common to all teeth, so that 1/sqrt(Z_mp) is not for it."""
+    return LoadSharing.of(drive).response(1, drive.geometry.circular_spline_teeth)
+
+
 def mesh_range(drive: Drive) -> float:
     """How far the measured teeth of `drive` can move the driving deviation, mm of arc: the ranges of both tables, and
     what a cubic can pass the places of a table by. 0 without measured teeth."""

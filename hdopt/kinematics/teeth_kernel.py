@@ -58,7 +58,8 @@ def beat_constants(drive: Drive, misalignment: float = 1.0, sine_share: float = 
 
 
 def whole_tables(drive: Drive, tables: tuple[Array, Array]) -> tuple[Array, Array]:
-    """`mesh_tables` of `drive` as rows (1, 12 Z) of CS and FS; zeros for a spline whose teeth are not measured."""
+    """`tables` of CS and FS, as `mesh_tables` gives them for `drive`, as rows (1, 12 Z), mm of arc; zeros for a spline
+    whose teeth are not measured."""
     gear = drive.geometry
     teeth = gear.circular_spline_teeth, gear.flexspline_teeth
     cs, fs = (

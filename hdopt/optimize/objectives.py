@@ -20,7 +20,8 @@ from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, MissingValue, unknown_name
 from hdopt.kinematics.closed_form import tip_geometry
 from hdopt.kinematics.gradients import Extremes, extremes_of
-from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin
+from hdopt.kinematics.load_sharing import misalignment_share
+from hdopt.kinematics.peak_to_peak import beat_extremes_arcmin, matrix_peak_to_peak_arcmin
 from hdopt.mechanics.bearing_life import (
     BearingConstants,
     axial_force,
@@ -185,6 +186,12 @@ def tip_features(design: Design) -> Array:
     return np.array([tip.semi_major, tip.tip_radius, tip.half_width, tan_alpha, gear.arcmin_per_mm])
 
 
+def _piece(quantity: Quantity, point: Point) -> tuple[Array, Array]:
+    """A quantity as one piece, with slopes by central differences."""
+    value = quantity.value(point.trade, point.design)
+    return np.array([value]), point.slopes(lambda design: quantity.value(point.trade, design))[None, :]
+
+
 def _envelope(design: Design, rows: Array) -> Extremes:
     return extremes_of(tip_geometry(design.drive), math.tan(design.drive.geometry.pressure_angle), rows)
 
@@ -193,7 +200,8 @@ def _envelope(design: Design, rows: Array) -> Extremes:
 class PeakToPeak:
     """Peak-to-peak of the errors in the study, k_e = 1: the envelope over all FS phases (see `envelope`).
 
-    With effects there is no such envelope: the relative turn is walked, and local extremes are the pieces.
+    With effects there is no such envelope: the relative turn is walked, and local extremes are the pieces. Nor is there
+    one of measured teeth: the beat of their tables is walked, and the whole is one piece.
     """
 
     title: str = "Peak-to-peak"
@@ -203,6 +211,8 @@ class PeakToPeak:
     def value(self, trade: DesignConditions, design: Design) -> float:
         if trade.added is not None:
             return trade.added.peak_to_peak_arcmin(design.drive, trade.rows[0])
+        if design.drive.has_measured_teeth:
+            return float(np.ptp(beat_extremes_arcmin(design.drive, trade.rows)))
         found = _envelope(design, trade.rows)
         return float((found.highs.max() - found.lows.min()) * design.drive.geometry.arcmin_per_mm)
 
@@ -210,6 +220,8 @@ class PeakToPeak:
         if point.trade.added is not None:
             spans = point.trade.added.spans_near(point.design.drive, point.trade.rows[0], LOWEST_USED)
             return spans(point.design.drive), point.slopes(lambda design: spans(design.drive)).T
+        if point.design.drive.has_measured_teeth:
+            return _piece(self, point)
         found, features = _envelope(point.design, point.trade.rows), point.slopes(tip_features)
         lows, low_slopes = found.lows[0, :LOWEST_USED], found.low_slopes[0, :LOWEST_USED]
         spans = (found.highs[0][:, None] - lows[None, :]).ravel()
@@ -246,12 +258,16 @@ class PeakToPeakQuantile:
             return np.array([float(weights @ values[order])]), np.empty((1, 0))
         counts = weights > 2e-3 * weights.max()
         chosen, share = order[counts], weights[counts]
+        value = float(weights @ values[order])
+        if point.design.drive.has_measured_teeth:
+            rows = trade.drawn()[chosen]
+            each = point.slopes(lambda design: matrix_peak_to_peak_arcmin(design.drive, rows)).T
+            return np.array([value]), (share @ each / share.sum())[None, :]
         found, features = _envelope(point.design, trade.drawn()[chosen]), point.slopes(tip_features)
         n = np.arange(len(chosen))
         slopes = found.high_slopes[n, found.highs.argmax(axis=1)] - found.low_slopes[:, 0]
         scale = point.design.drive.geometry.arcmin_per_mm
         each = scale * slopes @ features[:, :4].T + np.outer(values[chosen] / scale, features[:, 4])
-        value = float(weights @ values[order])
         return np.array([value]), (share @ each / share.sum())[None, :]
 
 
@@ -268,10 +284,16 @@ class LargestLag:
 
     def value(self, trade: DesignConditions, design: Design) -> float:
         backlash = trade.needed("backlash", "the lag")
-        play = backlash - float(_envelope(design, trade.rows).lows.min())
-        return play * design.drive.geometry.arcmin_per_mm + self._slide(trade, design.drive)
+        scale = design.drive.geometry.arcmin_per_mm
+        if design.drive.has_measured_teeth:
+            lowest = float(beat_extremes_arcmin(design.drive, trade.rows)[:, 0].min())
+        else:
+            lowest = scale * float(_envelope(design, trade.rows).lows.min())
+        return backlash * scale - lowest + self._slide(trade, design.drive)
 
     def pieces(self, point: Point) -> tuple[Array, Array]:
+        if point.design.drive.has_measured_teeth:
+            return _piece(self, point)
         trade, scale = point.trade, point.design.drive.geometry.arcmin_per_mm
         found, features = _envelope(point.design, trade.rows), point.slopes(tip_features)
         play = trade.needed("backlash", "the lag") - found.lows[0, :LOWEST_USED]
@@ -359,11 +381,14 @@ def ring_load(trade: DesignConditions, drive: Drive) -> float:
 
 def evened_out(trade: DesignConditions, design: Design) -> float:
     """Peak-to-peak of `design` with the errors of `trade`, times k_e of its teeth in mesh (Jia 2021, Eq. (13)),
-    arcmin."""
+    arcmin. With measured teeth k_e is for sines beside them only, and misalignment has its own mean."""
     teeth = design.drive.geometry.circular_spline_teeth * design.mesh.contact_angle / (2 * math.pi)
     k_e = homogenization_coefficient(teeth, trade.k_b)
     if trade.added is not None:
         return trade.added.peak_to_peak_arcmin(design.drive, trade.rows[0], k_e)
+    if design.drive.has_measured_teeth:
+        shares = misalignment_share(design.drive), k_e
+        return float(np.ptp(beat_extremes_arcmin(design.drive, trade.rows, None, *shares)))
     return PeakToPeak().value(trade, design) * k_e
 
 

@@ -88,7 +88,8 @@ class VectorSum:
 class DriveResponse:
     """Converged peak-to-peak kinematic error (arcmin, times k_e) of the drive each row of inputs describes.
 
-    Errors that no column feeds keep the value they have in `held`.
+    With measured teeth k_e is for the sines beside them, and misalignment has its own mean. Errors that no column feeds
+    keep the value they have in `held`.
     """
 
     drive: Drive
@@ -112,9 +113,12 @@ class DriveResponse:
         bound = peak_to_peak_bound_arcmin(self.drive, self.widest_errors(lower, upper))
         if bound is None:
             return None
-        from hdopt.kinematics.load_sharing import mesh_range
+        if self.drive.has_measured_teeth:
+            from hdopt.kinematics.load_sharing import mesh_range
 
-        return self.homogenization * (bound + mesh_range(self.drive) * self.drive.geometry.arcmin_per_mm)
+            # Shared terms are no larger than those of a single pair of teeth.
+            return bound + mesh_range(self.drive) * self.drive.geometry.arcmin_per_mm
+        return self.homogenization * bound
 
     def widest_errors(self, lower: Array, upper: Array) -> DriveErrors:
         """The largest absolute value of every error over the box of inputs between `lower` and `upper`, (d,) each.
@@ -140,9 +144,21 @@ class DriveResponse:
     def __call__(self, inputs: Array) -> Array:
         from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin, peak_to_peak_arcmin
 
+        if self.drive.has_measured_teeth and self.homogenization != 1:
+            return self._shared(inputs)
         if self.drive.wave_generator.profile.tip_is_smooth:
             return self.homogenization * matrix_peak_to_peak_arcmin(self.drive, self.matrix(inputs))
         return self.homogenization * peak_to_peak_arcmin(self.drive, self.errors(inputs))
+
+    def _shared(self, inputs: Array) -> Array:
+        """Each term of drives with `inputs` (n, d) as the teeth in contact share it: sines by k_e, misalignment by its
+        mean, measured teeth by theirs; arcmin, (n,)."""
+        from hdopt.kinematics.load_sharing import misalignment_share
+        from hdopt.kinematics.peak_to_peak import beat_extremes_arcmin
+
+        shares = misalignment_share(self.drive), self.homogenization
+        low, high = beat_extremes_arcmin(self.drive, self.matrix(inputs), None, *shares).T
+        return np.asarray(high - low)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from hdopt.drive.geometry import Drive
 from hdopt.drive.profiles import perimeter_error, tip_radius_of_curvature
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.kinematics.extremes import extremes_arcmin, walked_peak_to_peak_arcmin
-from hdopt.kinematics.load_sharing import LoadSharing
+from hdopt.kinematics.load_sharing import misalignment_share
 from hdopt.kinematics.waveform import DEFAULT_METHOD, geometry_for
 from hdopt.mechanics.bending import max_bending_stress, max_curvature_change
 from hdopt.mechanics.contact import contact_angle, homogenization_coefficient, mean_flank_pressure, meshing_teeth
@@ -189,9 +189,8 @@ def _shared(study: Study, method: str, k_e: float) -> float:
     if study.effects:
         raise HdoptError("measured teeth and effects are not evened out together; leave [effects] out for that figure")
     drive, e = study.drive, study.errors
-    mean = LoadSharing.of(drive).response(1, drive.geometry.circular_spline_teeth)
     sines = e.with_(cs_tooth_amplitude=k_e * e.cs_tooth_amplitude, fs_tooth_amplitude=k_e * e.fs_tooth_amplitude)
-    low, high = extremes_arcmin(drive, sines, method, mean)
+    low, high = extremes_arcmin(drive, sines, method, misalignment_share(drive))
     return high - low
 
 

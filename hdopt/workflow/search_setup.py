@@ -38,10 +38,10 @@ def setup_of(study: Study, seed: int) -> Setup:
     which make a quantile."""
     section = study.find("search", SearchSection) or SearchSection()
     drive = study.drive
-    if drive.has_measured_teeth:
+    if drive.has_measured_teeth and section.size != "fixed_tooth_counts":
         raise HdoptError(
-            "a search of designs takes no measured teeth: they are those of one part; leave [cs_teeth] and [fs_teeth] "
-            "out, and look at the chosen design with ke"
+            f"search.size is {section.size!r}, which changes the number of teeth, and these were measured one by one; "
+            "set search.size=fixed_tooth_counts, or leave [cs_teeth] and [fs_teeth] out"
         )
     if not drive.wave_generator.profile.tip_is_smooth:
         raise HdoptError(

@@ -10,7 +10,6 @@ from cases import BASE_ERRORS, drive
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.teeth import MeasuredTeeth, read_teeth
 from hdopt.drive.values import DriveError
-from hdopt.errors import HdoptError
 from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin, extremes_arcmin
 from hdopt.kinematics.load_sharing import LoadSharing, mesh_range, mesh_tables
 from hdopt.kinematics.waveform import kinematic_error_arcmin
@@ -150,7 +149,8 @@ def test_a_study_takes_measured_teeth(study_with_teeth):
     inputs = problem.space.sample(np.full((1, problem.space.dimension), 0.5))
     one = DriveErrors.from_matrix(problem.response.matrix(inputs)[0])
     expected = converged_peak_to_peak_arcmin(study.drive, one, "closed form")
-    assert problem.response(inputs) == pytest.approx([expected], abs=1e-9)
+    # What the walk in lanes is held to against the search over all phases.
+    assert problem.response(inputs) == pytest.approx([expected], abs=1e-5)
 
 
 def test_what_is_proven_counts_the_tables_too(study_with_teeth):
@@ -164,9 +164,14 @@ def test_what_is_proven_counts_the_tables_too(study_with_teeth):
     assert worst.max() > bound - mesh_range(problem.response.drive) * problem.response.drive.geometry.arcmin_per_mm
 
 
-def test_a_study_that_evens_out_measured_teeth_twice_is_refused(study_with_teeth):
-    with pytest.raises(HdoptError, match=r"measured teeth are shared by those in contact already"):
-        study_problem(load_study(study_with_teeth, ["requirement.homogenization=contact"]))
+def test_a_stack_evens_out_term_by_term_as_ke_does(study_with_teeth):
+    """One drive in the middle of all tolerances: k_e on misalignment or on the table gives a third of this."""
+    study = load_study(study_with_teeth, ["requirement.homogenization=contact", "fs_tooth_amplitude_mm=0.002"])
+    problem = study_problem(study)
+    inputs = problem.space.sample(np.full((1, problem.space.dimension), 0.5))
+    one = DriveErrors.from_matrix(problem.response.matrix(inputs)[0])
+    expected = kinematic_error(study.drive, one, method="closed form").nonuniform_arcmin
+    assert problem.response(inputs) == pytest.approx([expected], abs=1e-5)
 
 
 @pytest.mark.parametrize(
