@@ -44,7 +44,8 @@ def write_png(path: Path, job: Job) -> None:
     """
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / "scene.npz"
-        np.savez(scene, **_scene(job))  # type: ignore[arg-type]  # its keyword allow_pickle is a bool, ours are arrays
+        # Its keyword allow_pickle is a bool, and the arrays of a scene could bear any name, for all that types say.
+        np.savez(scene, eye=np.array(EXPLODED[0]), **_scene(job))  # type: ignore[arg-type]
         command = [sys.executable, "-m", "hdopt.geometry.render", str(scene), str(path)]
         try:
             done = subprocess.run(command, capture_output=True, timeout=TIME_LIMIT).returncode
@@ -79,13 +80,13 @@ def check_png(path: Path, job: Job, name: str) -> JsonReady:
 
 
 def _scene(job: Job) -> dict[str, Array | Index]:
-    """Where the eye is, and meshes, colours and edges of all parts, as arrays; parts in a context stay in their
+    """Meshes, colours and edges of all parts, as arrays; parts in a context stay in their
     places."""
     made = [(part, solid) for part, solid in job.solids if not part.context]
     shapes: list[tuple[Part, cq.Solid]] = list(job.solids)
     if len(made) == len(shapes):
         shapes = list(zip((part for part, _ in made), pulled_apart(made), strict=True))
-    arrays: dict[str, Array | Index] = {"eye": np.array(EXPLODED[0])}
+    arrays: dict[str, Array | Index] = {}
     for index, (part, shape) in enumerate(shapes):
         _, vertices, corners = triangles(shape)
         lines = sharp_edges(shape)
