@@ -5,18 +5,21 @@ that a run can be continued. With `--minutes` no case is begun after that time. 
 begun, how long it took and which program answered. Nothing here opens DIR/sealed.
 """
 
+from __future__ import annotations
+
 import argparse
 import json
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from hdopt.bench.registry import hashes
 
 
-def answer(folder, out, command, limit_s=300):
+def answer(folder: Path, out: Path, command: Sequence[str], limit_s: float = 300) -> str:
     """Run `command` on the case in `folder`, for `limit_s` at most, its answer into `out`; "" or why there is none."""
     case = json.loads((folder / "case.json").read_text())
     target = out / f"{case['id']}.json"
@@ -41,7 +44,7 @@ def answer(folder, out, command, limit_s=300):
     return ""
 
 
-def main(arguments=None):
+def main(arguments: Sequence[str] | None = None) -> int:
     """Answer the cases that `arguments` name; status 1 where one that was begun has no answer."""
     parser = argparse.ArgumentParser(prog="python -m hdopt.bench.answer", description=__doc__)
     parser.add_argument("--dir", required=True, type=Path)
@@ -55,7 +58,7 @@ def main(arguments=None):
     folders = sorted(path.parent for path in (options.dir / "cases").glob("*/case.json"))
     begun_at, program = time.monotonic(), hashes()["program"]
 
-    def in_time(folder):
+    def in_time(folder: Path) -> str | None:
         if time.monotonic() - begun_at > 60 * options.minutes:
             return None
         return answer(folder, out, options.command, options.limit)

@@ -1,15 +1,24 @@
 """The gears of the bench: four drives of one size, and what a drive has as it is built."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import TypeAlias
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+
+from hdopt.bench.arrays import Array
 
 PRESSURE_ANGLE = np.deg2rad(12.0)
 TURN = 2 * np.pi
 # Points of a contour that is known as a table, and waves of Resal's series: the last adds 1e-9 of the deflection.
 CONTOUR_POINTS, RESAL_WAVES = 4096, 200
+
+
+Point: TypeAlias = tuple[Array, Array]
+"""Components along the minor and the major axis."""
 
 
 @dataclass(frozen=True)
@@ -35,28 +44,28 @@ class Gear:
     fs_pitch_mm: tuple[float, ...] = ()
 
     @property
-    def ratio(self):
+    def ratio(self) -> float:
         return self.fs_teeth / (self.cs_teeth - self.fs_teeth)
 
     @property
-    def floats_major(self):
+    def floats_major(self) -> bool:
         return self.structure in ("automatic", "one_way_major")
 
     @property
-    def floats_minor(self):
+    def floats_minor(self) -> bool:
         return self.structure in ("automatic", "one_way_minor")
 
     @property
-    def radius_mm(self):
+    def radius_mm(self) -> float:
         """Inner radius of the undeformed flexspline."""
         return self.semi_major_mm - self.module_mm
 
-    def rad_per_mm(self, theta):
+    def rad_per_mm(self, theta: Array) -> Array | float:
         """Output rotation (rad) for one mm of arc at input angles `theta` (rad)."""
         share = 1.0 + sum(a * np.cos(order * theta + phase) for order, a, phase in self.k_e)
         return share * TURN / (np.pi * self.module_mm * self.fs_teeth)
 
-    def contour(self, u):
+    def contour(self, u: Array) -> tuple[Point, Point, Point]:
         """Contour point (mm along the minor and the major axis) at parameter `u` (rad), and both derivatives."""
         if self.profile == "ellipse" and not self.cam:
             s, c = np.sin(u), np.cos(u)
@@ -73,7 +82,9 @@ class Gear:
 
 
 @cache
-def _radius(profile, semi_major, semi_minor, deflection, cam):
+def _radius(
+    profile: str, semi_major: float, semi_minor: float, deflection: float, cam: tuple[tuple[int, float, float], ...]
+) -> CubicSpline:
     """Polar radius (mm) over the angle from the major axis, as a periodic spline."""
     phi = TURN * np.arange(CONTOUR_POINTS + 1) / CONTOUR_POINTS
     if profile == "ellipse":
@@ -102,7 +113,7 @@ GEARS = {
 BUILT = ("pitch errors", "cam harmonics", "varying k_e")
 
 
-def as_built(gear, kind, rng):
+def as_built(gear: Gear, kind: str, rng: np.random.Generator) -> Gear:
     """`gear` with a `kind` of thing that real ones have (`BUILT`), its size drawn by `rng`."""
     if kind == "pitch errors":
         um = rng.uniform(0.2, 0.8, 2)
@@ -116,7 +127,7 @@ def as_built(gear, kind, rng):
     raise ValueError(f"no gear is built with {kind!r}; the bench knows {', '.join(BUILT)}")
 
 
-def study_text(gear):
+def study_text(gear: Gear) -> str:
     """A study file (TOML) with the nominal `gear`, for `hdopt diagnose --drive FILE`."""
     axes = f"semi_major_mm = {gear.semi_major_mm}\nsemi_minor_mm = {gear.semi_minor_mm}\n"
     return (

@@ -5,14 +5,24 @@ full rotation matrices; on a rim the squared radius is a trigonometric polynomia
 maximum Newton's method finds to rounding. Tooth deviations are arrays, one value a tooth, interpolated in between.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass, fields
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from hdopt.bench.gears import CSF, PRESSURE_ANGLE
+from hdopt.bench.arrays import Array
+from hdopt.bench.gears import CSF, PRESSURE_ANGLE, Gear
 
 FS_TEETH, CS_TEETH, RATIO = CSF.fs_teeth, CSF.cs_teeth, CSF.ratio
 ARCMIN = np.pi / 10800
+
+
+Pair: TypeAlias = tuple[float, float]
+"""A magnitude and its direction (rad), or the two components of a tilt (rad)."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +42,11 @@ class BaseErrors:
     fs_sin_mm: float
     fs_cos_mm: float
 
-    def vector(self):
+    def vector(self) -> Array:
         return np.array([getattr(self, field.name) for field in fields(self)])
 
     @classmethod
-    def from_polar(cls, axis, axis_tilts, wg, wg_tilts, cs, fs):
+    def from_polar(cls, axis: Pair, axis_tilts: Pair, wg: Pair, wg_tilts: Pair, cs: Pair, fs: Pair) -> BaseErrors:
         """From (magnitude, direction) pairs and pairs of tilts; a deviation is a sin(angle + phase)."""
         return cls(
             axis[0] * np.sin(axis[1]),
@@ -58,14 +68,18 @@ ERROR_STEPS = np.array([2e-5, 2e-5, 5e-6, 5e-6, 1e-5, 1e-5, 3e-6, 3e-6, 4e-6, 4e
 ERROR_BOUNDS = np.array([0.015, 0.015, *np.deg2rad([0.2, 0.2]), 0.0075, 0.0075, *np.deg2rad([0.1, 0.1]), *[0.003] * 4])
 
 
-def _below(draw, upper):
+def _below(draw: Callable[[], float], upper: float) -> float:
     value = draw()
     while abs(value) > upper:
         value = draw()
     return value
 
 
-def draw_errors(rng):
+def _two_below(draw: Callable[[], float], upper: float) -> Pair:
+    return _below(draw, upper), _below(draw, upper)
+
+
+def draw_errors(rng: np.random.Generator) -> BaseErrors:
     """Errors of one drive, drawn by `rng` from the tolerances that ship with csf-25-80.
 
     Eccentricities are Rayleigh and tilts normal, both cut at their bound (`ERROR_BOUNDS`); amplitudes of the teeth are
@@ -75,15 +89,15 @@ def draw_errors(rng):
     tilt = np.deg2rad([0.2, 0.1])
     return BaseErrors.from_polar(
         (_below(lambda: rng.rayleigh(0.005), 0.015), rng.uniform(0, turn)),
-        [_below(lambda: rng.normal(0, tilt[0] / 3), tilt[0]) for _ in range(2)],
+        _two_below(lambda: rng.normal(0, tilt[0] / 3), tilt[0]),
         (_below(lambda: rng.rayleigh(0.0025), 0.0075), rng.uniform(0, turn)),
-        [_below(lambda: rng.normal(0, tilt[1] / 3), tilt[1]) for _ in range(2)],
+        _two_below(lambda: rng.normal(0, tilt[1] / 3), tilt[1]),
         (rng.uniform(0.001, 0.003), rng.uniform(0, turn)),
         (rng.uniform(0.001, 0.003), rng.uniform(0, turn)),
     )
 
 
-def _tilt_frame(t2, t3):
+def _tilt_frame(t2: float, t3: float) -> Array:
     z = np.array([np.tan(t3), np.tan(t2), 1.0])
     z /= np.linalg.norm(z)
     y = np.array([0.0, np.cos(t2), -np.sin(t2)])
@@ -98,12 +112,12 @@ class Zones:
     angle on the flexspline, which has turned back by theta/N.
     """
 
-    depth_mm: np.ndarray
-    cs_angle: np.ndarray
-    fs_angle: np.ndarray
+    depth_mm: Array
+    cs_angle: Array
+    fs_angle: Array
 
 
-def find_zones(errors, theta, gear=CSF):
+def find_zones(errors: BaseErrors, theta: ArrayLike, gear: Gear = CSF) -> Zones:
     """Deepest point of each zone, over both rims, at wave-generator angles `theta` (n,) (rad, unwrapped) of `gear` with
     `errors` (Jia 2021, Eqs. (16)-(23), exactly)."""
     theta = np.asarray(theta, dtype=float)
@@ -111,9 +125,10 @@ def find_zones(errors, theta, gear=CSF):
     axis_frame = _tilt_frame(errors.axis_tilt_y, errors.axis_tilt_x)
     wg_frame = _tilt_frame(errors.wg_tilt_major, errors.wg_tilt_minor)
 
-    def to_ground(vector):
+    def to_ground(vector: Array) -> Array:
         turned = np.stack([cos * vector[0] + sin * vector[1], cos * vector[1] - sin * vector[0]])
-        return axis_frame[:2, :2] @ turned + axis_frame[:2, 2:] * vector[2]
+        result: Array = axis_frame[:2, :2] @ turned + axis_frame[:2, 2:] * vector[2]
+        return result
 
     minor = to_ground(wg_frame[:, 0])
     major = to_ground(wg_frame[:, 1])
@@ -148,7 +163,7 @@ def find_zones(errors, theta, gear=CSF):
     return Zones(depth, cs_angle, fs_angle)
 
 
-def base_teeth(errors, gear=CSF):
+def base_teeth(errors: BaseErrors, gear: Gear = CSF) -> tuple[Array, Array]:
     """Per-tooth tangential deviations (mm) of both splines of `gear` with `errors`: circular spline, flexspline.
 
     One sine over each circumference, and the pitch errors that the gear was built with.
@@ -161,7 +176,7 @@ def base_teeth(errors, gear=CSF):
     )
 
 
-def at_angle(teeth_mm, angle):
+def at_angle(teeth_mm: Array, angle: Array) -> Array:
     """Deviation of a spline at `angle` (rad), interpolated between the teeth around it; the shape of `angle`.
 
     `teeth_mm` (z,) holds the deviation of each tooth, the first at 0 rad.
@@ -174,18 +189,22 @@ def at_angle(teeth_mm, angle):
     return closed[index] * (1 - part) + closed[index + 1] * part
 
 
-def zone_deviation_mm(zones, cs_teeth_mm, fs_teeth_mm, extra_depth_mm=0.0):
+def zone_deviation_mm(
+    zones: Zones, cs_teeth_mm: Array, fs_teeth_mm: Array, extra_depth_mm: Array | float = 0.0
+) -> Array:
     """Tangential deviation tau (mm) of both `zones`, shape (2, n): depth times tan(alpha), and the teeth.
 
     `cs_teeth_mm` and `fs_teeth_mm` are per-tooth deviations of both splines; `extra_depth_mm` is added to the meshing
     depth, one number or (2, n).
     """
     depth = (zones.depth_mm + extra_depth_mm) * np.tan(PRESSURE_ANGLE)
-    return depth + at_angle(cs_teeth_mm, zones.cs_angle) + at_angle(fs_teeth_mm, zones.fs_angle)
+    result: Array = depth + at_angle(cs_teeth_mm, zones.cs_angle) + at_angle(fs_teeth_mm, zones.fs_angle)
+    return result
 
 
-def kinematic_error(errors, theta, gear=CSF):
+def kinematic_error(errors: BaseErrors, theta: Array, gear: Gear = CSF) -> Array:
     """Kinematic error (rad at the output) of the base drive `gear` with `errors` at `theta` (rad): the zone that
     deviates more drives."""
     zones = find_zones(errors, theta, gear)
-    return gear.rad_per_mm(theta) * zone_deviation_mm(zones, *base_teeth(errors, gear)).max(axis=0)
+    result: Array = gear.rad_per_mm(theta) * zone_deviation_mm(zones, *base_teeth(errors, gear)).max(axis=0)
+    return result

@@ -1,16 +1,20 @@
 """Concealed physics inside the drive: teeth, rings, bearing."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
-from hdopt.bench.gears import CSF
-from hdopt.bench.geometry import at_angle
-from hdopt.bench.motion import TURN
+from hdopt.bench.arrays import Array
+from hdopt.bench.gears import CSF, Gear
+from hdopt.bench.geometry import Zones, at_angle
+from hdopt.bench.motion import TURN, Run
 from hdopt.bench.signal_chain import Hidden, Parameter
 
 
-def long_wave_array(rng, teeth, kind):
+def long_wave_array(rng: np.random.Generator, teeth: int, kind: str) -> Array:
     """Per-tooth deviation of unit rms for so many `teeth`, drawn by `rng`, without the two lowest orders, which belong
     to the base.
 
@@ -33,7 +37,8 @@ def long_wave_array(rng, teeth, kind):
     spectrum = np.fft.rfft(wave)
     spectrum[:2] = 0
     wave = np.fft.irfft(spectrum, teeth)
-    return wave / wave.std()
+    result: Array = wave / wave.std()
+    return result
 
 
 LONG_WAVE = ("harmonics", "smooth", "segments")
@@ -49,16 +54,16 @@ class LongWave(Hidden):
     scale: float = 1.0  # um rms
 
     @classmethod
-    def draw(cls, rng, on, gear=CSF):
+    def draw(cls, rng: np.random.Generator, on: str, gear: Gear = CSF) -> Self:
         kind = str(rng.choice(LONG_WAVE))
         teeth = gear.cs_teeth if on == "cs" else gear.fs_teeth
         return cls(f"{on}_tooth_harmonics", kind, tuple(long_wave_array(rng, teeth, kind)))
 
-    def teeth(self, cs_mm, fs_mm):
+    def teeth(self, cs_mm: Array, fs_mm: Array) -> tuple[Array, Array]:
         extra = np.array(self.array) * self.scale * 1e-3
         return (cs_mm + extra, fs_mm) if self.id[0] == "c" else (cs_mm, fs_mm + extra)
 
-    def truth(self):
+    def truth(self) -> dict[str, Parameter]:
         found = {"deviation_rms": Parameter(self.scale, "um")}
         amplitude = 2 * np.abs(np.fft.rfft(self.array)) / len(self.array) * self.scale
         for order in np.flatnonzero(amplitude > 0.3 * amplitude.max()):
@@ -78,21 +83,21 @@ class ToothMesh(Hidden):
     needs = frozenset({"dense"})
 
     @classmethod
-    def draw(cls, rng, gear=CSF):
+    def draw(cls, rng: np.random.Generator, gear: Gear = CSF) -> Self:
         teeth = gear.cs_teeth
         size = 1 + rng.uniform(0.05, 0.4) * rng.standard_normal(teeth)
         if rng.random() < 0.5:
             size *= 1 + rng.uniform(0.1, 0.5) * np.sin(TURN * np.arange(teeth) / teeth + rng.uniform(0, TURN))
         return cls(tuple(size), rng.uniform(-0.3, 0.3))
 
-    def depth_mm(self, run, zones):
+    def depth_mm(self, run: Run, zones: Zones) -> Array | float:
         place = zones.cs_angle * len(self.size) / TURN
         part = place - np.floor(place)
         form = np.sin(np.pi * part) ** 2 + self.skew * np.sin(TURN * part)
         tooth = np.array(self.size)[np.floor(place).astype(np.int64) % len(self.size)]
         return self.scale * 1e-3 * tooth * form
 
-    def truth(self):
+    def truth(self) -> dict[str, Parameter]:
         return {"form_height": Parameter(self.scale, "um", False)}
 
 
@@ -109,19 +114,19 @@ class LocalDefect(Hidden):
     needs = frozenset({"fine"})
 
     @classmethod
-    def draw(cls, rng, gear=CSF):
+    def draw(cls, rng: np.random.Generator, gear: Gear = CSF) -> Self:
         on = str(rng.choice(["cs", "fs"]))
         teeth = gear.cs_teeth if on == "cs" else gear.fs_teeth
         # A raised flank carries whenever it passes; a worn one only hands over to the other zone.
         return cls(on, int(rng.integers(teeth)), 1.0 if rng.random() < 0.8 else -1.0, teeth_round=teeth)
 
-    def teeth(self, cs_mm, fs_mm):
+    def teeth(self, cs_mm: Array, fs_mm: Array) -> tuple[Array, Array]:
         array = (cs_mm if self.variant == "cs" else fs_mm).copy()
         for offset, part in ((-1, 0.5), (0, 1.0), (1, 0.5)):
             array[(self.tooth + offset) % array.size] += self.sign * part * self.scale * 1e-3
         return (array, fs_mm) if self.variant == "cs" else (cs_mm, array)
 
-    def truth(self):
+    def truth(self) -> dict[str, Parameter]:
         teeth = self.teeth_round or (CSF.cs_teeth if self.variant == "cs" else CSF.fs_teeth)
         return {
             "angle_deg": Parameter(360 * self.tooth / teeth, "deg"),
@@ -140,15 +145,15 @@ class Lobing(Hidden):
     variant = "lobes"
 
     @classmethod
-    def draw(cls, rng, gear=CSF):
+    def draw(cls, rng: np.random.Generator, gear: Gear = CSF) -> Self:
         return cls(int(rng.choice([3, 4, 5, 6, 8])), rng.uniform(0, TURN))
 
-    def depth_mm(self, run, zones):
+    def depth_mm(self, run: Run, zones: Zones) -> Array | float:
         around = np.arange(720) * TURN / 720
         ring = -np.cos(self.lobes * around - self.phase)  # where the ring stands in, the mesh is deeper
         return -self.scale * 1e-3 * at_angle(ring, zones.cs_angle)
 
-    def truth(self):
+    def truth(self) -> dict[str, Parameter]:
         return {"lobes": Parameter(self.lobes, "1"), "out_of_round": Parameter(self.scale, "um")}
 
 
@@ -166,7 +171,7 @@ class BearingPass(Hidden):
     id = "bearing_pass"
 
     @classmethod
-    def draw(cls, rng, gear=CSF):
+    def draw(cls, rng: np.random.Generator, gear: Gear = CSF) -> Self:
         kind = str(rng.choice(["diameters", "pitch"]))
         balls = int(rng.integers(19, 28))
         diameter = 0.15 * rng.standard_normal(balls)
@@ -175,7 +180,7 @@ class BearingPass(Hidden):
         sharpness = rng.uniform(4, 12) if kind == "diameters" else rng.uniform(60, 150)
         return cls(kind, balls, rng.uniform(0.075, 0.13), tuple(diameter), rng.uniform(0, TURN), sharpness)
 
-    def depth_mm(self, run, zones):
+    def depth_mm(self, run: Run, zones: Zones) -> Array | float:
         r = self.ball_to_pitch
         cage = run.theta * ((1 - r) / 2 - (1 + r) / (2 * run.ratio)) + self.start
         # A ball lifts the rim when it stands at an end; between two balls the rim sags ("pitch").
@@ -190,7 +195,7 @@ class BearingPass(Hidden):
         ends = np.stack([run.theta - cage, run.theta + np.pi - cage])
         return self.scale * 1e-3 * at_angle(lift, ends)
 
-    def truth(self):
+    def truth(self) -> dict[str, Parameter]:
         return {
             # The orders of unequal balls hold no trace of how many equal ones run between them.
             "balls": Parameter(self.balls, "1", self.variant == "pitch"),

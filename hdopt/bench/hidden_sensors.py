@@ -1,22 +1,28 @@
 """Concealed physics of the measurement: encoders off-centre or ill adjusted, bent couplings, clocks apart."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from hdopt.bench.gears import CSF
+from hdopt.bench.arrays import Array
+from hdopt.bench.gears import CSF, Gear
 from hdopt.bench.geometry import ARCMIN
-from hdopt.bench.motion import TURN
+from hdopt.bench.motion import TURN, Run
 from hdopt.bench.signal_chain import Hidden, Parameter
 
 
-def _near(turned, angle):
+def _near(turned: Array, angle: Array) -> Array:
     """The value of `turned` (known up to whole turns) that lies nearest `angle`."""
     return angle + (turned - angle + np.pi) % TURN - np.pi
 
 
-def off_centre_reading(angle, eccentricity, direction, stretch=0.0, stretch_direction=0.0):
+def off_centre_reading(
+    angle: Array, eccentricity: float, direction: float, stretch: float = 0.0, stretch_direction: float = 0.0
+) -> Array:
     """Angle read by one head off a code disc whose pattern is off-centre (share of its radius) and oval.
 
     `eccentricity` is a share of the disc's radius, `direction` (rad) where the pattern's centre lies; `stretch` is by
@@ -42,28 +48,28 @@ class Eccentricity(Hidden):
     scale: float = 0.1  # amplitude in the kinematic error, arcmin
 
     @classmethod
-    def draw(cls, rng, on, gear=CSF):
+    def draw(cls, rng: np.random.Generator, on: str, gear: Gear = CSF) -> Self:
         oval = on == "output" and rng.random() < 0.3
         share = rng.uniform(0.3, 0.8) if oval else 0.0
         name = f"encoder_{on}_eccentricity"
         return cls(name, "centre and oval" if oval else "centre", rng.uniform(0, TURN), share, rng.uniform(0, TURN))
 
     @property
-    def _at_input(self):
+    def _at_input(self) -> bool:
         return self.id == "encoder_input_eccentricity"
 
-    def read_input(self, angle, run):
+    def read_input(self, angle: Array, run: Run) -> Array:
         if not self._at_input:
             return angle
         return off_centre_reading(angle, self.scale * ARCMIN * run.ratio, self.direction)
 
-    def read_output(self, angle, run):
+    def read_output(self, angle: Array, run: Run) -> Array:
         if self._at_input:
             return angle
         size = self.scale * ARCMIN
         return off_centre_reading(angle, size, self.direction, 2 * size * self.oval_share, self.oval_direction)
 
-    def truth(self):
+    def truth(self) -> dict[str, Parameter]:
         return {"amplitude_arcmin": Parameter(self.scale, "arcmin")}
 
 
@@ -83,24 +89,24 @@ class Interpolation(Hidden):
     needs = frozenset({"fine"})
 
     @classmethod
-    def draw(cls, rng, gear=CSF):
+    def draw(cls, rng: np.random.Generator, gear: Gear = CSF) -> Self:
         on = str(rng.choice(["input", "output"]))
         lines = rng.choice([8, 16, 20, 32]) if on == "input" else rng.choice([500, 720, 1000, 1024, 2048, 2500])
         return cls(on, int(lines), tuple(rng.uniform(-1, 1, 2)), rng.uniform(-1, 1), rng.uniform(-1, 1))
 
-    def read(self, angle):
+    def read(self, angle: Array) -> Array:
         electrical = self.lines * angle
         a = (1 + self.scale * self.gain) * np.cos(electrical) + self.scale * self.offset[0]
         b = np.sin(electrical + self.scale * self.skew) + self.scale * self.offset[1]
         return _near(np.arctan2(b, a), electrical) / self.lines
 
-    def read_input(self, angle, run):
+    def read_input(self, angle: Array, run: Run) -> Array:
         return self.read(angle) if self.variant == "input" else angle
 
-    def read_output(self, angle, run):
+    def read_output(self, angle: Array, run: Run) -> Array:
         return self.read(angle) if self.variant == "output" else angle
 
-    def truth(self):
+    def truth(self) -> dict[str, Parameter]:
         return {"lines": Parameter(self.lines, "1")}
 
 
@@ -116,24 +122,25 @@ class Coupling(Hidden):
     scale_range = (1e-4, 15.0**2)
 
     @classmethod
-    def draw(cls, rng, gear=CSF):
+    def draw(cls, rng: np.random.Generator, gear: Gear = CSF) -> Self:
         return cls(str(rng.choice(["input", "output"], p=[0.25, 0.75])), rng.uniform(0, TURN), ratio=gear.ratio)
 
     @property
-    def bend(self):
-        return np.deg2rad(np.sqrt(self.scale))
+    def bend(self) -> float:
+        result: float = np.deg2rad(np.sqrt(self.scale))
+        return result
 
-    def read(self, angle):
+    def read(self, angle: Array) -> Array:
         turned = angle - self.direction
         return _near(np.arctan2(np.cos(self.bend) * np.sin(turned), np.cos(turned)), turned) + self.direction
 
-    def read_input(self, angle, run):
+    def read_input(self, angle: Array, run: Run) -> Array:
         return self.read(angle) if self.variant == "input" else angle
 
-    def read_output(self, angle, run):
+    def read_output(self, angle: Array, run: Run) -> Array:
         return self.read(angle) if self.variant == "output" else angle
 
-    def truth(self):
+    def truth(self) -> dict[str, Parameter]:
         amplitude = np.tan(self.bend / 2) ** 2 / ARCMIN / (self.ratio if self.variant == "input" else 1)
         return {
             "amplitude_arcmin": Parameter(float(amplitude), "arcmin"),
@@ -152,22 +159,22 @@ class ChannelDelay(Hidden):
     scale_range = (1e-7, 1.0)
 
     @classmethod
-    def draw(cls, rng, gear=CSF):
+    def draw(cls, rng: np.random.Generator, gear: Gear = CSF) -> Self:
         return cls(str(rng.choice(["output late", "input late"])))
 
-    def scale_for(self, rms, speed):
+    def scale_for(self, rms: float, speed: float) -> float:
         """Scale that gives `rms` (rad) in a test back and forth at `speed` (rad/s) of the output."""
         return rms / speed
 
-    def clock(self, time, input_angle, output_angle):
+    def clock(self, time: Array, input_angle: Array, output_angle: Array) -> tuple[Array, Array]:
         late = time - self.scale
         if self.variant == "output late":
             return input_angle, _hold_ends(time, output_angle, late)
         return _hold_ends(time, input_angle, late), output_angle
 
-    def truth(self):
+    def truth(self) -> dict[str, Parameter]:
         return {"delay_s": Parameter(self.scale if self.variant == "output late" else -self.scale, "s")}
 
 
-def _hold_ends(time, angle, when):
+def _hold_ends(time: Array, angle: Array, when: Array) -> Array:
     return CubicSpline(time, angle)(np.clip(when, time[0], time[-1]))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
 from hdopt.bench import loops
+from hdopt.bench.arrays import Array
 from hdopt.bench.geometry import ARCMIN
 from hdopt.bench.motion import Plan, Run
 
@@ -29,15 +31,15 @@ class Instrument:
     blanks: float  # share of rows with a value missing
 
     @property
-    def noise_keep(self):
+    def noise_keep(self) -> float:
         return float(np.exp(-1 / self.noise_length)) if self.noise_length > 0.1 else 0.0
 
-    def effective(self, samples):
+    def effective(self, samples: float) -> float:
         """Number of independent samples that the coloured noise leaves of `samples`."""
         return samples * (1 - self.noise_keep) / (1 + self.noise_keep)
 
 
-def draw_instrument(rng, recordings, trouble=frozenset()):
+def draw_instrument(rng: np.random.Generator, recordings: int, trouble: Set[str] = frozenset()) -> Instrument:
     """A measuring chain for so many `recordings`, drawn by `rng`.
 
     `trouble` may hold "coloured" (more noise, correlated over 20 to 150 samples), "gaps" (rows and values missing),
@@ -67,7 +69,7 @@ def record(
     plan: Plan,
     run: Run,
     angles: tuple[np.ndarray, np.ndarray],
-    torque: np.ndarray,
+    torque: Array,
     rng: np.random.Generator,
 ) -> tuple[pd.DataFrame, np.ndarray]:
     """Recording `rank` as a table, and its noise (rad of kinematic error, mean removed).
@@ -95,11 +97,11 @@ def record(
     return _with_gaps(instrument, pd.DataFrame(columns), rng), error - error.mean()
 
 
-def _quantised(angle_deg, step_deg):
+def _quantised(angle_deg: Array, step_deg: float) -> Array:
     return np.round(np.floor(angle_deg / step_deg + 0.5) * step_deg, 7)
 
 
-def _with_gaps(instrument, table, rng):
+def _with_gaps(instrument: Instrument, table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
     if instrument.gaps:
         keep = np.ones(len(table), bool)
         for _ in range(instrument.gaps):

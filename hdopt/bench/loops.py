@@ -1,11 +1,15 @@
 """Path-dependent elements, stepped along the samples."""
 
+from __future__ import annotations
+
 import numba
 import numpy as np
 
+from hdopt.bench.arrays import Array
+
 
 @numba.njit(cache=True)
-def play(position, gap):
+def play(position: Array, gap: Array) -> Array:
     """Follower (n,) of a play (backlash) operator on a path `position` (n,), whose full width `gap` (n,), in the unit
     of the path, may change from sample to sample. It starts at the side that the first twenty samples press against."""
     follower = np.empty_like(position)
@@ -17,7 +21,7 @@ def play(position, gap):
 
 
 @numba.njit(cache=True)
-def maxwell_slip(position, slip, weight):
+def maxwell_slip(position: Array, slip: Array, weight: Array) -> Array:
     """Force (n,) of Jenkins elements in parallel along a path `position` (n,): element k slips at a deflection of
     `slip`[k], in the unit of the path, with a force `weight`[k]. All start without deflection."""
     force = np.empty_like(position)
@@ -35,7 +39,7 @@ def maxwell_slip(position, slip, weight):
 
 
 @numba.njit(cache=True)
-def bouc_wen(position, length, exponent, beta):
+def bouc_wen(position: Array, length: float, exponent: float, beta: float) -> Array:
     """Bouc-Wen force z (n,) along a path `position` x (n,), +-1 when it slips.
 
     dz/dx = (1 - |z|^n (1 - beta + beta sign(z dx)))/`length`, n the `exponent`, `beta` how much unloading differs.
@@ -60,7 +64,7 @@ def bouc_wen(position, length, exponent, beta):
 
 
 @numba.njit(cache=True)
-def first_order_noise(white, keep):
+def first_order_noise(white: Array, keep: float) -> Array:
     """AR(1) noise of unit variance from `white` noise (n,) of unit variance; `keep` (0 to 1) is what a sample keeps of
     the one before."""
     coloured = np.empty_like(white)

@@ -48,8 +48,8 @@ OPEN_DEFINITIONS = ("transition_deg", "angle_deg")
 SIGN_FREE = ("delay_s",)
 
 
-def check_answer(answer):
-    """What is wrong with an answer by the contract, or ""."""
+def check_answer(answer: Any) -> str:
+    """What is wrong with an `answer` by the contract, or ""; Any, because whoever answers may write what he likes."""
     if answer is None:
         return "no answer"
     if not isinstance(answer, dict) or answer.get("schema") != 1:
@@ -73,7 +73,7 @@ def check_answer(answer):
     return ""
 
 
-def explanations(answer):
+def explanations(answer: dict[str, Any]) -> list[frozenset[str]]:
     """Sets of effects that the answer offers, the best first."""
     if answer["verdict"] not in ("named", "ambiguous"):
         return []
@@ -150,7 +150,7 @@ def improvement(answer: dict[str, Any], key: dict[str, Any]) -> tuple[float, boo
     return float(min(relative, absolute, 1.0)), bool(said < 0.8 * noise)
 
 
-def covered(parameter, name, truth):
+def covered(parameter: dict[str, Any], name: str, truth: dict[str, Any]) -> bool:
     """Whether the interval of a stated `parameter` (its low and high) holds the value of the key's `truth`.
 
     By its `name` an angle counts modulo 360 deg, and of a delay only the size counts. An interval without ends does not

@@ -1,10 +1,14 @@
 """Test plans and what the motor, the load and the surroundings do in them, sample by sample."""
 
+from __future__ import annotations
+
+from collections.abc import Set
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter
 
+from hdopt.bench.arrays import Array
 from hdopt.bench.geometry import RATIO
 
 TURN = 2 * np.pi
@@ -54,60 +58,63 @@ class Plan:
 class Run:
     """True state of the bench at the sampling instants (s, rad, rad/s, Nm, K)."""
 
-    time: np.ndarray
-    theta: np.ndarray
-    speed: np.ndarray
-    torque: np.ndarray
-    body_k: np.ndarray
+    time: Array
+    theta: Array
+    speed: Array
+    torque: Array
+    body_k: Array
     ratio: float = RATIO
 
     @property
-    def step(self):
-        return (self.time[-1] - self.time[0]) / (self.time.size - 1)
+    def step(self) -> float:
+        result: float = (self.time[-1] - self.time[0]) / (self.time.size - 1)
+        return result
 
 
-def run(plan, jitter, rng, ratio=RATIO):
+def run(plan: Plan, jitter: float, rng: np.random.Generator, ratio: float = RATIO) -> Run:
     """Drive one `plan` of a gear of `ratio`; chance comes from `rng`.
 
     `jitter` is the clock's random error in units of the sampling step, equal for both channels.
     """
     top = max(rpm for _, rpm in plan.legs) * TURN / 60
     step = TURN / top / plan.samples_per_turn
-    speed = np.concatenate([_leg(turns, rpm, plan.ramp_turns, step) for turns, rpm in plan.legs])
+    speed: Array = np.concatenate([_leg(turns, rpm, plan.ramp_turns, step) for turns, rpm in plan.legs])
     speed = speed * _stepped(plan.speed_steps, speed.size)
     nominal = _integral(speed, step)
     ripple = sum(a * np.cos(order * nominal + phase) for order, a, phase in plan.ripple)
     speed = speed * (1 + ripple)
     theta = plan.start + _integral(speed, step)
-    time = np.arange(speed.size) * step
+    time: Array = np.asarray(np.arange(speed.size) * step, float)
     error = jitter * step * np.clip(rng.standard_normal(speed.size), -3, 3)
     theta = theta + error * (speed + 0.5 * error * np.gradient(speed, step))
     return Run(time, theta, speed, _torque(plan, time, theta / ratio), _body(plan, time), ratio)
 
 
-def _stepped(levels, samples):
+def _stepped(levels: tuple[float, ...], samples: int) -> Array | float:
     """Share of the set speed at every sample: `levels` of equal length, each reached within a fortieth of it."""
     if not levels:
         return 1.0
     place = np.linspace(0, len(levels), samples)
     edges = np.repeat(np.arange(1, len(levels)), 2) + np.tile([-0.0125, 0.0125], len(levels) - 1)
-    return np.interp(place, edges, np.repeat(levels, 2)[1:-1])
+    result: Array | float = np.interp(place, edges, np.repeat(levels, 2)[1:-1])
+    return result
 
 
-def _leg(turns, rpm, ramp_turns, step):
+def _leg(turns: float, rpm: float, ramp_turns: float, step: float) -> Array:
     """Trapezoid of speed (rad/s): ramp, constant, ramp."""
     top = rpm * TURN / 60
     ramp = 2 * ramp_turns * TURN / top
     hold = max(abs(turns) * TURN / top - ramp, 0)
     t = np.arange(round((hold + 2 * ramp) / step) + 1) * step
-    return np.sign(turns) * top * np.clip(np.minimum(t, hold + 2 * ramp - t) / ramp, 0, 1)
+    result: Array = np.sign(turns) * top * np.clip(np.minimum(t, hold + 2 * ramp - t) / ramp, 0, 1)
+    return result
 
 
-def _integral(values, step):
+def _integral(values: Array, step: float) -> Array:
     return np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))]) * step
 
 
-def _torque(plan, time, output):
+def _torque(plan: Plan, time: Array, output: Array) -> Array:
     load = plan.torque
     if load is None:
         return np.zeros_like(time)
@@ -121,10 +128,11 @@ def _torque(plan, time, output):
         rank = np.floor(2 * cycles).astype(int)
         blend = np.clip((2 * cycles - rank) * 20, 0, 1)
         wave = levels[rank] * (1 - blend) + levels[rank + 1] * blend
-    return load.offset_nm + load.amplitude_nm * wave
+    result: Array = load.offset_nm + load.amplitude_nm * wave
+    return result
 
 
-def _body(plan, time):
+def _body(plan: Plan, time: Array) -> Array:
     heat = plan.heat
     if heat is None:
         return np.zeros_like(time)
@@ -133,7 +141,7 @@ def _body(plan, time):
     return lfilter([1 - keep], [1, -keep], power)
 
 
-def _draw_samples_per_turn(rng, needs, size, several, ratio):
+def _draw_samples_per_turn(rng: np.random.Generator, needs: Set[str], size: str, several: bool, ratio: float) -> float:
     teeth = max(1.0, ratio / RATIO)  # more teeth a turn than the shipped drive's take more samples
     if "dense" in needs:
         return rng.uniform(390, 420) * teeth
@@ -143,7 +151,13 @@ def _draw_samples_per_turn(rng, needs, size, several, ratio):
     return {"brief": BRIEF_SAMPLES, "long": LONG_SAMPLES}.get(size, samples)
 
 
-def draw_plans(rng, needs=frozenset(), size="full", ratio=RATIO, turns=0.0):
+def draw_plans(
+    rng: np.random.Generator,
+    needs: Set[str] = frozenset(),
+    size: str = "full",
+    ratio: float = RATIO,
+    turns: float = 0.0,
+) -> tuple[Plan, ...]:
     """Plans (a tuple, one a recording) of one case, drawn by `rng`; of `turns` input turns, where these are given.
 
     `needs` is what the physics demands of the record; everything else is drawn at random.
@@ -199,7 +213,7 @@ def draw_plans(rng, needs=frozenset(), size="full", ratio=RATIO, turns=0.0):
     return tuple(plans)
 
 
-def _draw_legs(rng, turns, rpm, reversal):
+def _draw_legs(rng: np.random.Generator, turns: float, rpm: float, reversal: bool) -> tuple[tuple[float, float], ...]:
     legs = [(turns, rpm)]
     if reversal:
         if rng.random() < 0.5:  # short strokes first: more reversals to look at
@@ -210,19 +224,19 @@ def _draw_legs(rng, turns, rpm, reversal):
     return tuple((sign * t, r) for t, r in legs)
 
 
-def draw_ripple(rng, size):
+def draw_ripple(rng: np.random.Generator, size: float) -> tuple[tuple[float, float, float], ...]:
     """Ripple of the motor's speed, drawn by `rng`: (order, relative amplitude, phase) of the orders 1, 2 and 6, the
     amplitudes up to `size` and falling with the root of the order."""
     return tuple((k, size * rng.uniform(0.2, 1) / np.sqrt(k), rng.uniform(0, TURN)) for k in (1, 2, 6))
 
 
-def _draw_torque(rng):
+def _draw_torque(rng: np.random.Generator) -> Torque:
     shape = rng.choice(["sweep", "pendulum", "steps"])
     period = rng.uniform(0.07, 0.3)
     return Torque(str(shape), rng.uniform(2, 30), rng.uniform(-0.3, 0.3), period, rng.uniform(0, TURN))
 
 
-def _draw_heat(rng, needs, size, longest_s):
+def _draw_heat(rng: np.random.Generator, needs: Set[str], size: str, longest_s: float) -> tuple[Heat | None, bool]:
     constant = "warm-up" in needs
     if constant or "temperature" in needs:
         logged = not constant

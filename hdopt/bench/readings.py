@@ -64,8 +64,8 @@ def through(reading: str, instrument: Instrument) -> Instrument:
     if reading in BITS:
         return replace(instrument, output_step_deg=360 / 2.0 ** BITS[reading])
     if reading == "long and clean":
-        steps = {"input_step_deg": 360 / 2.0**17, "output_step_deg": 360 / 2.0**22}
-        return replace(instrument, noise_arcmin=CLEAN_ARCMIN, noise_length=0.0, jitter=0.0, skew=0.0, **steps)
+        fine = replace(instrument, input_step_deg=360 / 2.0**17, output_step_deg=360 / 2.0**22)
+        return replace(fine, noise_arcmin=CLEAN_ARCMIN, noise_length=0.0, jitter=0.0, skew=0.0)
     return instrument
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from hdopt.bench import loops
+from hdopt.bench.arrays import Array
 from hdopt.bench.cases import CATALOGUE, scaled_to
 from hdopt.bench.geometry import ARCMIN, draw_errors
 from hdopt.bench.motion import draw_plans, run
@@ -26,29 +27,29 @@ BLOCK = 100
 class RealResidual:
     """What is left of one real recording: time (s), input angle (rad), residual (arcmin), gear ratio."""
 
-    time: np.ndarray
-    input_angle: np.ndarray
-    residual: np.ndarray
+    time: Array
+    input_angle: Array
+    residual: Array
     ratio: float
 
     @property
-    def rms(self):
+    def rms(self) -> float:
         return float(np.std(self.residual))
 
 
-def friction(real, rng):
+def friction(real: RealResidual, rng: np.random.Generator) -> Array:
     """Maxwell slip of unit half loop on the motion of `real`, over a fifth to half a degree of output by `rng`."""
     slip = np.deg2rad(0.5 * rng.uniform(0.2, 0.5)) * np.geomspace(0.3, 2, 8)
     return -loops.maxwell_slip(real.input_angle / real.ratio, slip, np.full(8, 1 / 8))
 
 
-def play(real, rng):
+def play(real: RealResidual, rng: np.random.Generator) -> Array:
     """A follower in a play of one arcmin on the motion of `real`; nothing in it is left to `rng`."""
     position = real.input_angle / real.ratio
     return (loops.play(position, np.full(position.size, ARCMIN)) - position) / ARCMIN
 
 
-def delay(real, rng):
+def delay(real: RealResidual, rng: np.random.Generator) -> Array:
     """The output read a millisecond before the input, by interpolation in the recording `real`; `rng` has no part."""
     output = real.input_angle / real.ratio
     return (output - np.interp(real.time + 1e-3, real.time, output)) / ARCMIN
@@ -77,7 +78,7 @@ def on_real_motion(real: RealResidual, effect: str, severity: float, rng: np.ran
     )
 
 
-def prolonged(residual, samples, rng):
+def prolonged(residual: Array, samples: int, rng: np.random.Generator) -> Array:
     """`samples` values made of blocks of a real `residual` (m,), drawn by `rng`, a hundred long on average; unit rms.
 
     The stationary bootstrap (Politis, Romano, J. Am. Stat. Assoc. 89, 1994): colour and steps stay, and no line comes
@@ -88,11 +89,12 @@ def prolonged(residual, samples, rng):
     start = rng.integers(residual.size, size=samples)
     begun = np.maximum.accumulate(np.where(fresh, np.arange(samples), 0))
     series = residual[(start[begun] + np.arange(samples) - begun) % residual.size]
-    return (series - series.mean()) / series.std()
+    result: Array = (series - series.mean()) / series.std()
+    return result
 
 
 def on_simulated_drive(
-    residual: np.ndarray, effect: str, severity: float, noise_share: float, rng: np.random.Generator
+    residual: Array, effect: str, severity: float, noise_share: float, rng: np.random.Generator
 ) -> tuple[pd.DataFrame, ...]:
     """Tables of a bench run whose noise is `residual`, `noise_share` x the base's rms, with `effect` ("" for none) at
     `severity` x the base's rms in it.

@@ -4,15 +4,20 @@ Answers are JSON files DIR/answers/<id>.json as `hdopt diagnose --json` writes t
 The keys and answers of a registered run lie beside the register (`registry`), so that anyone can score them again.
 """
 
+from __future__ import annotations
+
 import argparse
 import itertools
 import json
 from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from hdopt.bench import registry, thresholds
+from hdopt.bench.arrays import Array
 from hdopt.bench.marking import (
     CLAIMS,
     COMPARED,
@@ -27,20 +32,26 @@ from hdopt.bench.marking import (
 )
 from hdopt.bench.scores import Bin, CaseScore, Rate, Scores
 
-INVALID = {"verdict": "invalid", "effects": []}
+Record: TypeAlias = dict[str, Any]
+"""An answer or a key as JSON has it, with values of several types."""
+
+INVALID: Record = {"verdict": "invalid", "effects": []}
 
 
-def score(answers, keys, raised=None):
+def score(answers: Mapping[str, Record], keys: Sequence[Record], raised: Mapping[str, str] | None = None) -> Scores:
     """Scores of `answers` (id -> contract dictionary) against `keys` (dictionaries as the generator seals them).
 
     `raised` (id -> message) says of cases without an answer why there is none.
     """
     excused = undecidable(keys)
-    cases, invalid, coverage, statements = [], [], defaultdict(list), []
+    cases: list[CaseScore] = []
+    invalid: list[str] = []
+    coverage: defaultdict[str, list[bool]] = defaultdict(list)
+    statements: list[tuple[float, bool]] = []
     for key in keys:
         answer = answers.get(key["id"])
         problem = (raised or {}).get(key["id"]) or check_answer(answer)
-        if problem:
+        if answer is None or problem:
             invalid.append(f"{key['id']}: {problem}")
             cases.append(_case(key, INVALID, (0.0, problem), key["id"] in excused))
             continue
@@ -51,12 +62,12 @@ def score(answers, keys, raised=None):
     return _collect(tuple(cases), tuple(invalid), coverage, statements, keys)
 
 
-def _statements(answer, key):
+def _statements(answer: Record, key: Record) -> list[tuple[float, bool]]:
     true = {*key["effects"], *key["beside_true"]}
     return [(effect["confidence"], effect["id"] in true) for effect in answer["effects"]]
 
 
-def _cover(answer, key, coverage):
+def _cover(answer: Record, key: Record, coverage: dict[str, list[bool]]) -> None:
     for effect in answer["effects"]:
         for name, truth in key["parameters"].get(effect["id"], {}).items():
             stated = (effect.get("parameters") or {}).get(name)
@@ -64,7 +75,7 @@ def _cover(answer, key, coverage):
                 coverage[f"{effect['id']}.{name}"].append(covered(stated, name, truth))
 
 
-def _case(key, answer, marked, excused):
+def _case(key: Record, answer: Record, marked: tuple[float, str], excused: bool) -> CaseScore:
     valid = answer["verdict"] != "invalid"
     measured = key["effects"] and key["detectable"] and not key["built"]
     gain, below = improvement(answer, key) if measured else (float("nan"), False)
@@ -89,7 +100,13 @@ def _case(key, answer, marked, excused):
     )
 
 
-def _collect(cases, invalid, coverage, statements, keys):
+def _collect(
+    cases: tuple[CaseScore, ...],
+    invalid: tuple[str, ...],
+    coverage: Mapping[str, list[bool]],
+    statements: Sequence[tuple[float, bool]],
+    keys: Sequence[Record],
+) -> Scores:
     empty = [case for case in cases if case.nothing]
     hidden = [case for case in cases if case.truth]
     grave = [case for case in hidden if case.severity >= thresholds.EXACT_SET_FROM_SEVERITY]
@@ -127,39 +144,42 @@ def _collect(cases, invalid, coverage, statements, keys):
     )
 
 
-def _rate(hits):
-    hits = list(hits)
-    return Rate(int(sum(hits)), len(hits))
+def _rate(hits: Iterable[bool]) -> Rate:
+    counted = list(hits)
+    return Rate(int(sum(counted)), len(counted))
 
 
-def _by(cases, group, hit):
-    groups = defaultdict(list)
+def _by(
+    cases: Iterable[CaseScore], group: Callable[[CaseScore], Any], hit: Callable[[CaseScore], bool]
+) -> dict[Any, Rate]:
+    """Rates by group; Any, because a group may be a name or a pair of numbers."""
+    groups: defaultdict[Any, list[bool]] = defaultdict(list)
     for case in cases:
         groups[group(case)].append(hit(case))
     return {name: _rate(hits) for name, hits in sorted(groups.items())}
 
 
-def _calibration_error(bins):
+def _calibration_error(bins: Sequence[Bin]) -> float:
     """Mean distance of stated confidence from observed frequency; rounded, so that a limit can be met exactly."""
     total = sum(b.right.n for b in bins)
     return round(sum(b.right.n * abs(b.stated - b.right.value) for b in bins) / total, 9) if total else float("nan")
 
 
-def _log_score(statements):
+def _log_score(statements: Sequence[tuple[float, bool]]) -> tuple[float, float]:
     """Mean log probability of what came true, as stated and of the best constant; NaN where nothing was stated."""
     if not statements:
         return float("nan"), float("nan")
     least = thresholds.LEAST_CONFIDENCE
     right = np.array([hit for _, hit in statements], float)
 
-    def mean_log(stated):
+    def mean_log(stated: Array) -> float:
         p = np.clip(stated, least, 1 - least)
         return float(np.mean(right * np.log(p) + (1 - right) * np.log(1 - p)))
 
     return mean_log(np.array([c for c, _ in statements])), mean_log(np.full(right.size, right.mean()))
 
 
-def _reliability(statements):
+def _reliability(statements: Sequence[tuple[float, bool]]) -> tuple[Bin, ...]:
     edges = thresholds.RELIABILITY_BINS
     bins = []
     for low, high in itertools.pairwise(edges):
@@ -170,7 +190,7 @@ def _reliability(statements):
     return tuple(bins)
 
 
-def read(folder, answers=None):
+def read(folder: str | Path, answers: str | Path | None = None) -> tuple[dict[str, Record], list[Record]]:
     """Answers and keys of a proof's `folder`, or of the folder `answers`. Refuses keys that are not those sealed when
     the cases were written."""
     folder = Path(folder)
@@ -180,7 +200,7 @@ def read(folder, answers=None):
         raise ValueError(
             f"{folder / 'sealed' / 'keys.jsonl'} is not what was sealed (sha256 {checksum}): generate anew"
         )
-    found = {}
+    found: dict[str, Record] = {}
     for path in sorted(Path(answers or folder / "answers").glob("*.json")):
         try:
             found[path.stem] = json.loads(path.read_text())
@@ -189,7 +209,7 @@ def read(folder, answers=None):
     return found, [json.loads(line) for line in text.splitlines()]
 
 
-def main(arguments=None):
+def main(arguments: Sequence[str] | None = None) -> int:
     """Score what `arguments` name and print all of it; status 0 where the gate is passed."""
     parser = argparse.ArgumentParser(prog="python -m hdopt.bench.score", description=__doc__)
     source = parser.add_mutually_exclusive_group(required=True)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 from scipy.stats import beta
@@ -19,10 +21,10 @@ class Rate:
     n: int
 
     @property
-    def value(self):
+    def value(self) -> float:
         return self.hits / self.n if self.n else float("nan")
 
-    def _bound(self, upper, level):
+    def _bound(self, upper: bool, level: float) -> float:
         if not self.n:
             return 1.0 if upper else 0.0
         if upper:
@@ -30,11 +32,11 @@ class Rate:
         return 0.0 if self.hits == 0 else float(beta.ppf(1 - level, self.hits, self.n - self.hits + 1))
 
     @property
-    def upper_bound(self):
+    def upper_bound(self) -> float:
         return self._bound(True, t.CONFIDENCE)
 
     @property
-    def interval(self):
+    def interval(self) -> tuple[float, float]:
         level = 0.5 + t.CONFIDENCE / 2
         return self._bound(False, level), self._bound(True, level)
 
@@ -62,7 +64,7 @@ class CaseScore:
     below_noise: bool
 
     @property
-    def nothing(self):
+    def nothing(self) -> bool:
         """Whether nothing is hidden in it."""
         return not self.truth and not self.outside
 
@@ -119,9 +121,9 @@ class Scores:
         return tuple(case for case in self.cases if case.credit < 1)
 
     @property
-    def coverage_by_effect(self):
+    def coverage_by_effect(self) -> dict[str, Rate]:
         """Share of intervals that hold the truth, by effect."""
-        found = {}
+        found: dict[str, Rate] = {}
         for name, rate in self.coverage_by_parameter.items():
             effect = name.split(".")[0]
             before = found.get(effect, Rate(0, 0))
@@ -150,7 +152,7 @@ class Scores:
             Criterion("enough cases", float(self._enough), 1.0, self._enough, f"{len(self.cases)} cases"),
         )
 
-    def _stated(self):
+    def _stated(self) -> tuple[Criterion, ...]:
         """Criteria of what an answer states of itself: intervals and confidences."""
         low, high = t.COVERAGE
         off = [n for n, r in self.coverage_by_effect.items() if r.n and not _overlap(r.interval, t.COVERAGE)]
@@ -176,7 +178,7 @@ class Scores:
         )
 
     @property
-    def _enough(self):
+    def _enough(self) -> bool:
         counts = {"nothing hidden": self.false_alarms.n}
         counts |= {family: rate.n for family, rate in self.families.items()}
         least = all(counts.get(family, 0) >= n for family, n in t.LEAST.items())
@@ -187,11 +189,11 @@ class Scores:
         """Whether every criterion of the gate holds."""
         return all(criterion.passed for criterion in self.gate())
 
-    def to_frame(self):
+    def to_frame(self) -> pd.DataFrame:
         """The gate, a row a criterion."""
         return pd.DataFrame([criterion.__dict__ for criterion in self.gate()]).set_index("name")
 
-    def cases_frame(self):
+    def cases_frame(self) -> pd.DataFrame:
         """A row a case."""
         return pd.DataFrame([case.__dict__ for case in self.cases]).set_index("id")
 
@@ -234,7 +236,7 @@ class Scores:
             parts.append(f"failed cases: {len(self.failed)} of {len(self.cases)}\n" + self._failed_rows())
         return "\n\n".join(parts)
 
-    def _failed_rows(self):
+    def _failed_rows(self) -> str:
         columns = ["family", "gear", "severity", "truth", "hidden", "verdict", "said", "told_apart", "reason"]
         if not self.failed:
             return ""
@@ -244,18 +246,19 @@ class Scores:
         return failed.to_string()
 
 
-def _at_most(name, rate, limit, bound=False):
+def _at_most(name: str, rate: Rate, limit: float, bound: bool = False) -> Criterion:
     value = rate.upper_bound if bound else rate.value
     return Criterion(name, value, limit, value <= limit, f"{rate.hits} of {rate.n}")
 
 
-def _at_least(name, rate, limit):
+def _at_least(name: str, rate: Rate, limit: float) -> Criterion:
     return Criterion(name, rate.value, limit, rate.value >= limit, f"{rate.hits} of {rate.n}")
 
 
-def _overlap(one, other):
+def _overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
     return one[0] <= other[1] and other[0] <= one[1]
 
 
-def _rows(table):
+def _rows(table: Mapping[Any, Rate]) -> str:
+    """A line a rate; Any, because a rate may stand under a name, a number or a pair of them."""
     return "\n".join(f"  {name!s:44s} {rate.value:6.3f}  {rate.hits} of {rate.n}" for name, rate in table.items())

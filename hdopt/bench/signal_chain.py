@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Self
 
 import numpy as np
 
+from hdopt.bench.arrays import Array
 from hdopt.bench.gears import CSF, Gear
 from hdopt.bench.geometry import BaseErrors, Zones, base_teeth, find_zones, zone_deviation_mm
-from hdopt.bench.motion import Run
+from hdopt.bench.motion import Plan, Run
 
 
 @dataclass(frozen=True)
@@ -27,40 +28,49 @@ class Hidden:
 
     id: str  # of the catalogue; empty outside it
     variant: str
-    needs = frozenset()
-    torque_gain = 1.0
+    scale: float
     scale_range = (1e-4, 1e4)
 
-    def for_plans(self, plans):
+    @property
+    def needs(self) -> frozenset[str]:
+        """What it demands of the record, in the words of `draw_plans`."""
+        return frozenset()
+
+    @property
+    def torque_gain(self) -> float:
+        """By how much it takes more load than was drawn."""
+        return 1.0
+
+    def for_plans(self, plans: Sequence[Plan]) -> Self:
         """The same physics, with what depends on the test's conditions set."""
         return self
 
-    def scaled(self, scale):
+    def scaled(self, scale: float) -> Self:
         """The same physics, `scale` times as large as it was drawn."""
-        return replace(self, scale=scale)
+        return replace(self, scale=scale)  # type: ignore[type-var]  # every physics is a record with a scale
 
-    def teeth(self, cs_mm, fs_mm):
+    def teeth(self, cs_mm: Array, fs_mm: Array) -> tuple[Array, Array]:
         """Per-tooth deviations (mm) with this physics in them."""
         return cs_mm, fs_mm
 
-    def depth_mm(self, run, zones):
+    def depth_mm(self, run: Run, zones: Zones) -> Array | float:
         """Extra meshing depth (mm) of both zones."""
         return 0.0
 
-    def lag(self, run, ke):
+    def lag(self, run: Run, ke: Array) -> Array | float:
         """Extra lag (rad) of the output behind input/N - `ke`."""
         return 0.0
 
-    def read_input(self, angle, run):
+    def read_input(self, angle: Array, run: Run) -> Array:
         return angle
 
-    def read_output(self, angle, run):
+    def read_output(self, angle: Array, run: Run) -> Array:
         return angle
 
-    def clock(self, time, input_angle, output_angle):
+    def clock(self, time: Array, input_angle: Array, output_angle: Array) -> tuple[Array, Array]:
         return input_angle, output_angle
 
-    def truth(self):
+    def truth(self) -> dict[str, Parameter]:
         """Parameters, name to Parameter."""
         return {}
 
@@ -75,19 +85,19 @@ class Setup:
     gear: Gear = CSF
 
 
-def set_up(errors, run, gear=CSF):
+def set_up(errors: BaseErrors, run: Run, gear: Gear = CSF) -> Setup:
     """One recording's `run` with the zones of `gear` with `errors` along it."""
     return Setup(run, find_zones(errors, run.theta, gear), errors, gear)
 
 
-def read_angles(setup: Setup, hidden: Sequence[Any] = ()) -> tuple[np.ndarray, np.ndarray]:
+def read_angles(setup: Setup, hidden: Sequence[Hidden] = ()) -> tuple[Array, Array]:
     """Input and output angles (n,) (rad) of the recording `setup` as ideal electronics would read them, with the
     `hidden` physics in place, in the order of the chain: load, teeth, depth, lag, encoders, clock."""
     run = setup.run
     gain = np.prod([physics.torque_gain for physics in hidden])
     run = replace(run, torque=run.torque * gain)
     cs_mm, fs_mm = base_teeth(setup.errors, setup.gear)
-    extra = 0.0
+    extra: Array | float = 0.0
     for physics in hidden:
         cs_mm, fs_mm = physics.teeth(cs_mm, fs_mm)
         extra = extra + physics.depth_mm(run, setup.zones)
@@ -102,19 +112,20 @@ def read_angles(setup: Setup, hidden: Sequence[Any] = ()) -> tuple[np.ndarray, n
     return input_angle, output_angle
 
 
-def read_error(setup: Setup, hidden: Sequence[Any] = ()) -> np.ndarray:
+def read_error(setup: Setup, hidden: Sequence[Hidden] = ()) -> Array:
     """Kinematic error (n,) (rad) of the ideal readings of `setup` with the `hidden` physics: input/N - output."""
     input_angle, output_angle = read_angles(setup, hidden)
     return input_angle / setup.run.ratio - output_angle
 
 
-def hidden_wave(setup, hidden):
+def hidden_wave(setup: Setup, hidden: Sequence[Hidden]) -> Array:
     """What the `hidden` physics adds to the recorded kinematic error of `setup`, (n,) rad, mean removed."""
     wave = read_error(setup, hidden) - read_error(setup)
-    return wave - wave.mean()
+    result: Array = wave - wave.mean()
+    return result
 
 
-def joint_rms(waves):
+def joint_rms(waves: Sequence[Array]) -> float:
     """Rms over all recordings of a case, whose `waves` are one array each, with each one's mean removed."""
     centred = np.concatenate([wave - wave.mean() for wave in waves])
     return float(np.sqrt(np.mean(centred**2)))

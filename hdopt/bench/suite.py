@@ -3,7 +3,11 @@
 The full proof has a thousand cases over four drives; `cases` draws a part of it that keeps the families' shares.
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from itertools import combinations, cycle, islice
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -23,7 +27,13 @@ TURNS_EFFECTS = ("cs_tooth_harmonics", "hysteresis", "lost_motion", "circular_sp
 HUMS = (0.3, 1.0, 3.0)
 
 
-def plan(seed, families=(), cases=FULL, gears=tuple(GEARS), share=1.0):
+def plan(
+    seed: int,
+    families: Sequence[str] = (),
+    cases: int = FULL,
+    gears: Sequence[str] = tuple(GEARS),
+    share: float = 1.0,
+) -> list[Spec]:
     """Specs of a proof: `cases` of the thousand that `seed` draws, or the part `share` of those, on `gears`.
 
     `families` keeps these alone (empty: all). Every family keeps its share of the cases, and one case at least.
@@ -36,7 +46,7 @@ def plan(seed, families=(), cases=FULL, gears=tuple(GEARS), share=1.0):
         if gear not in GEARS:
             raise ValueError(f"unknown gear {gear!r}; there are {', '.join(GEARS)}")
     rng = np.random.default_rng(seed)
-    wanted = []
+    wanted: list[Spec] = []
     for family, made in _families(rng).items():
         count = max(1, round(len(made) * share * cases / FULL))
         kept = [made[i] for i in rng.permutation(len(made))[:count]]
@@ -50,7 +60,11 @@ def plan(seed, families=(), cases=FULL, gears=tuple(GEARS), share=1.0):
     return [wanted[i] for i in rng.permutation(len(wanted))]
 
 
-def _families(rng):
+Asked: TypeAlias = dict[str, Any]
+"""Fields of a `Spec`, which are of several types."""
+
+
+def _families(rng: np.random.Generator) -> dict[str, list[Asked]]:
     """Name -> what is asked of each case, in the full proof; what is drawn comes from `rng`."""
     return {
         "nothing": [{}] * 150,
@@ -75,7 +89,7 @@ def _families(rng):
     }
 
 
-def _singles(repeats):
+def _singles(repeats: int) -> list[Asked]:
     return [
         {"effects": (effect,), "severity": severity}
         for effect in CATALOGUE
@@ -84,7 +98,7 @@ def _singles(repeats):
     ]
 
 
-def _sets(rng, size, count):
+def _sets(rng: np.random.Generator, size: int, count: int) -> list[Asked]:
     """`count` sets of `size` effects, a quarter, half or all of the drive's own error each."""
     allowed = [
         found for found in combinations(CATALOGUE, size) if not any(both <= set(found) for both in ONE_IN_THE_OTHER)
@@ -93,8 +107,8 @@ def _sets(rng, size, count):
     return [{"effects": allowed[i], "severity": (0.25, 0.5, 1.0)[rank % 3]} for rank, i in enumerate(drawn)]
 
 
-def _decoys(rng):
-    made = []
+def _decoys(rng: np.random.Generator) -> list[Asked]:
+    made: list[Asked] = []
     for trouble in TROUBLES:
         made += [{"trouble": trouble, "size": "small"}] * 4
         for effect in rng.choice(list(CATALOGUE), 3, replace=False):
@@ -102,8 +116,8 @@ def _decoys(rng):
     return made
 
 
-def _orientations():
-    made = [{"reading": r, "size": "small"} for r in ORIENTATIONS for _ in range(12)]
+def _orientations() -> list[Asked]:
+    made: list[Asked] = [{"reading": r, "size": "small"} for r in ORIENTATIONS for _ in range(12)]
     return made + [
         {"reading": ORIENTATIONS[0], "effects": (effect,), "severity": s}
         for effect in MIRRORED_EFFECTS
@@ -111,31 +125,31 @@ def _orientations():
     ]
 
 
-def _unknowns(rng, count):
+def _unknowns(rng: np.random.Generator, count: int) -> list[Asked]:
     """`count` outsiders: every form once before any comes again, in an order drawn anew."""
     forms = [str(kind) for _ in range(count // len(ALL_KINDS) + 1) for kind in rng.permutation(ALL_KINDS)]
     return [{"outside": kind, "severity": (0.25, 0.5, 1.0)[rank % 3]} for rank, kind in enumerate(forms[:count])]
 
 
-def _built(rng):
-    made = [{"built": kind, "size": "small"} for kind in BUILT for _ in range(14)]
+def _built(rng: np.random.Generator) -> list[Asked]:
+    made: list[Asked] = [{"built": kind, "size": "small"} for kind in BUILT for _ in range(14)]
     effects = rng.choice(list(CATALOGUE), 15, replace=False)
     return made + [
         {"built": BUILT[rank % 3], "effects": (str(effect),), "severity": 0.5} for rank, effect in enumerate(effects)
     ]
 
 
-def _speed_steps():
-    made = [{"speed_steps": True, "size": "small"}] * 8
+def _speed_steps() -> list[Asked]:
+    made: list[Asked] = [{"speed_steps": True, "size": "small"}] * 8
     return made + [
         {"speed_steps": True, "effects": (effect,), "severity": s} for effect in STEPPED_EFFECTS for s in (0.5, 1.0)
     ]
 
 
-def _turns(rng):
+def _turns(rng: np.random.Generator) -> list[Asked]:
     """Records of 3 to 400 input turns."""
     turns = np.exp(rng.uniform(np.log(3), np.log(400), 23))
-    made = [{"turns": float(t)} for t in turns[:13]]
+    made: list[Asked] = [{"turns": float(t)} for t in turns[:13]]
     return made + [
         {"turns": float(t), "effects": (TURNS_EFFECTS[rank % 4],), "severity": (0.5, 1.0)[rank % 2]}
         for rank, t in enumerate(turns[13:])

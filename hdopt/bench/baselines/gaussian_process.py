@@ -27,7 +27,8 @@ def inputs(rows: Rows) -> Array:
     found = [np.cos(angle), np.sin(angle), np.cos(output), np.sin(output), np.sign(rows.speed), rows.speed]
     columns = np.column_stack([*found, rows.torque, rows.temperature, rows.time])
     wide = columns.std(0)
-    return columns[:, wide > 0] / wide[wide > 0]
+    result: Array = columns[:, wide > 0] / wide[wide > 0]
+    return result
 
 
 def kernel(one: Array, other: Array, log_scales: Array) -> Array:

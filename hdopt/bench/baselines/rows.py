@@ -51,7 +51,8 @@ class Rows:
     @property
     def means(self) -> Array:
         """A column of ones for each recording."""
-        return (self.rank[:, None] == np.unique(self.rank)).astype(float)
+        result: Array = (self.rank[:, None] == np.unique(self.rank)).astype(float)
+        return result
 
 
 def rows_of(tables: Sequence[pd.DataFrame], ratio: float) -> Rows:
@@ -96,8 +97,8 @@ def base_columns(rows: Rows) -> Array:
 
 def fitted(columns: Array, values: Array, ridge: float = 1e-6) -> Array:
     """Coefficients of `columns` for `values`, least squares with a small `ridge` (of the mean square of a column)."""
-    square = columns.T @ columns
-    square += ridge * np.trace(square) / len(square) * np.eye(len(square))
+    square: Array = columns.T @ columns
+    square += float(ridge * np.trace(square) / len(square)) * np.eye(len(square))
     found: Array = np.linalg.solve(square, columns.T @ values)
     return found
 
