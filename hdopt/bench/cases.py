@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,7 +22,7 @@ from hdopt.bench.motion import draw_plans, draw_ripple, run
 from hdopt.bench.readings import READINGS, as_read, through
 from hdopt.bench.signal_chain import hidden_wave, joint_rms, read_angles, read_error, set_up
 
-CATALOGUE = {
+CATALOGUE: dict[str, Callable[..., Any]] = {
     "cs_tooth_harmonics": partial(LongWave.draw, on="cs"),
     "fs_tooth_harmonics": partial(LongWave.draw, on="fs"),
     "tooth_mesh": ToothMesh.draw,
@@ -103,7 +105,7 @@ class Key:
     beside_true: tuple[str, ...] = ()  # names of the catalogue that would be true of it
     redrawn: int = 0
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         return asdict(self)
 
 
@@ -115,7 +117,7 @@ class Case:
     recordings: tuple[pd.DataFrame, ...]
 
 
-def generate(spec, name="case"):
+def generate(spec: Spec, name: str = "case") -> tuple[Case, Key]:
     """Case and key of `spec`, called `name`; the same seed gives the same numbers."""
     for effect in spec.effects:
         if effect not in CATALOGUE:

@@ -6,23 +6,27 @@ checksum to DIR/keys.sha256: whoever answers must not open `sealed` before the a
 DIR/answers/<id>.json.
 """
 
+from __future__ import annotations
+
 import argparse
 import json
 import sys
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.csv
 
-from hdopt.bench.cases import generate
+from hdopt.bench.cases import Spec, generate
 from hdopt.bench.gears import CSF, GEARS, study_text
 from hdopt.bench.registry import lines, sha
 from hdopt.bench.suite import FAMILIES, FULL, plan
 
 
-def write_case(numbered, folder):
+def write_case(numbered: tuple[int, Spec], folder: Path) -> dict[str, Any]:
     """Recordings of one numbered spec as CSV files below `folder`; its key as a dictionary."""
     number, spec = numbered
     case, key = generate(spec, f"case-{number:04d}")
@@ -40,7 +44,14 @@ def write_case(numbered, folder):
     return key.to_dict()
 
 
-def write(out, seed, families=(), workers=1, progress=lambda done, total: None, **sizes):
+def write(
+    out: str | Path,
+    seed: int,
+    families: Sequence[str] = (),
+    workers: int = 1,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    **sizes: Any,
+) -> str:
     """Write the cases that `seed` draws below `out`, by `workers` processes; returns the checksum of their keys.
 
     `families` and `sizes` as in `suite.plan`; `progress` is told how many are done.
@@ -71,7 +82,7 @@ def write(out, seed, families=(), workers=1, progress=lambda done, total: None, 
     return checksum
 
 
-def main(arguments=None):
+def main(arguments: Sequence[str] | None = None) -> None:
     """Write the cases that the command line's `arguments` ask for (those of this process if None)."""
     parser = argparse.ArgumentParser(prog="python -m hdopt.bench.generate", description=__doc__)
     parser.add_argument("--out", required=True, type=Path)
@@ -82,7 +93,7 @@ def main(arguments=None):
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args(arguments)
 
-    def progress(done, total):
+    def progress(done: int, total: int) -> None:
         if sys.stderr.isatty():
             print(f"\r{done}/{total}", end="\n" if done == total else "", file=sys.stderr)
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import pandas as pd
 
-from hdopt.bench.cases import generate
+from hdopt.bench.cases import Case, generate
 from hdopt.bench.gears import CSF
 from hdopt.bench.score import score
 from hdopt.bench.scores import Scores
@@ -27,15 +27,17 @@ def prove(
     stay in here until every answer is given; an answer that raises counts as none, and its message is what
     `Scores.invalid` shows. `spread` is a map that may do the cases elsewhere, results in order.
     """
-    answers, keys, raised = {}, [], {}
+    answers: dict[str, dict[str, Any]] = {}
+    keys: list[dict[str, Any]] = []
+    raised: dict[str, str] = {}
 
-    def cases():
+    def cases() -> Iterator[Case]:
         for number, spec in enumerate(plan(seed, gears=gears, **sizes), start=1):
             case, key = generate(spec, f"case-{number:04d}")
             keys.append(key.to_dict())
             yield case
 
-    def answered(case):
+    def answered(case: Case) -> tuple[str, dict[str, Any] | None, str | None]:
         try:
             return case.id, diagnose(case.recordings), None
         except Exception as error:

@@ -15,8 +15,7 @@ LONG_NOT_YET: set[str] = set()
 KERNELS: dict[str, str] = {}
 """Compiled functions that may be longer, with the reason."""
 
-UNDESCRIBED = {
-}
+UNDESCRIBED: dict[str, int] = {}
 """Public functions, by room, whose docstring does not name every argument; these numbers only fall. Commands do not
 count: their arguments are described by their options."""
 
