@@ -16,6 +16,7 @@ import numpy as np
 from hdopt.arrays import Array, Index, Mask
 from hdopt.diagnosis.inference.base_excitation import driven_by, excites, motion_of, transmitted
 from hdopt.diagnosis.inference.catalogue import explanations
+from hdopt.diagnosis.inference.newey_west import newey_west
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
@@ -178,13 +179,9 @@ class Fit:
         block = self.problem.rows.block
         scores = np.zeros((block[-1] + 1, design.shape[1]))
         np.add.at(scores, block, design * residual[:, None] / sigma2)
-        # Wander outlasts a turn: neighbouring turns' scores count too, with falling weight (Newey, West 1987).
-        meat = scores.T @ scores
+        # Wander outlasts a turn: neighbouring turns' scores count too, with falling weight.
         lags = min(settings.lags_turns, len(scores) // settings.turns_a_lag)
-        for lag in range(1, lags + 1):
-            across = scores[lag:].T @ scores[:-lag]
-            meat += (1 - lag / (lags + 1)) * (across + across.T)
-        sandwich = inverse @ meat @ inverse
+        sandwich = inverse @ newey_west(scores, lags) @ inverse
         blocks = block[-1] + 1
         sandwich *= blocks / max(blocks - 1, 1)
         ratio = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(inverse), TINY), 1.0))
