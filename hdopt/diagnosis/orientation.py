@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.settings import OrientationSettings
+from hdopt.effects import EFFECTS
 from hdopt.effects.estimate import Parameter
 from hdopt.effects.term import Term
 from hdopt.recordings.recording import Recording
@@ -84,7 +85,7 @@ def as_counted(parameters: dict[str, Parameter], term: Term) -> dict[str, Parame
             one = Parameter(value, value - (one.high - one.value), value + (one.value - one.low), one.unit)
         elif name == "angle_deg":
             one = Parameter(-one.value, -one.high, -one.low, one.unit)
-        elif term.effect == "thermal_drift" and name != "time_constant_s":
+        elif name in EFFECTS[term.effect].signed_by_error:
             one = Parameter(-one.value, -one.high, -one.low, one.unit)
         turned[name] = one
     return turned

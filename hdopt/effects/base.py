@@ -119,6 +119,10 @@ class Effect(Explanation):
     """'zones': it adds to the deviation of each meshing zone; 'beside': to the kinematic error. For the docs."""
     bench_part: ClassVar[str] = ""
     """Part of the bench which measures that it comes from; '' for an effect of the drive."""
+    nuisance: ClassVar[str] = ""
+    """The nuisance of a diagnosis that takes up all that it can do, so that beside it it is not looked for."""
+    signed_by_error: ClassVar[tuple[str, ...]] = ()
+    """Its numbers in a diagnosis whose sign is the error's: it turns where the angles are counted the other way."""
     needs_strain_wave: ClassVar[bool] = False
     """Whether it stands at the orders of a strain wave gear's teeth or bearing: of another gear they mean nothing."""
     radial: ClassVar[bool] = False

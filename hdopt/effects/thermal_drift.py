@@ -29,6 +29,8 @@ class ThermalDrift(Effect):
     domain = "time"
     separating = "record the temperature beside the angles, and once more after the bench has warmed through"
     bench_part = "the expansion of the bench, drive and bench together"
+    nuisance = "drift"
+    signed_by_error = ("coefficient_arcmin_per_k", "amplitude_arcmin")
     needs_said = "temperature; or time and speed"
     declared = (
         Quantity("coefficient_arcmin_per_k", "arcmin/K", "alone: it follows the temperature", "c", (-2.0, 2.0), None),

@@ -6,6 +6,12 @@ import pytest
 
 from hdopt.diagnosis import diagnose
 from hdopt.diagnosis.inference.base_fit import beat_warning
+from hdopt.diagnosis.inference.nuisance import NUISANCES, nuisances_for
+from hdopt.diagnosis.orientation import as_counted
+from hdopt.effects import EFFECTS
+from hdopt.effects.declared import Quantity
+from hdopt.effects.estimate import Parameter
+from hdopt.effects.term import Term
 from hdopt.errors import HdoptError
 from hdopt.kinematics.waveform import kinematic_error_arcmin
 from hdopt.recordings.read import recording_from_table
@@ -110,3 +116,24 @@ def test_what_the_length_cannot_carry_is_told(study):
         for turns in (10, 5)
     ]
     assert 3 < worse[0] < worse[1]
+
+
+def test_what_a_nuisance_takes_up_comes_from_the_declarations(study, monkeypatch):
+    """An effect that declares the nuisance is no candidate beside it, and nothing else is; none declares one that
+    cannot be asked for."""
+    assert {effect.nuisance for effect in EFFECTS.values()} <= {"", *NUISANCES}
+    rows = gather([clockless(study, turns=4)])
+    assert nuisances_for(rows, None, ("drift",)).hidden == ("thermal_drift",)
+    assert nuisances_for(rows, None, ("time-warp",)).hidden == ()
+    monkeypatch.setattr(type(EFFECTS["output_coupling"]), "nuisance", "drift")
+    assert set(nuisances_for(rows, None, ("drift",)).hidden) == {"thermal_drift", "output_coupling"}
+
+
+def test_numbers_that_turn_with_the_error_are_those_of_the_effect():
+    """A misspelled name would leave a drift's sign as it is where the angles were counted the other way."""
+    for effect in EFFECTS.values():
+        assert set(effect.signed_by_error) <= {one.name for one in effect.flat_declared() if isinstance(one, Quantity)}
+    one = Parameter(0.3, 0.2, 0.5, "arcmin")
+    found = as_counted({"amplitude_arcmin": one, "time_constant_s": one}, Term("thermal_drift", {}))
+    assert (found["amplitude_arcmin"].low, found["amplitude_arcmin"].value) == (-0.5, -0.3)
+    assert found["time_constant_s"] == one

@@ -25,13 +25,15 @@ from hdopt.arrays import Array, Mask
 from hdopt.diagnosis.inference.common_slope import TakenSlope
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.settings import DEFAULT, NuisanceSettings
+from hdopt.effects import EFFECTS
 from hdopt.effects.estimate import FitEstimate, Parameter
 from hdopt.effects.sines import sine_columns
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.rows import Rows
 
-NUISANCES = ("drift", "time-warp")
+DRIFT = "drift"
+NUISANCES = (DRIFT, "time-warp")
 """What `--nuisance` may ask for."""
 
 
@@ -55,7 +57,7 @@ class Nuisances:
     @property
     def hidden(self) -> tuple[str, ...]:
         """Effects that are no candidates beside these nuisances."""
-        return ("thermal_drift",) if self.drift else ()
+        return tuple(name for name, effect in EFFECTS.items() if self.drift and effect.nuisance == DRIFT)
 
     def blocks(self, rows: Rows) -> dict[str, Array]:
         """Columns (n, q) in arcmin by kind: zero, drift, angle, orders, scale, time-warp. `rows` are those of the
@@ -103,7 +105,7 @@ def nuisances_for(
     means = np.array([rows.error[rows.record == r].mean() for r in range(rows.records)])
     return Nuisances(
         separate_zeros=bool(np.ptp(means) >= settings.shared_zero_arcmin),
-        drift="drift" in asked,
+        drift=DRIFT in asked,
         angle=angle_range(rows, settings) if base is None and not rows.locked and rows.span_turns < 1 else None,
         orders=tuple(k for k in range(1, highest + 1) if k * rows.span_turns >= 1),
         warps="time-warp" in asked,
