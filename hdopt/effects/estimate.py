@@ -10,6 +10,11 @@ import numpy as np
 
 from hdopt.arrays import Array
 
+HALF_WIDTH_95 = 1.96
+"""Standard deviations to either side in a 95 % interval of one number."""
+ELLIPSE_POINTS = 720
+"""Points round an ellipse: its extremes are right to 1e-5 of its radius."""
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -59,13 +64,35 @@ class FitEstimate:
             up[i] += step
             down[i] -= step
             gradient[i] = (function(up) - function(down)) / (2 * step)
-        half = 1.96 * math.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0))
+        half = HALF_WIDTH_95 * math.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0))
         return Parameter(value, value - half, value + half, unit)
 
     def amplitude(self, sin: int, cos: int, unit: str = "arcmin", scale: float = 1.0) -> Parameter:
-        """Amplitude of a pair of sine and cosine coefficients, times `scale`; its interval ends at zero."""
+        """Amplitude of a pair of sine and cosine coefficients (their places `sin` and `cos`), times `scale`, in `unit`.
+
+        The interval is that of its profile likelihood, from zero on: of all points of the pair's 95 % ellipse (of one
+        parameter) the smallest and the largest amplitude.
+        """
         found = self.derived(lambda v: scale * math.hypot(v[sin], v[cos]), unit)
-        return replace(found, low=max(found.low, 0.0))
+        pair = self._standardised(sin, cos)
+        if pair is None:
+            return replace(found, low=max(found.low, 0.0))
+        root, standard = pair
+        turn = 2 * math.pi * np.arange(ELLIPSE_POINTS) / ELLIPSE_POINTS
+        ellipse = root @ (standard[:, None] + HALF_WIDTH_95 * np.array([np.cos(turn), np.sin(turn)]))
+        sizes = abs(scale) * np.hypot(*ellipse)
+        inside = float(standard @ standard) <= HALF_WIDTH_95**2
+        return replace(found, low=0.0 if inside else float(sizes.min()), high=float(sizes.max()))
+
+    def _standardised(self, sin: int, cos: int) -> tuple[Array, Array] | None:
+        """A root (2, 2) of the covariance of two coefficients and the two in standard deviations, (2,); None where one
+        of them is known exactly."""
+        at = [sin, cos]
+        try:
+            root = np.linalg.cholesky(self.covariance[np.ix_(at, at)])
+            return root, np.linalg.solve(root, self.values[at])
+        except np.linalg.LinAlgError:
+            return None
 
     def range_of(self, shapes: Array, unit: str) -> Parameter:
         """Largest less smallest value of the curve `shapes` (n, p) @ values."""
@@ -74,8 +101,30 @@ class FitEstimate:
         return self.derived(lambda v: float((high - low) @ v), unit)
 
     def phase_deg(self, sin: int, cos: int) -> Parameter:
-        """Phase phi of a sin(x + phi) from its sine and cosine coefficients, deg, in (-180, 180]; at worst +-180."""
+        """Phase phi of a sin(x + phi), deg, in (-180, 180], from its sine and cosine coefficients at `sin` and `cos`.
+
+        The interval is that of its profile likelihood: between the rays that touch the pair's 95 % ellipse (of one
+        parameter); the full turn where that holds zero.
+        """
         value = math.degrees(math.atan2(self.values[cos], self.values[sin]))
-        spread = self.derived(lambda v: (math.degrees(math.atan2(v[cos], v[sin])) - value + 180) % 360 - 180, "deg")
-        half = min(spread.high - spread.value, 180.0)
-        return Parameter(value, value - half, value + half, "deg")
+        pair = self._standardised(sin, cos)
+        if pair is None:
+            spread = self.derived(lambda v: _turn(math.degrees(math.atan2(v[cos], v[sin])) - value), "deg")
+            half = min(spread.high - spread.value, 180.0)
+            return Parameter(value, value - half, value + half, "deg")
+        root, standard = pair
+        size = float(np.hypot(*standard))
+        if size <= HALF_WIDTH_95:
+            return Parameter(value, value - 180.0, value + 180.0, "deg")
+        away = math.asin(HALF_WIDTH_95 / size)
+        ends = []
+        for angle in (-away, away):
+            turned = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+            first, second = root @ turned @ standard
+            ends.append(_turn(math.degrees(math.atan2(second, first)) - value))
+        return Parameter(value, value + min(ends), value + max(ends), "deg")
+
+
+def _turn(angle: float) -> float:
+    """An angle in degrees as one in [-180, 180)."""
+    return (angle + 180) % 360 - 180
