@@ -89,8 +89,8 @@ class FitEstimate:
         of them is known exactly."""
         at = [sin, cos]
         try:
-            root = np.linalg.cholesky(self.covariance[np.ix_(at, at)])
-            return root, np.linalg.solve(root, self.values[at])
+            root = np.asarray(np.linalg.cholesky(self.covariance[np.ix_(at, at)]), np.float64)
+            return root, np.asarray(np.linalg.solve(root, self.values[at]), np.float64)
         except np.linalg.LinAlgError:
             return None
 

@@ -152,20 +152,21 @@ def fitted(theta, time, error, noise, effect, shape):
 
 
 def test_an_effect_with_a_bounded_parameter():
-    """A time constant near the record's length, in much noise: the high end is far out or the bound of ten records;
-    +-1.96 standard deviations are even and reach below the low end."""
+    """A time constant near the record's length, in much noise: the profile's high end is far out or the bound of ten
+    records. What is said is never narrower than +-1.96 standard deviations, and stops at the bound of a hundredth."""
     fit, tau, duration = drifting(1.0, 0.25)
     (estimate,) = profiled_estimates(fit)
     at = fit.terms[0].width
-    low, high = estimate.profiles[at]
-    assert low < tau < high <= 10 * duration
-    assert high - estimate.values[at] > 1.5 * (estimate.values[at] - low) > 0
-    shown = EFFECTS["thermal_drift"].parameters(fit.terms[0], estimate)["time_constant_s"]
-    assert (shown.low, shown.high) == (low, high)
-    sigma = np.sqrt(estimate.covariance[at, at])
+    value, sigma = estimate.values[at], np.sqrt(estimate.covariance[at, at])
     unit = fit.expected_rises()[fit.problem.nuisance.shape[1] + at] * sigma**2
     one = shape_parameter(fit, 0, "time_constant_s", sigma, unit)
+    low, high = profile_interval(one, CHI2_95, SETTINGS)
+    assert low < tau < high <= 10 * duration
+    assert high - value > 1.5 * (value - low) > 0
     assert one.rise(low) == pytest.approx(CHI2_95, rel=0.05)  # 0.02 standard deviations of the end, and of the refit
+    said = EFFECTS["thermal_drift"].parameters(fit.terms[0], estimate)["time_constant_s"]
+    assert said.low == pytest.approx(max(0.01 * duration, min(low, value - NORMAL_95 * sigma)), rel=1e-3)
+    assert said.high == pytest.approx(max(high, value + NORMAL_95 * sigma), rel=0.02)
 
 
 def test_an_effect_that_is_well_known_keeps_its_standard_deviations():

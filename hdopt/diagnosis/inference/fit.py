@@ -171,6 +171,15 @@ class Fit:
         rises: Array = sigma2 / np.maximum(np.diag(inverse), TINY)
         return rises
 
+    def along(self, index: int, name: str, change: float) -> Fit:
+        """The fit with the free shape parameter `name` of term `index` moved by `change`, and all others by as much as
+        the curvature of the objective says that they follow."""
+        at = self.problem.base_width + self.problem.nuisance.shape[1]
+        at += sum(term.freedom for term in self.terms[:index])
+        at += self.terms[index].width + list(self.terms[index].steps).index(name)
+        inverse = self._curvature[3]
+        return _moved(self, inverse[:, at] * (change / max(float(inverse[at, at]), TINY)), True)
+
     def covariance(self) -> Array:
         """Covariance of all parameters, robust against what the noise model misses: the larger, parameter by parameter,
         of the model-based one and the sandwich over whole turns."""

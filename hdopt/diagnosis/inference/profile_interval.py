@@ -93,32 +93,35 @@ def settle(fit: Fit) -> Fit:
 def shape_parameter(fit: Fit, index: int, name: str, sigma: float, unit: float) -> HeldParameter:
     """The free shape parameter `name` of term `index` of a `fit` that stands; `sigma` and `unit` as in `HeldParameter`.
 
-    A held fit starts from the nearest one held before, so that it moves by little.
+    A held fit starts from where the curvature of the whole fit puts the others, or from the nearest one held before,
+    whichever is better.
     """
     problem, term = fit.problem, fit.terms[index]
     value = float(term.shape[name])
     before: dict[float, Fit] = {value: fit}
 
-    @cache
-    def held_at(asked: float) -> tuple[float, float]:
-        start = before[min(before, key=lambda other: abs(other - asked))]
+    def at_start(start: Fit, asked: float) -> Fit:
         shape = {**start.terms[index].shape, name: asked}
         made = problem.explanations[term.effect].term(problem.rows, shape, start.motion)
         free = {key: step for key, step in made.steps.items() if key != name}
         terms = list(start.terms)
         terms[index] = replace(made, trials=term.trials, odds=term.odds, steps=free)
-        moved = evaluate(problem, start.errors, start.offsets, terms, start.coefficients)
-        settled = settle(moved)
-        reached = float(settled.terms[index].shape[name])
+        return evaluate(problem, start.errors, start.offsets, terms, start.coefficients)
+
+    @cache
+    def held_at(asked: float) -> tuple[float, float]:
+        nearest = before[min(before, key=lambda other: abs(other - asked))]
+        starts = [at_start(start, asked) for start in (fit.along(index, name, asked - value), nearest)]
+        settled = settle(min(starts, key=lambda start: start.objective))
         before[asked] = settled
-        return settled.objective, reached
+        return settled.objective, float(settled.terms[index].shape[name])
 
     return HeldParameter(value, sigma, held_at, fit.objective, unit)
 
 
 def profiled_estimates(fit: Fit) -> list[FitEstimate]:
     """The estimates of each term of a `fit` that stands, with profile intervals of those free shape parameters whose
-    +-1.96 standard deviations do not serve.
+    +-1.96 standard deviations do not serve; none is narrower than they are within its bounds.
 
     The rise that ends an interval is counted in the robust variance: what widens a standard deviation widens it.
     """
@@ -136,12 +139,18 @@ def profiled_estimates(fit: Fit) -> list[FitEstimate]:
             if sigma > 0 and unit > 0:
                 held = shape_parameter(settled, index, name, sigma, unit)
                 if not is_parabola(held, settings):
-                    low, high = profile_interval(held, NORMAL_95**2, settings)
-                    value = float(estimate.values[at])
-                    profiles[at] = min(low, value), max(high, value)
+                    profiles[at] = _widened(profile_interval(held, NORMAL_95**2, settings), held)
         found.append(replace(estimate, profiles=profiles))
         start += term.freedom
     return found
+
+
+def _widened(profile: tuple[float, float], held: HeldParameter) -> tuple[float, float]:
+    """The ends of a `profile`, or of +-1.96 standard deviations as far as the bounds of the `held` parameter let them,
+    whichever lie farther out: a refit that stays in a worse minimum makes a profile too narrow, never too wide."""
+    half = NORMAL_95 * held.sigma
+    low, high = (held.held_at(held.value + way * half)[1] for way in (-1.0, 1.0))
+    return min(profile[0], low), max(profile[1], high)
 
 
 def least_squares_parameter(
