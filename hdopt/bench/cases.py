@@ -307,8 +307,9 @@ def _weigh(drawn, together, rng):
         beside = [parts[other][:, None] for other in others] + [witness.family(hidden[other].id) for other in others]
         evidence = witness.weigh(parts[rank], physics.id, drawn.noise_rms, share, beside)
         detectable &= evidence.detectable
-        rivals |= set(evidence.rivals)
-        margin = min(margin, evidence.margin)
+        rivals |= {*evidence.rivals, *physics.same_as}
+        # Linear columns leave a little of what a change of zones makes; the same recording leaves nothing.
+        margin = min(margin, 0.0 if physics.same_as else evidence.margin)
     return {
         "unexplained_rms_arcmin": witness.refit(sampled(together)) / ARCMIN,
         "detectable": bool(detectable),

@@ -41,6 +41,9 @@ def long_wave_array(rng: np.random.Generator, teeth: int, kind: str) -> Array:
     return result
 
 
+# Share of the power from which on one wave is alone.
+LONE = 0.999
+
 LONG_WAVE = ("harmonics", "smooth", "segments")
 
 
@@ -58,6 +61,12 @@ class LongWave(Hidden):
         kind = str(rng.choice(LONG_WAVE))
         teeth = gear.cs_teeth if on == "cs" else gear.fs_teeth
         return cls(f"{on}_tooth_harmonics", kind, tuple(long_wave_array(rng, teeth, kind)))
+
+    @property
+    def same_as(self) -> tuple[str, ...]:
+        """A lone wave of the circular spline's teeth is a lobe of its ring: the flank moves, or the depth."""
+        power = np.abs(np.fft.rfft(self.array)) ** 2
+        return ("circular_spline_lobing",) if self.id[0] == "c" and power.max() > LONE * power.sum() else ()
 
     def teeth(self, cs_mm: Array, fs_mm: Array) -> tuple[Array, Array]:
         extra = np.array(self.array) * self.scale * 1e-3

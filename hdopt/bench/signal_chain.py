@@ -37,6 +37,11 @@ class Hidden:
         return frozenset()
 
     @property
+    def same_as(self) -> tuple[str, ...]:
+        """Entries of the catalogue that make the very same recording, with other parameters."""
+        return ()
+
+    @property
     def torque_gain(self) -> float:
         """By how much it takes more load than was drawn."""
         return 1.0

@@ -11,11 +11,13 @@ from hdopt.bench.cases import CATALOGUE, TROUBLES, Spec, generate, simulate
 from hdopt.bench.gears import BUILT, GEARS, study_text
 from hdopt.bench.generate import write
 from hdopt.bench.geometry import RATIO
+from hdopt.bench.hidden_drive import Lobing, LongWave
 from hdopt.bench.hidden_outside import ALL_KINDS
 from hdopt.bench.marking import IDS
 from hdopt.bench.outside_forms import FORMS
 from hdopt.bench.registry import sha
 from hdopt.bench.score import read
+from hdopt.bench.signal_chain import hidden_wave
 from hdopt.bench.suite import FAMILIES, SEVERITIES, plan
 
 
@@ -150,6 +152,27 @@ def test_speed_steps_and_turns_are_in_the_motion():
         run = simulate(Spec("turns", 2, turns=turns)).setups[0].run
         travelled = np.abs(np.diff(run.theta)).sum() / (2 * np.pi)
         assert 0.7 * turns < travelled < 3.5 * turns + 40  # there and back, short strokes before
+
+
+def test_a_lone_wave_of_the_teeth_is_a_lobe_whatever_the_noise():
+    """Catches what run-001 showed: linear columns called the two apart, as more of them follow the change of zones."""
+    rng = np.random.default_rng(0)
+    drawn = [LongWave.draw(rng, on="cs") for _ in range(40)]
+    lone = [wave for wave in drawn if wave.variant == "harmonics" and len(wave.truth()) == 2]
+    assert lone and all(wave.same_as == ("circular_spline_lobing",) for wave in lone)
+    assert not any(wave.same_as for wave in drawn if wave.variant != "harmonics")
+    setup = simulate(Spec("nothing", 2, size="brief")).setups[0]
+    (teeth, order) = next((wave, int(max(wave.truth()).split("_")[1])) for wave in lone)
+    wave = hidden_wave(setup, [teeth])
+    phases = 2 * np.pi * np.arange(48) / 48
+    lobes = [
+        hidden_wave(
+            setup,
+            [Lobing(order, phase).scaled(teeth.truth()[f"order_{order}_amplitude"].value / np.tan(np.deg2rad(12)))],
+        )
+        for phase in phases
+    ]
+    assert min(np.std(wave - lobe) for lobe in lobes) < 0.1 * np.std(wave)  # 48 phases: half a step is 0.065
 
 
 def test_evidence_finds_what_cannot_be_told_apart():
