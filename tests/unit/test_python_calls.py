@@ -102,6 +102,7 @@ def recording(tmp_path_factory):
     return file
 
 
+@pytest.mark.slow
 def test_diagnose_from_python_writes_what_the_command_writes(recording, tmp_path):
     """Verdict, report and written study: byte for byte those of `hdopt diagnose --report --write-study`."""
     from hdopt.cli import main
@@ -130,6 +131,7 @@ def test_a_file_that_cannot_be_written_is_said_before_the_work(recording, tmp_pa
         hdopt.diagnose(recording, hdopt.load_study().drive, files={"study": tmp_path / "fitted.toml"})
 
 
+@pytest.mark.slow
 def test_inspect_and_compensate_take_every_form_of_a_drive_alike(recording, tmp_path):
     study = hdopt.load_study("csf-25-80")
     forms = ["csf-25-80", study, study.drive, hdopt.recorded_drive("csf-25-80")]
@@ -145,6 +147,7 @@ def test_inspect_and_compensate_take_every_form_of_a_drive_alike(recording, tmp_
     assert made.worth == (tmp_path / "table.json").exists()
 
 
+@pytest.mark.slow
 def test_a_stack_of_records_is_the_stack_of_the_study(tmp_path):
     """The same drive and distributions as records and as a study file: the same sample to the last bit."""
     study = hdopt.load_study("csf-25-80")
