@@ -39,16 +39,23 @@ DRAWS = 100
 HEADER = """\
 # Thresholds of the diagnosis
 
-Every number that decides, as it stands in `hdopt/diagnosis/settings.py`: value, unit, where it comes from, and how
-many of {cases} answers change when it becomes 0.7 or 1.3 times as large (whole numbers move by one at least). The cases
-are one short recording of every effect of the catalogue at half of the drive's own error, one of each of {outside}
-kinds of physics outside it, and the rest with nothing hidden; {right} of the {cases} are answered rightly as shipped.
+Every number that decides, as it stands in `hdopt/diagnosis/settings.py`: value, unit, where it comes from, and how many
+answers change when it becomes 0.7 or 1.3 times as large (whole numbers move by one at least). Written by
+
+    python -m hdopt.studies.threshold_sensitivity --out build/thresholds --write docs/diagnosis-thresholds.md
+
+"""
+TRIED = """\
+The {cases} cases are one short recording of every effect of the catalogue at half of the drive's own error, one of each
+of {outside} kinds of physics outside it, and the rest with nothing hidden; {right} of the {cases} are answered rightly
+as shipped.
 
 Thresholds of the verdict are moved one by one, on what the other stages had found. The others are moved as groups
 first: in a group that changes no answer each stands with 0, though moves within it may make up for each other;
 "group: n" says that the group changes n answers and that its members were not moved singly yet.
-
-    python -m hdopt.studies.threshold_sensitivity --out build/thresholds --write docs/diagnosis-thresholds.md
+"""
+NOT_TRIED = """\
+The moves have not been tried on these settings yet.
 """
 
 Answer = tuple[str, tuple[str, ...]]
@@ -228,7 +235,7 @@ def told(one: Threshold, factor: float, answers: Answers, tried: Sequence[Case])
         asked = by_group
     changed = answers.changed(asked, Move(one.key, factor))
     if changed is None:
-        return f"group: {len(asked)}"
+        return "not tried" if one.group == REPLAYED else f"group: {len(asked)}"
     if not changed:
         return "0"
     names = ", ".join(f"{case.name}: {_said(answers.get(case, Move(one.key, factor)))}" for case in changed)
@@ -240,18 +247,25 @@ def _said(answer: Answer | None) -> str:
     return f"{verdict} {', '.join(effects)}".strip() if effects else verdict
 
 
+def row_of(one: Threshold) -> list[str]:
+    """What the table says of the threshold `one` itself: name, value, unit, origin."""
+    values = one.value if isinstance(one.value, tuple) else (one.value,)
+    return [f"`{one.name}`", ", ".join(f"{v:g}" for v in values), one.unit, one.origin]
+
+
 def page(answers: Answers, tried: Sequence[Case]) -> str:
     """The documentation's page on every threshold, from the `answers` to the cases `tried`."""
-    right = sum(answers.get(case, None) in case.answers for case in tried)
-    lines = HEADER.format(cases=len(tried), outside=len(KINDS), right=right).splitlines()
+    given = [answers.get(case, None) for case in tried]
+    right = sum(answer in case.answers for case, answer in zip(tried, given, strict=True))
+    tells = NOT_TRIED if None in given else TRIED.format(cases=len(tried), outside=len(KINDS), right=right)
+    lines = (HEADER + tells).splitlines()
     group = ""
     for one in thresholds():
         if one.group != group:
             group = one.group
             lines += ["", f"## {group}", "", "| threshold | value | unit | origin | x 0.7 | x 1.3 |", "|---" * 6 + "|"]
-        values = one.value if isinstance(one.value, tuple) else (one.value,)
-        cells = [f"`{one.name}`", ", ".join(f"{v:g}" for v in values), one.unit, one.origin]
-        lines.append("| " + " | ".join(cells + [told(one, factor, answers, tried) for factor in FACTORS]) + " |")
+        cells = row_of(one) + [told(one, factor, answers, tried) for factor in FACTORS]
+        lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 

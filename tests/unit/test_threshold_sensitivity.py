@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from hdopt.diagnosis.settings import DEFAULT, moved, thresholds
 from hdopt.studies import threshold_sensitivity as study
-from hdopt.studies.threshold_sensitivity import Answers, Case, Move, page, work
+from hdopt.studies.threshold_sensitivity import Answers, Case, Move, page, row_of, work
 
 NAMED = ("named", ("hysteresis",))
 CASES = (Case("one", None, (NAMED,)), Case("two", None, (NAMED,)))
@@ -64,8 +66,10 @@ def test_only_a_group_that_matters_is_moved_singly_and_only_where_it_does(counte
 
 def test_the_page_tells_every_threshold_and_what_was_not_tried(counted):
     answers, _, first = counted
+    assert "have not been tried" in page(answers, CASES)
     for case in CASES:
         answers.answered(case)
+    assert "2 of the 2" in page(answers, CASES)
     assert page(answers, CASES).count("not tried | not tried |") >= 100
     for case, move in work(answers, CASES):
         answers.answered(case, move)
@@ -75,3 +79,10 @@ def test_the_page_tells_every_threshold_and_what_was_not_tried(counted):
     assert "not tried" not in text
     row = next(line for line in text.splitlines() if f"`{first.name}`" in line and first.origin in line)
     assert row.count("1 (two: unknown)") == 2
+
+
+def test_the_page_of_the_documentation_holds_todays_settings():
+    """Would catch a threshold added, moved or explained anew without its row: `--minutes 0 --write` renews them."""
+    written = (Path(__file__).resolve().parents[2] / "docs" / "diagnosis-thresholds.md").read_text(encoding="utf-8")
+    rows = [line for line in written.splitlines() if line.startswith("| `")]
+    assert [row.split(" | ")[:4] for row in rows] == [["| " + row_of(one)[0], *row_of(one)[1:]] for one in thresholds()]
