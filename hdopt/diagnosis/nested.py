@@ -2,8 +2,8 @@
 
 What is refitted by one linear step with the rest in sight (`inference.cross_validation`) has had its effects, shapes,
 zones and noise chosen on the very turns that it then predicts. Here the turns are taken out of the recordings before
-the first stage; orientation, scale, noise, search, shapes and drive all come from what is left. One split: a fold more
-would cost one diagnosis more.
+the first stage; orientation, scale, noise, search, shapes and drive all come from what is left (an orientation that
+the base leaves open is not searched for twice). One split: a fold more would cost one diagnosis more.
 """
 
 from __future__ import annotations

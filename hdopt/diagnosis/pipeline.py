@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from hdopt.diagnosis.checks.assessment import Evidence, assess
 from hdopt.diagnosis.nested import nested_held_out
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
-from hdopt.diagnosis.stages import STAGES, begin
+from hdopt.diagnosis.stages import STAGES, STAGES_OF_A_PART, begin
 from hdopt.diagnosis.state import State
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import Recording
@@ -26,10 +26,12 @@ def gather_evidence(
     thresholds. All of it is done once more on a part of the turns, and looked at on the others.
     """
 
-    def run(some: Sequence[Recording]) -> State:
+    def run(some: Sequence[Recording], stages: Sequence[Callable[[State], State]]) -> State:
         state = begin(some, base, seed, settings, nuisance)
-        for stage in STAGES:
+        for stage in stages:
             state = stage(state)
         return state
 
-    return replace(assess(run(recordings)), nested=nested_held_out(recordings, run, seed, settings))
+    # First, so that what it worked with is gone before the diagnosis itself is in memory.
+    nested = nested_held_out(recordings, lambda some: run(some, STAGES_OF_A_PART), seed, settings)
+    return replace(assess(run(recordings, STAGES)), nested=nested)

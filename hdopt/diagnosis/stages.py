@@ -150,6 +150,20 @@ def choose_orientation(state: State) -> State:
     """Both ways of counting the angles are fitted; where neither base explains clearly more, with their effects.
     `state` is where the work stands; the draws are its own, so that a recording as counted goes on as without them.
     """
+    return oriented(state, better_way)
+
+
+def choose_orientation_by_base(state: State) -> State:
+    """As `choose_orientation`, but where neither base explains clearly more, the one that explains more at all: a
+    search saved. `state` is where the work stands.
+    """
+    return oriented(state, likelier_way)
+
+
+def oriented(state: State, undecided: Callable[[State, State, float], State]) -> State:
+    """`state` on its recordings as counted or turned round, by what the base explains. `undecided` chooses where that
+    is not clear: of the state, its turned counterpart, and how far the base prefers the first (`preference`).
+    """
     problem = state.problem
     output = -1 if state.recordings[0].output_reversed else 1
     if problem.base is None or problem.rows.locked or state.nuisances.warps:
@@ -164,11 +178,15 @@ def choose_orientation(state: State) -> State:
             ways = ([state.base, beside_smooth(state.clean)], [turned.base, beside_smooth(clean)])
             preferred = preference(*ways)
     turned = replace(turned, orientation=Orientation(-1, -output, "data"))
+    state = replace(state, orientation=Orientation(1, output, "data"))
     if is_decisive(preferred, settings.orientation):
-        return (
-            replace(state, orientation=Orientation(1, output, "data")) if preferred > 0 else fit_base_in_noise(turned)
-        )
-    return better_way(replace(state, orientation=Orientation(1, output, "data")), turned)
+        return likelier_way(state, turned, preferred)
+    return undecided(state, turned, preferred)
+
+
+def likelier_way(state: State, turned: State, preferred: float) -> State:
+    """`state` where its base is `preferred` at all, else its `turned` counterpart."""
+    return state if preferred > 0 else fit_base_in_noise(turned)
 
 
 def begin_turned(state: State) -> State:
@@ -193,9 +211,9 @@ def beside_smooth(clean: Fit) -> Fit:
     return refine(evaluate(beside, clean.errors, free, (), ()), problem.settings.fit.offset_iterations)
 
 
-def better_way(state: State, turned: State) -> State:
-    """Of `state` and its `turned` counterpart the one whose effects and base explain more together; `state`, by
-    convention, where that is a tie.
+def better_way(state: State, turned: State, preferred: float) -> State:
+    """Of `state` and its `turned` counterpart the one whose effects and base explain more together, whatever the base
+    alone `preferred`; `state`, by convention, where that is a tie.
     """
     other = fit_base_in_noise(turned)
     sigma2 = state.problem.noise.sigma**2
@@ -313,3 +331,8 @@ STAGES: tuple[Callable[[State], State], ...] = (
     settle_shapes,
 )
 """A diagnosis, in the order of its work, after `begin`; `checks.assessment.assess` takes the last state."""
+
+STAGES_OF_A_PART = tuple(choose_orientation_by_base if stage is choose_orientation else stage for stage in STAGES)
+"""The same on a part of the turns, whose error on the others is asked for and not its verdict: no second search where
+the base leaves the orientation open.
+"""
