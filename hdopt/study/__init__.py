@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.files import files_of_work
-from hdopt.study.base import Section
 from hdopt.study.document import (
     SET_ON_COMMAND_LINE,
     Document,
@@ -31,8 +30,9 @@ if TYPE_CHECKING:
     from hdopt.drive.geometry import Drive
     from hdopt.drive.teeth import MeasuredTeeth
     from hdopt.simulation import EffectValues, Operation
+    from hdopt.study.base import Section
 
-S = TypeVar("S", bound=Section)
+S = TypeVar("S", bound="Section")
 
 DEFAULT_STUDY = "csf-25-80"
 """What a command works on when it is told neither a study nor a drive."""
