@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
 
+from hdopt.bench.arrays import Array
 from hdopt.bench.evidence import Witness
-from hdopt.bench.gears import CSF, GEARS, as_built
-from hdopt.bench.geometry import ARCMIN, draw_errors, find_zones
+from hdopt.bench.gears import CSF, GEARS, Gear, as_built
+from hdopt.bench.geometry import ARCMIN, BaseErrors, draw_errors, find_zones
 from hdopt.bench.hidden_drive import BearingPass, Lobing, LocalDefect, LongWave, ToothMesh
 from hdopt.bench.hidden_load import Hysteresis, LostMotion, Resonance, ThermalDrift, Windup
 from hdopt.bench.hidden_outside import Outside
 from hdopt.bench.hidden_sensors import ChannelDelay, Coupling, Eccentricity, Interpolation
 from hdopt.bench.instrument import Instrument, draw_instrument, record
-from hdopt.bench.motion import draw_plans, draw_ripple, run
+from hdopt.bench.motion import Plan, draw_plans, draw_ripple, run
 from hdopt.bench.readings import READINGS, as_read, through
-from hdopt.bench.signal_chain import hidden_wave, joint_rms, read_angles, read_error, set_up
+from hdopt.bench.signal_chain import Hidden, Setup, hidden_wave, joint_rms, read_angles, read_error, set_up
 
-CATALOGUE: dict[str, Callable[..., Any]] = {
+CATALOGUE: dict[str, Callable[..., Hidden]] = {
     "cs_tooth_harmonics": partial(LongWave.draw, on="cs"),
     "fs_tooth_harmonics": partial(LongWave.draw, on="fs"),
     "tooth_mesh": ToothMesh.draw,
@@ -40,6 +41,15 @@ CATALOGUE: dict[str, Callable[..., Any]] = {
     "local_tooth_defect": LocalDefect.draw,
     "channel_delay": ChannelDelay.draw,
 }
+
+ToAndFro: TypeAlias = Hysteresis | LostMotion | ChannelDelay
+"""Physics of a reversal, which knows what it would make in a test to and fro."""
+
+Sized: TypeAlias = tuple[Hidden, list[Array]]
+"""Physics as large as asked for, and its wave (rad) in each recording."""
+
+Parameters: TypeAlias = dict[str, dict[str, Any]]
+"""Name -> {value, unit, identifiable}."""
 
 TROUBLES = ("gaps", "coloured", "ripple", "short", "one way", "coarse", "clock")
 
@@ -89,14 +99,14 @@ class Key:
     severity: float
     base_rms_arcmin: float
     hidden_rms_arcmin: float  # of all hidden physics together
-    part_rms_arcmin: dict
+    part_rms_arcmin: dict[str, float]
     noise_rms_arcmin: float
     unexplained_rms_arcmin: float  # of the hidden wave, after the base alone was refitted
     detectable: bool
     separable: bool
     rivals: tuple[str, ...]
-    parameters: dict  # id -> name -> {value, unit, identifiable}
-    conditions: dict
+    parameters: dict[str, Parameters]  # id -> name -> {value, unit, identifiable}
+    conditions: dict[str, Any]
     gear: str = CSF.name
     built: str = ""
     margin: float | None = None  # evidence against the closest rival, or the base, in units of what decides
@@ -134,7 +144,7 @@ def generate(spec: Spec, name: str = "case") -> tuple[Case, Key]:
     raise AssertionError("the last draw is taken as it is")
 
 
-def _generator(spec):
+def _generator(spec: Spec) -> np.random.Generator:
     return np.random.default_rng([spec.seed, len(spec.effects), int(1000 * spec.severity)])
 
 
@@ -150,24 +160,24 @@ def simulate(spec: Spec, rng: np.random.Generator | None = None) -> Simulated | 
 class Simulated:
     """One draw of a case: its drive and motion, what is hidden in it and how large, and what the instrument wrote."""
 
-    plans: tuple
-    setups: list
-    hidden: list
-    waves: list  # of each hidden physics alone, one array a recording
+    plans: tuple[Plan, ...]
+    setups: list[Setup]
+    hidden: list[Hidden]
+    waves: list[list[Array]]  # of each hidden physics alone, one array a recording
     instrument: Instrument
     tables: tuple[pd.DataFrame, ...]
     noise_rms: float
     base_rms: float
     torque_gain: float
-    beside: list  # waves of what the drive and the bench have besides, one array a recording
+    beside: list[Array]  # waves of what the drive and the bench have besides, one array a recording
 
-    def parameters(self):
+    def parameters(self) -> dict[str, Parameters]:
         """True parameters of the catalogue's physics in it: id -> name -> {value, unit, identifiable}."""
         top = self.torque_gain * max(float(np.abs(s.run.torque).max()) for s in self.setups)
         return {physics.id: _parameters(physics, top) for physics in self.hidden if physics.id}
 
 
-def _simulate(spec, rng, last=False):
+def _simulate(spec: Spec, rng: np.random.Generator, last: bool = False) -> Simulated | None:
     gear = GEARS[spec.gear]
     errors = draw_errors(rng)
     hidden = [CATALOGUE[effect](rng, gear=gear) for effect in spec.effects]
@@ -176,13 +186,13 @@ def _simulate(spec, rng, last=False):
     plans = _plans(spec, hidden, rng)
     hidden = [physics.for_plans(plans) for physics in hidden]
     if spec.whole_motion:
-        hidden = [replace(h, whole_motion=True) if h.id == "resonance" else h for h in hidden]
+        hidden = [replace(h, whole_motion=True) if isinstance(h, Resonance) else h for h in hidden]
     instrument = through(spec.reading, draw_instrument(rng, len(plans), frozenset([spec.trouble])))
     real = as_built(gear, spec.built, rng) if spec.built else gear
     setups = [set_up(errors, run(plan, instrument.jitter, rng, gear.ratio), real) for plan in plans]
     base_rms = joint_rms([read_error(s) for s in setups])
     sized = _sized(spec, hidden, setups, base_rms, last)
-    if None in sized:
+    if sized is None:
         return None
     hidden, waves = [physics for physics, _ in sized], [waves for _, waves in sized]
     beside, hum = _beside(spec, setups, errors, gear, instrument)
@@ -198,19 +208,25 @@ def _simulate(spec, rng, last=False):
     return Simulated(plans, setups, hidden, waves, instrument, tables, joint_rms(noises), base_rms, gain, beside)
 
 
-def _sized(spec, hidden, setups, base_rms, as_it_is):
-    """Hidden physics as large as `spec` asks for, each with its waves; where it cannot be, None or `as_it_is`."""
+def _sized(
+    spec: Spec, hidden: Sequence[Hidden], setups: Sequence[Setup], base_rms: float, as_it_is: bool
+) -> list[Sized] | None:
+    """Hidden physics as large as `spec` asks for, each with its waves; where one cannot be, None or `as_it_is`."""
     deaf = {"reversal", "speeds"} if spec.trouble == "one way" else set()
     target = spec.severity * base_rms
-    return [
+    found = [
         _as_if_reversed(physics, setups, target)
-        if physics.needs & deaf and hasattr(physics, "scale_for")
+        if physics.needs & deaf and isinstance(physics, ToAndFro)
         else scaled_to(physics, setups, target, as_it_is)
         for physics in (hidden if target else [])
     ]
+    sized = [one for one in found if one is not None]
+    return sized if len(sized) == len(found) else None
 
 
-def _beside(spec, setups, errors, gear, instrument):
+def _beside(
+    spec: Spec, setups: Sequence[Setup], errors: BaseErrors, gear: Gear, instrument: Instrument
+) -> tuple[list[Array], list[Outside]]:
     """Waves of what the drive as built and the bench have besides, one a recording, and the hum among it."""
     hum = []
     if spec.hum:
@@ -223,7 +239,7 @@ def _beside(spec, setups, errors, gear, instrument):
     return (waves if spec.built or spec.hum else []), hum
 
 
-def _key(spec, name, drawn, rng):
+def _key(spec: Spec, name: str, drawn: Simulated, rng: np.random.Generator) -> Key:
     hidden, setups, waves = drawn.hidden, drawn.setups, drawn.waves
     together = [hidden_wave(s, hidden) for s in setups] if len(hidden) != 1 else waves[0]
     return Key(
@@ -249,7 +265,7 @@ def _key(spec, name, drawn, rng):
     )
 
 
-def _plans(spec, hidden, rng):
+def _plans(spec: Spec, hidden: Sequence[Hidden], rng: np.random.Generator) -> tuple[Plan, ...]:
     needs = frozenset().union(*[physics.needs for physics in hidden])
     size = spec.size or ("small" if spec.family == "nothing" else "full")
     if spec.trouble == "one way":
@@ -264,7 +280,7 @@ def _plans(spec, hidden, rng):
     return plans
 
 
-def scaled_to(physics, setups, target, as_it_is=False):
+def scaled_to(physics: Hidden, setups: Sequence[Setup], target: float, as_it_is: bool = False) -> Sized | None:
     """`physics` scaled to an rms of `target` (rad) over `setups`, and its waves.
 
     Where it cannot be so large: None, or with `as_it_is` as large as it can be.
@@ -283,19 +299,19 @@ def scaled_to(physics, setups, target, as_it_is=False):
     return (physics, waves) if as_it_is or abs(rms / target - 1) < 0.02 else None
 
 
-def _as_if_reversed(physics, setups, target):
+def _as_if_reversed(physics: ToAndFro, setups: Sequence[Setup], target: float) -> Sized:
     """Physics in a test without the reversal that it needs: as large as would give `target` with one."""
     physics = physics.scaled(physics.scale_for(target, max(np.abs(s.run.speed).max() / s.run.ratio for s in setups)))
     return physics, [hidden_wave(s, [physics]) for s in setups]
 
 
-def _weigh(drawn, together, rng):
+def _weigh(drawn: Simulated, together: Sequence[Array], rng: np.random.Generator) -> dict[str, Any]:
     hidden = drawn.hidden
     if not hidden:
         return {"unexplained_rms_arcmin": 0.0, "detectable": False, "separable": False, "rivals": (), "margin": None}
     witness = Witness(drawn.setups, drawn.plans, rng)
 
-    def sampled(parts):
+    def sampled(parts: Sequence[Array]) -> Array:
         return np.concatenate([part[pick] for part, pick in zip(parts, witness.pick, strict=True)])
 
     share = drawn.instrument.effective(1.0)
@@ -323,7 +339,7 @@ TRUE_OF_BUILT = {"pitch errors": ("cs_tooth_harmonics", "fs_tooth_harmonics")}
 """Names of the catalogue that are true of a drive as built: each tooth's own error has waves of every length."""
 
 
-def _weigh_beside(spec, drawn, rng):
+def _weigh_beside(spec: Spec, drawn: Simulated, rng: np.random.Generator) -> dict[str, Any]:
     if not drawn.beside:
         return {}
     witness = Witness(drawn.setups, drawn.plans, rng)
@@ -336,12 +352,12 @@ def _weigh_beside(spec, drawn, rng):
     }
 
 
-def _parameters(physics, top_torque):
-    found = physics.truth_under(top_torque) if physics.id == "torsional_windup" else physics.truth()
+def _parameters(physics: Hidden, top_torque: float) -> Parameters:
+    found = physics.truth_under(top_torque) if isinstance(physics, Windup) else physics.truth()
     return {name: asdict(parameter) for name, parameter in found.items()}
 
 
-def _conditions(plans, setups):
+def _conditions(plans: Sequence[Plan], setups: Sequence[Setup]) -> dict[str, Any]:
     return {
         "recordings": len(plans),
         "samples": int(sum(s.run.time.size for s in setups)),

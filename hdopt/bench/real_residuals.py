@@ -109,8 +109,9 @@ def on_simulated_drive(
         hidden = [physics.for_plans(plans) for physics in hidden]
         setups = [set_up(errors, run(plan, 0.0, rng)) for plan in plans]
         base = joint_rms([read_error(s) for s in setups])
-        sized = [scaled_to(physics, setups, severity * base) for physics in hidden]
-        if None not in sized:
+        found = [scaled_to(physics, setups, severity * base) for physics in hidden]
+        sized = [one for one in found if one is not None]
+        if len(sized) == len(found):
             break
     else:
         raise RuntimeError(f"{effect} could not be made {severity} x the base's rms in {ATTEMPTS} draws")

@@ -14,7 +14,8 @@ import pandas as pd
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
-from hdopt.bench.baselines.rows import Array, Rows, answer, base_columns, fitted, rows_of
+from hdopt.bench.arrays import Array
+from hdopt.bench.baselines.rows import Rows, answer, base_columns, fitted, rows_of
 
 TRAINED, STEPS = 250, 25
 # The held-out error must fall by this share before the model is said to lack something.

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hdopt.bench.baselines.rows import Array, Rows, answer, base_columns, held_out_rms, rows_of, waves
+from hdopt.bench.arrays import Array
+from hdopt.bench.baselines.rows import Rows, answer, base_columns, held_out_rms, rows_of, waves
 
 HIGHEST, POWERS = 12, 3
 RIDGE = 1e-4

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hdopt.bench.arrays import Array
 
 MOST_ROWS = 6000
 TURN = 2 * np.pi
@@ -99,8 +99,7 @@ def fitted(columns: Array, values: Array, ridge: float = 1e-6) -> Array:
     """Coefficients of `columns` for `values`, least squares with a small `ridge` (of the mean square of a column)."""
     square: Array = columns.T @ columns
     square += float(ridge * np.trace(square) / len(square)) * np.eye(len(square))
-    found: Array = np.linalg.solve(square, columns.T @ values)
-    return found
+    return np.asarray(np.linalg.solve(square, columns.T @ values), np.float64)
 
 
 def held_out_rms(rows: Rows, columns: Array) -> float:

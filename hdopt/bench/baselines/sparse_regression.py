@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hdopt.bench.baselines.rows import Array, Rows, answer, base_columns, fitted, held_out_rms, rows_of, waves
+from hdopt.bench.arrays import Array
+from hdopt.bench.baselines.rows import Rows, answer, base_columns, fitted, held_out_rms, rows_of, waves
 
 # Coefficients below this share of the base's residual are set to zero, as often as it takes.
 THRESHOLD, ROUNDS = 0.3, 10
