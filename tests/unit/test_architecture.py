@@ -31,12 +31,6 @@ BESIDE = {
 }
 """Imports between rooms of one layer, with the reason."""
 
-NOT_YET: set[tuple[str, str]] = set()
-"""Imports that the plan does not allow and that still stand; this list only shrinks."""
-
-CIRCLES_NOT_YET: set[frozenset[str]] = set()
-"""Import circles that still stand; this list only shrinks."""
-
 TOP = {"__init__.py", "arrays.py", "errors.py", "files.py"}
 
 HEAVY = {"cadquery", "plotly", "cvxpy", "SALib", "openturns", "distributed", "dask", "nlopt", "pymoo", "vtk", "OCP"}
@@ -143,16 +137,12 @@ def circles(graph: dict[str, set[str]]) -> set[frozenset[str]]:
 def test_imports_run_one_way():
     edges = room_edges(IMPORTS)
     wrong = forbidden(edges)
-    assert wrong <= NOT_YET, [line for edge in wrong - NOT_YET for line in edges[edge]]
-    assert NOT_YET <= wrong, f"mended: take {NOT_YET - wrong} out of NOT_YET"
+    assert not wrong, [line for edge in wrong for line in edges[edge]]
 
 
 def test_no_modules_import_each_other_in_a_circle():
-    found = circles(IMPORTS)
-    new = [sorted(group) for group in found if not any(group <= known for known in CIRCLES_NOT_YET)]
-    assert not new, new
-    mended = [sorted(known) for known in CIRCLES_NOT_YET if not any(group <= known for group in found)]
-    assert not mended, f"mended: take {mended} out of CIRCLES_NOT_YET"
+    found = [sorted(group) for group in circles(IMPORTS)]
+    assert not found, found
 
 
 def test_the_reasons_of_neighbours_are_still_needed():
