@@ -192,9 +192,8 @@ class Witness:
             rivals["thermal_drift"] = [1 - np.exp(-part / tau) for tau in (0.1, 0.2, 0.4, 0.8, 1.6)]
         if len(self.setups) > 1:
             top = 2 * max(np.abs(s.run.speed).max() for s in self.setups) / TURN
-            # Known fault: r is meant as the scale, but lands in `whole_motion`. Keys would change if it were mended.
             rivals["resonance"] = [
-                self._swing(Resonance(z, False, top, r))  # type: ignore[arg-type]
+                self._swing(Resonance(z, False, top, scale=r))
                 for r in (0.02, 0.1, 0.3, 0.6, 0.9)
                 for z in (0.03, 0.1)
             ]

@@ -1,6 +1,7 @@
 """Whole cases: size, repeatability, what goes out and what stays behind."""
 
 import json
+from itertools import combinations
 
 import numpy as np
 import pandas as pd
@@ -8,6 +9,7 @@ import pytest
 
 from hdopt.bench import cases
 from hdopt.bench.cases import CATALOGUE, TROUBLES, Spec, generate, simulate
+from hdopt.bench.evidence import OneOf, Witness
 from hdopt.bench.gears import BUILT, GEARS, study_text
 from hdopt.bench.generate import write
 from hdopt.bench.geometry import RATIO
@@ -184,6 +186,17 @@ def test_evidence_finds_what_cannot_be_told_apart():
     assert lines.parameters["encoder_interpolation"]["lines"]["value"] == 500 and lines.rivals == ("bearing_pass",)
     _, delay = generate(Spec("single", 1, ("channel_delay",), 1.0))
     assert delay.separable
+
+
+def test_no_entry_has_one_rival_twice():
+    """Would catch a parameter that lands in another's place: rivals of five frequencies were one."""
+    drawn = simulate(Spec("single", 233, ("resonance",), 0.5, size="brief"))
+    rivals = Witness(drawn.setups, drawn.plans, np.random.default_rng(0)).rivals()
+    assert "resonance" in rivals
+    for name, columns in rivals.items():
+        shapes = [np.ravel(c) / np.std(c) for c in columns if not isinstance(c, OneOf)]
+        for first, second in combinations(shapes, 2):
+            assert first.shape != second.shape or np.std(first - second) > 1e-3, name
 
 
 def test_the_proof_has_every_case_that_it_must_have():
