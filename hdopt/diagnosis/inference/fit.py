@@ -177,7 +177,7 @@ class Fit:
         at = self.problem.base_width + self.problem.nuisance.shape[1]
         at += sum(term.freedom for term in self.terms[:index])
         at += self.terms[index].width + list(self.terms[index].steps).index(name)
-        inverse = self._curvature[3]
+        *_, inverse = self._curvature
         return _moved(self, inverse[:, at] * (change / max(float(inverse[at, at]), TINY)), True)
 
     def covariance(self) -> Array:
