@@ -53,7 +53,8 @@ def test_a_search_sees_every_phase_of_the_beat(teeth, index):
     """Z_FS/2 phases instead of Z_FS/gcd(Z_FS, Z_CS) are wrong for odd tooth numbers, by 0.04 arcmin at Z_FS = 61."""
     design = drive(geometry=DriveGeometry(teeth, teeth + 2, 0.5, 0.3, 30.65))
     errors = random_errors(8, seed=index)
-    conditions = SimpleNamespace(sample=errors.to_matrix())
+    sample = errors.to_matrix()
+    conditions = SimpleNamespace(drawn=lambda: sample)
     found = PeakToPeakQuantile()._sample(conditions, SimpleNamespace(drive=design))
     searched = peak_to_peak_by_search_arcmin(design, errors)
     # What the compiled kernel promises.
