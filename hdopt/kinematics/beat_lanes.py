@@ -18,7 +18,7 @@ from numba import njit
 
 from hdopt.arrays import Array, Index, Mask
 from hdopt.kinematics.branches import TIE_MM
-from hdopt.kinematics.essential import _rims_between, _stretches
+from hdopt.kinematics.essential import _least_of_lines, _rims_between, _stretches
 
 # Least and largest do not depend on the order in which lanes are taken; sums keep theirs.
 compiled = njit(error_model="numpy", fastmath={"contract", "nsz", "nnan", "arcp"})
@@ -434,16 +434,6 @@ def _ends(lanes: Array, folds: Array, best: Array) -> tuple[float, float]:
     floor, least, ceiling = _least_of(folds[0]), _least_of(folds[1]), -_least_of(folds[2])
     best[0], best[1] = min(best[0], least), max(best[1], ceiling)
     return floor, ceiling
-
-
-@compiled
-def _least_of_lines(one_a: float, two_a: float, one_b: float, two_b: float) -> float:
-    """Least of the larger of two lines between their ends."""
-    least = min(max(one_a, two_a), max(one_b, two_b))
-    apart_a, apart_b = one_a - two_a, one_b - two_b
-    if apart_a * apart_b < 0.0:
-        least = min(least, (one_a * apart_b - one_b * apart_a) / (apart_b - apart_a))
-    return least
 
 
 @compiled
