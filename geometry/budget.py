@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
 from hdopt.drive.geometry import Clearances, Structure
 from hdopt.errors import HdoptError

@@ -45,7 +45,7 @@ def write_png(path: Path, job: Job) -> None:
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / "scene.npz"
         # Its keyword allow_pickle is a bool, and the arrays of a scene could bear any name, for all that types say.
-        np.savez(scene, eye=np.array(EXPLODED[0]), **_scene(job))  # type: ignore[arg-type]
+        np.savez(scene, eye=np.array(EXPLODED[0]), **_scene(job))  # type: ignore[arg-type]  # see above
         command = [sys.executable, "-m", "hdopt.geometry.render", str(scene), str(path)]
         try:
             done = subprocess.run(command, capture_output=True, timeout=TIME_LIMIT).returncode

@@ -7,7 +7,7 @@ docs/python.md lists them. Names are imported when they are first used, so that 
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any  # Any: whatever of the package is asked for by name
 
 if TYPE_CHECKING:
     from hdopt.allocation.results import AllocateResult as AllocateResult

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any  # Any: values of JSON; groups are names or pairs of numbers
 
 from hdopt.bench.scores import Rate, Scores
 

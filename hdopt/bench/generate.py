@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any  # Any: values of JSON; sizes of cases
 
 import pyarrow as pa
 import pyarrow.csv

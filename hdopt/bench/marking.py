@@ -11,7 +11,7 @@
 """
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any  # Any: values of JSON, as whoever answers may have written them
 
 import numpy as np
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any  # Any: values of JSON
 
 from hdopt.bench import registry, thresholds
 from hdopt.bench.scores import Rate

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any
+from typing import Any  # Any: values of JSON; sizes of cases
 
 import pandas as pd
 

@@ -19,7 +19,7 @@ import subprocess
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any  # Any: values of JSON
 
 from hdopt.bench import registry
 from hdopt.bench.figures import figures

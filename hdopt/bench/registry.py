@@ -11,7 +11,7 @@ import json
 import lzma
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any  # Any: values of JSON
 
 from hdopt.bench.marking import COMPARED
 

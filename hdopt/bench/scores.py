@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any  # Any: groups are names or pairs of numbers
 
 import pandas as pd
 from scipy.stats import beta

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations, cycle, islice
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias  # Any: fields of a case, which are of several types
 
 import numpy as np
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any  # Any: values of JSON
 
 from hdopt.compensation.surface import Harmonics, Surface
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any  # Any: each effect has shapes of its own
 
 from hdopt.arrays import Array
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any  # Any: fields of the trade's records, of several types
 
 from hdopt.mechanics.tooth_path import Mesh
 from hdopt.optimize.design_space import OWN_VARIABLES, Combination, Design, DesignSpace

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any  # Any: values of JSON
 
 from hdopt.optimize.design_space import VARIABLES
 from hdopt.optimize.objectives import QUANTITIES

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar  # Any: distributed has no types for what is used of it
 
 from hdopt.errors import HdoptError
 from hdopt.parallel.workers import as_worker, cores

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import is_dataclass, replace
-from typing import Any, Protocol, TypeVar, cast
+from typing import Any, Protocol, TypeVar, cast  # Any: an engine of any kind, with one field changed
 
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.parallel.local import InTurn, Processes, ThisProcess, Threads

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar  # Any: whatever work gives back
 
 from hdopt.errors import HdoptError
 from hdopt.files import make_folder, write_bytes, write_text

@@ -10,7 +10,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.recordings.columns import Column

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any  # Any: times as numbers, text or dates
 
 import numpy as np
 from numpy.typing import NDArray

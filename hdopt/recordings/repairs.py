@@ -6,7 +6,7 @@ A repair never invents data: rows are dropped, angles unwrapped, whole turns put
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NoReturn
+from typing import Any, NoReturn  # Any: indices and masks alike
 
 import numpy as np
 from numpy.typing import NDArray

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any  # Any: indices and masks alike; columns of several kinds
 
 import numpy as np
 from numpy.typing import NDArray

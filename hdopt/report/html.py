@@ -16,7 +16,7 @@ from functools import singledispatchmethod
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any  # Any: what a template is given
 
 from markupsafe import Markup, escape
 

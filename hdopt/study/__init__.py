@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar  # Any: what a study file holds, of TOML's several kinds
 
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.files import files_of_work

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
 from hdopt.errors import HdoptError, shown
 from hdopt.files import read_text

@@ -6,7 +6,7 @@ The keys of every effect derive from what it declares (`hdopt.effects.declared`)
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal  # Any: annotations and fields that pydantic takes
 
 from pydantic import Field, create_model
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal  # Any: fields that pydantic takes
 
 from pydantic import ConfigDict, Field, create_model
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
 import tomlkit
 from tomlkit.items import InlineTable, Item, Table

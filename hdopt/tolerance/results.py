@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 from hdopt.kinematics.model_error import ModelError
 from hdopt.tolerance.sensitivity import Shapley, Sobol

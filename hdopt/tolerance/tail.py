@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any  # Any: values of JSON
 
 import numpy as np
 from numpy.typing import ArrayLike

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal  # Any: values of JSON
 
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.files import replacing_all, to_csv, write_text

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 if TYPE_CHECKING:
     from hdopt.allocation.results import AllocateResult

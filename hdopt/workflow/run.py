@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, cast  # Any: values of JSON
 
 from hdopt.errors import HdoptError, MissingLibrary, MissingValue
 from hdopt.files import make_folder, to_json, write_bytes, write_text

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any  # Any: values of JSON
 
 from hdopt.errors import HdoptError
 from hdopt.files import read_json

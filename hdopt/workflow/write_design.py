@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any
+from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
 from hdopt.drive.profiles import TwoDisk
 from hdopt.errors import HdoptError

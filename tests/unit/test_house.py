@@ -1,7 +1,9 @@
 """Rules of the house that the linter does not know: length of functions, docstrings that name every argument."""
 
 import ast
+import io
 import re
+import tokenize
 from collections import Counter
 from pathlib import Path
 
@@ -85,9 +87,30 @@ def test_array_types_are_named_once():
     assert {path for path, found in spelled.items() if found} == {Path("hdopt/arrays.py")}
 
 
+def without_reason(source: str) -> list[str]:
+    """Lines with `Any` or `type: ignore` that say no reason, there or, for `Any`, where it is imported."""
+    lines = source.splitlines()
+    imported = any(re.search(r"import .*\bAny\b.*# Any: \w", line) for line in lines)
+    code = {token.start[0] for token in tokens(source) if token.type == tokenize.NAME and token.string == "Any"}
+    bare = [lines[n - 1] for n in sorted(code) if " import " not in lines[n - 1] and "#" not in lines[n - 1]]
+    return ([] if imported else bare) + [line for line in lines if re.search(r"type: ignore\S*\s*$", line)]
+
+
+def tokens(source: str):
+    return tokenize.generate_tokens(io.StringIO(source).readline)
+
+
+def test_what_types_leave_open_has_its_reason():
+    sources = {path: (ROOT / path).read_text(encoding="utf-8") for path in TREES}
+    assert {str(path): found for path, source in sources.items() if (found := without_reason(source))} == {}
+
+
 def test_the_rules_of_this_page_bite():
     tree = ast.parse('def f(first, *, second):\n    """Say `first`."""\n' + "    pass\n" * 60)
     (node,) = functions(tree)
     assert length(node) == 62
     assert unnamed_arguments(node) == ["second"]
     assert array_aliases(ast.parse("Numbers = NDArray[np.float64]")) == {"NDArray[np.float64]"}
+    assert without_reason("from typing import Any\nx: Any = 1\ny: Any = 2  # JSON") == ["x: Any = 1"]
+    assert without_reason("from typing import Any  # Any: JSON\nx: Any = 1") == []
+    assert without_reason("x = f()  # type: ignore[arg-type]") == ["x = f()  # type: ignore[arg-type]"]

@@ -7,7 +7,7 @@ torque and time; length scales and noise are those of the highest marginal likel
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any  # Any: values of JSON
 
 import numpy as np
 import pandas as pd

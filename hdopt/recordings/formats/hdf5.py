@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any  # Any: arrays of numbers and of text, as the file's format has them
 
 import numpy as np
 

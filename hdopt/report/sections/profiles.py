@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any  # Any: Plotly's dictionaries and traces, which have no types
 
 import numpy as np
 
