@@ -15,7 +15,7 @@ import numpy as np
 
 from hdopt.arrays import Array, Mask
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
-from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut, hidden_samples, shares, without_samples
+from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut, hidden_samples, shares_of_samples, without_samples
 from hdopt.diagnosis.orientation import turn_round
 from hdopt.diagnosis.search.high_order import subtract
 from hdopt.diagnosis.settings import DiagnosisSettings
@@ -39,7 +39,7 @@ def nested_held_out(
     state = pipeline(without_samples(recordings, hidden))
     seen = as_seen(recordings, hidden, state)
     rows = gather(subtract(seen, ripple_of(seen, state)), neighbours_for(state.recordings))
-    share = shares(seen, hidden, neighbours_for(state.recordings))
+    share = shares_of_samples(seen, hidden, neighbours_for(state.recordings))
     best, base = state.selection.best.fit, state.selection.base
     errors = [_rms(refitted(fit, rows, share > 0, state).residual[share == 1]) for fit in (base, best)]
     named = {name for found in (state.selection, state.high) if found is not None for name in found.best.effects}

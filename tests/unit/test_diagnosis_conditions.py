@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hdopt.diagnosis import diagnose
-from hdopt.diagnosis.inference.conditions import across_conditions, find_conditions, levels
+from hdopt.diagnosis.inference.conditions import across_conditions, find_conditions, number_levels
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.nuisance import nuisances_for
@@ -35,8 +35,8 @@ def fits(study, records, names, shapes):
 
 
 def test_levels_part_at_gaps():
-    np.testing.assert_array_equal(levels(np.array([3.0, 1.0, 1.05, 2.98, 9.0]), 0.1), [1, 0, 0, 1, 2])
-    np.testing.assert_array_equal(levels(np.array([5.0]), 0.1), [0])
+    np.testing.assert_array_equal(number_levels(np.array([3.0, 1.0, 1.05, 2.98, 9.0]), 0.1), [1, 0, 0, 1, 2])
+    np.testing.assert_array_equal(number_levels(np.array([5.0]), 0.1), [0])
 
 
 def test_conditions_are_named_by_what_differs(study):

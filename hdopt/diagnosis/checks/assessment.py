@@ -22,7 +22,7 @@ from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import MAD_TO_SIGMA, SMALLEST_POWER, TINY
 from hdopt.diagnosis.orientation import Orientation
-from hdopt.diagnosis.search.candidates import scale_of, search_terms
+from hdopt.diagnosis.search.candidates import penalty_scale, search_terms
 from hdopt.diagnosis.search.penalty import Scale as PenaltyScale
 from hdopt.diagnosis.search.penalty import penalty
 from hdopt.diagnosis.search.subset_search import Selection
@@ -97,7 +97,7 @@ def assess(state: State) -> Evidence:
     probe = FitProbe(base)
     strange = STRAIN_WAVE_ONLY if base.problem.base is None else ()
     pool = search_terms(probe, skip=state.ruled_out)
-    scale = scale_of(base.problem, inflation)
+    scale = penalty_scale(base.problem, inflation)
     penalties = [penalty([term], 0.0, scale) for term in pool]
     observed = max(
         [

@@ -8,7 +8,7 @@ import numpy as np
 
 from hdopt.diagnosis.inference.catalogue import SCALE
 from hdopt.diagnosis.inference.fit import Fit
-from hdopt.diagnosis.inference.nuisance import Nuisances, places
+from hdopt.diagnosis.inference.nuisance import Nuisances, slices_by_kind
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import NORMAL_95, TINY
 
@@ -46,7 +46,7 @@ def fitted_scale(fit: Fit, nuisances: Nuisances) -> Scale | None:
     """
     rows, taken = fit.problem.rows, nuisances.taken
     if taken is not None:
-        place = places(fit, nuisances)["scale"].start
+        place = slices_by_kind(fit, nuisances)["scale"].start
         at = fit.problem.base_width + place
         half = NORMAL_95 * float(np.sqrt(fit.covariance()[at, at])) / taken.input_gain
         slope = taken.slope + float(fit.offsets[place]) / taken.input_gain

@@ -38,17 +38,17 @@ def find_conditions(rows: Rows, settings: ConditionSettings = DEFAULT.conditions
     runs = np.r_[0, np.cumsum(changes)]
     channels: list[tuple[Array, float, Callable[[float], str]]] = []
     if rows.speed is not None and not rows.locked:
-        speed = usual(runs, np.abs(rows.speed))
+        speed = median_of_runs(runs, np.abs(rows.speed))
         channels.append(
             (speed, settings.level * float(speed.max()), lambda value: f"{value * SECONDS_A_MINUTE / TURN:.3g} r/min")
         )
     if rows.torque is not None and not rows.locked:
-        torque = usual(runs, rows.torque)
+        torque = median_of_runs(runs, rows.torque)
         channels.append((torque, settings.level * float(np.abs(rows.torque).max()), lambda value: f"{value:.3g} Nm"))
     if rows.temperature is not None:
-        temperature = usual(runs, rows.temperature)
+        temperature = median_of_runs(runs, rows.temperature)
         channels.append((temperature, settings.level_k, lambda value: f"{value:.3g} deg C"))
-    told = [(values, levels(values, apart), say) for values, apart, say in channels]
+    told = [(values, number_levels(values, apart), say) for values, apart, say in channels]
     told = [(values, level, say) for values, level, say in told if level.max() > 0]
     if not told:
         return Conditions(np.zeros(len(runs), np.int64), ("all",))
@@ -59,12 +59,12 @@ def find_conditions(rows: Rows, settings: ConditionSettings = DEFAULT.conditions
     return Conditions(number[runs], names)
 
 
-def usual(runs: Index, values: Array) -> Array:
+def median_of_runs(runs: Index, values: Array) -> Array:
     """Median of `values` (n,) over each run, numbered by `runs` (n,): a reversal's slow rows do not count."""
     return np.array([np.median(part) for part in np.split(values, np.flatnonzero(np.diff(runs)) + 1)])
 
 
-def levels(values: Array, apart: float) -> Index:
+def number_levels(values: Array, apart: float) -> Index:
     """Number of the level of each value, from the lowest up: a gap of more than `apart` starts a new one. `values`
     (n,) in any unit.
     """

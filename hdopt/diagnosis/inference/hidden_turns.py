@@ -79,7 +79,7 @@ def _without(recording: Recording, hidden: Mask) -> Recording:
     )
 
 
-def shares(recordings: Sequence[Recording], values: Sequence[Mask], neighbours: int) -> Array:
+def shares_of_samples(recordings: Sequence[Recording], values: Sequence[Mask], neighbours: int) -> Array:
     """Means of `values` (n,) of each of the `recordings` over the samples of each row, where so many `neighbours` make
     one.
     """

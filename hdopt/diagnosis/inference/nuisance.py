@@ -67,9 +67,9 @@ class Nuisances:
         own = rows.record[:, None] == np.arange(rows.records)
         blocks = {"zero": own.astype(float) if self.separate_zeros else np.ones((n, 1))}
         if self.drift:
-            blocks["drift"] = _for_each(own, legendre(moment(rows), self.settings.drift_degree))
+            blocks["drift"] = _for_each(own, legendre(place_in_recording(rows), self.settings.drift_degree))
         if self.angle is not None:
-            blocks["angle"] = hats(rows.theta, *self.angle)
+            blocks["angle"] = tent_functions(rows.theta, *self.angle)
         if self.orders:
             blocks["orders"] = sine_columns(rows.theta, self.orders)
         if self.taken is not None:
@@ -145,7 +145,7 @@ def order_slope(fit: Fit, nuisances: Nuisances) -> Callable[[Array], Array]:
     return slope
 
 
-def places(fit: Fit, nuisances: Nuisances) -> dict[str, slice]:
+def slices_by_kind(fit: Fit, nuisances: Nuisances) -> dict[str, slice]:
     """Where each kind's coefficients stand among the fit's free ones. `nuisances` are the columns that are always
     free.
     """
@@ -160,10 +160,10 @@ def coefficients(fit: Fit, nuisances: Nuisances) -> dict[str, Array]:
     """The fitted coefficients of each kind. `fit` is the one looked at. `nuisances` are the columns that are always
     free.
     """
-    return {kind: fit.offsets[place] for kind, place in places(fit, nuisances).items()}
+    return {kind: fit.offsets[place] for kind, place in slices_by_kind(fit, nuisances).items()}
 
 
-def moment(rows: Rows) -> Array:
+def place_in_recording(rows: Rows) -> Array:
     """-1 at the start of each recording, 1 at its end: by time, or by row where no clock was recorded. `rows` are
     those of the recordings.
     """
@@ -180,7 +180,7 @@ def warp_shapes(rows: Rows, settings: NuisanceSettings = DEFAULT.nuisance) -> Ar
     are the thresholds.
     """
     own = rows.record[:, None] == np.arange(rows.records)
-    return _for_each(own, legendre(moment(rows), settings.warp_degree))
+    return _for_each(own, legendre(place_in_recording(rows), settings.warp_degree))
 
 
 def legendre(x: Array, degree: int) -> Array:
@@ -196,7 +196,7 @@ def angle_range(rows: Rows, settings: NuisanceSettings = DEFAULT.nuisance) -> tu
     return float(np.min(rows.theta)), float(np.max(rows.theta)), knots
 
 
-def hats(angle: Array, low: float, high: float, knots: int) -> Array:
+def tent_functions(angle: Array, low: float, high: float, knots: int) -> Array:
     """Any piecewise linear curve of `angle` but for a zero: tent functions on even knots, (n, knots - 1). The knots
     lie from `low` to `high`, rad.
     """
@@ -211,7 +211,7 @@ def estimated(fit: Fit, nuisances: Nuisances) -> dict[str, Parameter]:
     rows = fit.problem.rows
     covariance = fit.covariance()
     found = {}
-    for kind, place in places(fit, nuisances).items():
+    for kind, place in slices_by_kind(fit, nuisances).items():
         inside = slice(fit.problem.base_width + place.start, fit.problem.base_width + place.stop)
         estimate = FitEstimate(fit.offsets[place], covariance[inside, inside])
         if kind == "drift":

@@ -48,7 +48,9 @@ class RankedSubset:
     indices: tuple[int, ...]
 
 
-def scale_of(problem: FitProblem, inflation: float = 1.0, subtracted: SubtractedTerms = NOTHING_SUBTRACTED) -> Scale:
+def penalty_scale(
+    problem: FitProblem, inflation: float = 1.0, subtracted: SubtractedTerms = NOTHING_SUBTRACTED
+) -> Scale:
     """What penalties on the rows of `problem` are measured by: its weighed rows, noise rougher by `inflation`, and what
     was `subtracted` from the rows before.
     """

@@ -8,7 +8,7 @@ import numpy as np
 
 from hdopt.diagnosis.inference.base_excitation import is_driven
 from hdopt.diagnosis.inference.fit import Fit
-from hdopt.diagnosis.search.candidates import RankedSubset, joint_fit, rank_subsets, scale_of
+from hdopt.diagnosis.search.candidates import RankedSubset, joint_fit, penalty_scale, rank_subsets
 from hdopt.diagnosis.search.penalty import SubtractedTerms, has_exact_shape
 from hdopt.diagnosis.search.search_state import SearchState
 from hdopt.effects.term import Term
@@ -60,7 +60,7 @@ def behind_a_resonance(state: SearchState, centre: Fit, pool: Sequence[Term]) ->
             continue
         others = [term for term in pool if term.effect != driven.effect]
         beside = SubtractedTerms((driven, *subtracted.terms), subtracted.gain)
-        scale = scale_of(centre.problem, state.inflation, beside)
+        scale = penalty_scale(centre.problem, state.inflation, beside)
         ranked = rank_subsets(state.probe(centre, keep=[i]), others, scale, state.settings.most_effects - 1)
         sets += [[driven, *(others[j] for j in s.indices)] for s in ranked[: state.settings.leaders]]
     return sets

@@ -10,7 +10,7 @@ import numpy as np
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.search.acceptance import is_acceptable
-from hdopt.diagnosis.search.candidates import joint_fit, scale_of, search_terms, weigh
+from hdopt.diagnosis.search.candidates import joint_fit, penalty_scale, search_terms, weigh
 from hdopt.diagnosis.search.penalty import kind_of
 from hdopt.effects.term import Term
 
@@ -53,12 +53,12 @@ def otherwise_acceptable(fit: Fit, skip: Sequence[str], order_range: tuple[float
     return [fit for fit in found if is_acceptable(fit)]
 
 
-def in_full(fit: Fit, base: Fit, inflation: float, order_range: tuple[float, float]) -> Fit:
+def widened_where_it_pays(fit: Fit, base: Fit, inflation: float, order_range: tuple[float, float]) -> Fit:
     """`fit`, or the same effects in wider variants where these pay for their coefficients against the `base` in noise
     rougher by `inflation`, at orders in `order_range`: what a name has to pay for bending to anything, it need not pay
     any more once it stands.
     """
-    scale, settings = scale_of(fit.problem, inflation), fit.problem.settings.search
+    scale, settings = penalty_scale(fit.problem, inflation), fit.problem.settings.search
 
     def paid(candidate: Fit) -> float:
         freedom = sum(term.freedom for term in candidate.terms)
@@ -75,7 +75,7 @@ def in_full(fit: Fit, base: Fit, inflation: float, order_range: tuple[float, flo
     return fit
 
 
-def narrower(fit: Fit, skip: Sequence[str], order_range: tuple[float, float]) -> list[list[Term]]:
+def with_a_plain_term(fit: Fit, skip: Sequence[str], order_range: tuple[float, float]) -> list[list[Term]]:
     """Sets in which a plain term takes the place of a wide one of `fit`, of all effects but those of `skip` and at
     orders in `order_range`: about a base that is bent to the wide one it looks worse than it is.
     """

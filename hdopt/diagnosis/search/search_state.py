@@ -9,7 +9,7 @@ import numpy as np
 
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.residual_gains import FitProbe
-from hdopt.diagnosis.search.candidates import Candidate, scale_of, search_terms, weigh
+from hdopt.diagnosis.search.candidates import Candidate, penalty_scale, search_terms, weigh
 from hdopt.diagnosis.search.penalty import NOTHING_SUBTRACTED, Scale, SubtractedTerms
 from hdopt.diagnosis.settings import SearchSettings
 from hdopt.effects.term import Term
@@ -52,7 +52,7 @@ class SearchState:
     @property
     def scale(self) -> Scale:
         """What penalties are measured by."""
-        return scale_of(self.base.problem, self.inflation, self.plan.subtracted)
+        return penalty_scale(self.base.problem, self.inflation, self.plan.subtracted)
 
     @property
     def order_range(self) -> tuple[float, float]:

@@ -20,7 +20,13 @@ from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import Candidate, joint_fit, without_each
 from hdopt.diagnosis.search.explore import explore
 from hdopt.diagnosis.search.penalty import flexibility
-from hdopt.diagnosis.search.refinement import in_full, narrower, otherwise_acceptable, shortened, trimmed
+from hdopt.diagnosis.search.refinement import (
+    otherwise_acceptable,
+    shortened,
+    trimmed,
+    widened_where_it_pays,
+    with_a_plain_term,
+)
 from hdopt.diagnosis.search.search_state import SearchPlan, SearchState
 from hdopt.effects.term import Term
 from hdopt.parallel.shared_memory import each
@@ -61,7 +67,7 @@ def select(base: Fit, inflation: float, rng: np.random.Generator, plan: SearchPl
         state = stage(state)
     candidates = acceptable_first(ranked(state), state.settings.close_behind)
     best = candidates[0]
-    fuller = in_full(best.fit, state.base, inflation, state.order_range) if best.fit.terms else best.fit
+    fuller = widened_where_it_pays(best.fit, state.base, inflation, state.order_range) if best.fit.terms else best.fit
     return Selection(state.base, (replace(best, fit=fuller), *candidates[1:]), inflation)
 
 
@@ -161,7 +167,7 @@ def refit_close_rivals(state: SearchState) -> SearchState:
     behind = sorted(others, key=state.log_bayes_factor, reverse=True)[: settings.leaders]
     least = settings.close * leader.log_bayes_factor
     sets: list[Sequence[Term]] = [fit.terms for fit in behind if state.log_bayes_factor(fit) > least]
-    sets += narrower(leader.fit, state.plan.skip, state.order_range)
+    sets += with_a_plain_term(leader.fit, state.plan.skip, state.order_range)
     start = leader.fit
 
     def fitted(numbered: tuple[Sequence[Term], np.random.Generator]) -> Fit:
