@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from hdopt.tolerance.screening import Screening as Screening
     from hdopt.workflow.acceptance_sheet import SheetLabel as SheetLabel
     from hdopt.workflow.allocate import allocate as allocate
+    from hdopt.workflow.check_study import StudyCheck as StudyCheck
+    from hdopt.workflow.check_study import check_study as check_study
     from hdopt.workflow.compare import CompareResult as CompareResult
     from hdopt.workflow.compare import compare as compare
     from hdopt.workflow.compensate import Compensated as Compensated
@@ -48,6 +50,8 @@ if TYPE_CHECKING:
     from hdopt.workflow.kinematic_error import ProfileResult as ProfileResult
     from hdopt.workflow.kinematic_error import kinematic_error as kinematic_error
     from hdopt.workflow.kinematic_error import profile as profile
+    from hdopt.workflow.new_study import NewStudy as NewStudy
+    from hdopt.workflow.new_study import new_study as new_study
     from hdopt.workflow.recorded_drive import RecordedDrive as RecordedDrive
     from hdopt.workflow.recorded_drive import recorded_drive as recorded_drive
     from hdopt.workflow.run import RunResult as RunResult
@@ -87,6 +91,8 @@ _EXPORTS: dict[str, str] = {
     "Screening": "hdopt.tolerance.screening",
     "SheetLabel": "hdopt.workflow.acceptance_sheet",
     "allocate": "hdopt.workflow.allocate",
+    "StudyCheck": "hdopt.workflow.check_study",
+    "check_study": "hdopt.workflow.check_study",
     "CompareResult": "hdopt.workflow.compare",
     "compare": "hdopt.workflow.compare",
     "Compensated": "hdopt.workflow.compensate",
@@ -99,6 +105,8 @@ _EXPORTS: dict[str, str] = {
     "ProfileResult": "hdopt.workflow.kinematic_error",
     "kinematic_error": "hdopt.workflow.kinematic_error",
     "profile": "hdopt.workflow.kinematic_error",
+    "NewStudy": "hdopt.workflow.new_study",
+    "new_study": "hdopt.workflow.new_study",
     "RecordedDrive": "hdopt.workflow.recorded_drive",
     "recorded_drive": "hdopt.workflow.recorded_drive",
     "RunResult": "hdopt.workflow.run",

@@ -15,7 +15,24 @@ class MissingValue(HdoptError):
     def __init__(self, needed_by: str, *keys: str) -> None:
         self.keys = keys
         names = " and ".join(keys)
-        super().__init__(f"{needed_by} needs {names}, which is not given; add it to the study file or with --set")
+        given = "which is not given; add it" if len(keys) == 1 else "which are not given; add them"
+        super().__init__(f"{needed_by} needs {names}, {given} to the study file or with --set")
+
+
+class MissingSection(MissingValue):
+    """A whole section of the study is needed that it does not have; `keys` holds its name in brackets."""
+
+    def __init__(self, needed_by: str, section: str, source: str) -> None:
+        HdoptError.__init__(self, f"{needed_by} needs a [{section}] section, which {source} does not have; add it")
+        self.keys = (f"[{section}]",)
+
+
+class IncompleteStudy(MissingValue):
+    """A study file without keys that its sections cannot do without: `keys`, dotted paths."""
+
+    def __init__(self, message: str, keys: Iterable[str]) -> None:
+        HdoptError.__init__(self, message)
+        self.keys = tuple(keys)
 
 
 class MissingLibrary(HdoptError):

@@ -7,6 +7,8 @@ from importlib import import_module
 import click
 
 COMMANDS: dict[str, str] = {
+    "new": "A commented study to begin with.",
+    "check": "What can be computed from a study, and what is missing for the rest.",
     "ke": "Kinematic error of one drive: peak-to-peak, orders, contact, lag.",
     "profile": "The wave generator's profile: contact angle, curvature change, bending stress.",
     "stack": "Monte Carlo stack of the tolerances: distribution, yield, Ppk; tails and worst case on request.",

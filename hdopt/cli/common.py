@@ -59,6 +59,8 @@ check_option = click.option(
 )
 """For every command that can say whether a study's requirement is met; `status` turns the verdict into the status."""
 CHECK = "hdopt.check"
+DEFAULTS = "hdopt.defaults"
+"""What the command falls back on, for `emit`."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +74,16 @@ class StudyOptions:
 
     def load(self, *further: str) -> Study:
         """The study that is meant, with `further` KEY=VALUE after those of --set."""
-        from hdopt.study import load_study
+        from hdopt.study import DEFAULT_STUDY, load_study
+        from hdopt.study.defaults import USED, defaults_taken
 
-        return load_study(self.study, (*self.overrides, *further), self.drive)
+        study = load_study(self.study, (*self.overrides, *further), self.drive)
+        context = click.get_current_context()
+        said = defaults_taken(study.sections, USED.get(context.info_name or "", ()))
+        if self.study is None and self.drive is None:
+            said = (f"no study given: the shipped {DEFAULT_STUDY}", *said)
+        context.meta[DEFAULTS] = said
+        return study
 
 
 def study_options(command: Callable[..., R]) -> Callable[..., R]:
@@ -114,10 +123,15 @@ def emit(
 ) -> None:
     """Write `result` as JSON where asked, and `lines` for a person unless JSON takes standard output.
 
-    The verdict, where there is one, is the last line, and `requirement` in the JSON; `provenance` is there always.
+    The verdict, where there is one, is the last line, and `requirement` in the JSON; `provenance` is there always, and
+    `defaults` where the command falls back on any.
     Where the JSON cannot be written, the lines are printed all the same: the work is not lost.
     """
     result = dict(result)
+    context = click.get_current_context(silent=True)
+    defaults: tuple[str, ...] = () if context is None else context.meta.get(DEFAULTS, ())
+    if defaults:
+        result["defaults"] = list(defaults)
     if verdict is not None:
         result["requirement"] = verdict.to_dict()
     if json_file is not None:
@@ -131,6 +145,8 @@ def emit(
     finally:
         for line in lines:
             click.echo(line)
+        for said in defaults:
+            click.echo(f"default: {said}")
         if verdict is not None:
             click.echo(verdict.line)
 

@@ -12,7 +12,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar  # Any: what a study file holds, of TOML's several kinds
 
-from hdopt.errors import HdoptError, unknown_name
+from hdopt.errors import HdoptError, MissingSection, MissingValue, unknown_name
 from hdopt.files import files_of_work
 from hdopt.study.document import (
     SET_ON_COMMAND_LINE,
@@ -69,7 +69,7 @@ class Study:
         `needed_by` what."""
         found = self.find(name, kind)
         if found is None:
-            raise HdoptError(f"{needed_by} needs a [{name}] section, which {self.source} does not have; add it")
+            raise MissingSection(needed_by, name, self.source)
         return found
 
     @cached_property
@@ -185,6 +185,9 @@ class Study:
         """Messages of what is built from the section `name` say where in the file that section stands."""
         try:
             yield
+        except MissingValue as error:
+            error.args = (f"{self.document.where((name,))}: {error}",)  # which keys it names stays known
+            raise
         except HdoptError as error:
             raise HdoptError(f"{self.document.where((name,))}: {error}") from error
         except (ValueError, ArithmeticError) as error:
@@ -234,6 +237,15 @@ def load_study(source: str | Path | None = None, overrides: Sequence[str] = (), 
     all that ships with it, and its own keys replace the shipped ones, key by key. `overrides` are KEY=VALUE with the
     key's last name or dotted path. Raises `HdoptError` with file, line and key for anything that cannot be used.
     """
+    document, name, folder = study_document(source, drive)
+    given = str(Path(source).resolve()) if source is not None and _is_file(Path(source)) else source
+    recipe = {"source": given, "overrides": list(overrides), "drive": drive}
+    return replace(study_of(apply_overrides(document, overrides), name, folder), recipe=recipe)
+
+
+def study_document(source: str | Path | None = None, drive: str | None = None) -> tuple[Document, str, Path]:
+    """The document of the study that `source` and `drive` mean, as `load_study` takes them, with all that ships merged
+    in and nothing checked yet; its name and its folder."""
     if source is None:
         name = drive or DEFAULT_STUDY
         document, folder = _shipped_drive(name), Path()
@@ -246,16 +258,14 @@ def load_study(source: str | Path | None = None, overrides: Sequence[str] = (), 
         own = {key: value for key, value in document.data.items() if key != "drive"}
         base = _shipped_drive(document.data["drive"], document.where(("drive",))).data
         document = Document(merge(base, own), document.source, document.lines)
-    given = str(Path(source).resolve()) if source is not None and _is_file(Path(source)) else source
-    recipe = {"source": given, "overrides": list(overrides), "drive": drive}
-    return replace(study_of(apply_overrides(document, overrides), name, folder), recipe=recipe)
+    return document, name, folder
 
 
 def study_of(document: Document, name: str, folder: Path) -> Study:
     """The study called `name` in a `document` whose shipped parts are merged in already; file names in it are relative
     to `folder`. Raises `HdoptError` with file, line and key for an unknown section or key and for values that no
     study may have."""
-    from hdopt.study.schema import check_sections
+    from hdopt.study.check import check_sections
 
     study = Study(name, check_sections(document), document.data, folder, document.source, document)
     if (work := files_of_work()) is not None:
@@ -314,6 +324,7 @@ def with_values(document: Document, values: Iterable[tuple[str, Any]], place: st
 
 def _resolve(key: str, data: Mapping[str, Any], place: str) -> tuple[str, ...]:
     """The dotted path that a key's last name or path means; an unknown or ambiguous one is an error."""
+    from hdopt.study.nearest import unknown_key
     from hdopt.study.schema import ANY_NAME, known_paths
 
     parts = tuple(key.split("."))
@@ -328,7 +339,7 @@ def _resolve(key: str, data: Mapping[str, Any], place: str) -> tuple[str, ...]:
         return found
     possible = {path for path in possible if ANY_NAME not in path}
     names = {path[-1] for path in possible} if len(parts) == 1 else {".".join(path) for path in possible}
-    raise HdoptError(f"{place} {unknown_name('key', key, sorted(names))}")
+    raise HdoptError(f"{place} {unknown_key(key, sorted(names))}")
 
 
 def _match(

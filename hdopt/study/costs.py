@@ -16,14 +16,20 @@ class CostRow(Section):
     """What every cost may carry: where its numbers come from, and how far the tolerance may go."""
 
     source: str = "assumed"
+    """Where the numbers come from."""
     tightest: NotNegative | None = None
+    """Smallest tolerance that can be made, in the error's unit."""
     widest: Positive | None = None
+    """Largest tolerance that may be allocated."""
 
 
 class ReciprocalRow(CostRow):
     model: Literal["reciprocal"]
+    """a + b/t at tolerance t."""
     a: float = 0.0
+    """Cost that does not depend on the tolerance."""
     b: Positive
+    """Cost times tolerance."""
 
     def build(self, gear: tuple[float, float] | None) -> CostModel:
         return Reciprocal(self.a, self.b)
@@ -31,9 +37,13 @@ class ReciprocalRow(CostRow):
 
 class PowerRow(CostRow):
     model: Literal["power"]
+    """a + b/t^k at tolerance t."""
     a: float = 0.0
+    """Cost that does not depend on the tolerance."""
     b: Positive
+    """Factor."""
     k: Positive
+    """Exponent."""
 
     def build(self, gear: tuple[float, float] | None) -> CostModel:
         return Power(self.a, self.b, self.k)
@@ -41,9 +51,13 @@ class PowerRow(CostRow):
 
 class ExponentialRow(CostRow):
     model: Literal["exponential"]
+    """fixed + a exp(-b t) at tolerance t."""
     a: Positive
+    """Cost at tolerance 0 beyond the fixed one."""
     b: Positive
+    """Decay per unit of tolerance."""
     fixed: float = 0.0
+    """Cost that does not depend on the tolerance."""
 
     def build(self, gear: tuple[float, float] | None) -> CostModel:
         return Exponential(self.a, self.b, self.fixed)
@@ -51,6 +65,7 @@ class ExponentialRow(CostRow):
 
 class PiecewiseRow(CostRow):
     model: Literal["piecewise"]
+    """Straight lines between points."""
     points: list[list[float]] = Field(min_length=2)
     """[tolerance, cost] pairs, tolerances rising."""
 
@@ -64,16 +79,22 @@ class GradeRow(Section):
     """One grade: its cost, and its tolerance unless a standard gives it."""
 
     grade: str | int
+    """Name of the grade, or its number in the standard."""
     cost: float
+    """Its cost."""
     tolerance: Positive | None = None
+    """Its tolerance, in the error's unit, where no standard gives it."""
 
 
 class TableRow(CostRow):
     """A choice of grades; `system` names the standard that gives their tolerances."""
 
     model: Literal["table"]
+    """A choice of grades."""
     grades: list[GradeRow] = Field(min_length=1)
+    """The grades that can be had."""
     system: Literal["iso286", "iso1328", "jis1702"] | None = None
+    """The standard that gives their tolerances."""
     nominal_mm: Positive | None = None
     """Nominal size, for ISO 286."""
     factor: Positive = 1.0
@@ -114,6 +135,7 @@ class AllocateSection(Section):
     """[allocate]: which rule decides, what is compared, and how the result is verified."""
 
     rule: Literal["worst_case", "rss", "yield"] = "yield"
+    """Which rule decides: worst case, root sum square, or yield."""
     compare: bool = True
     """Also the other rules and equal scaling, in one table."""
     verify_n: int = Field(default=2**20, ge=2**14)

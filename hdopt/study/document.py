@@ -12,6 +12,7 @@ from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
 from hdopt.errors import HdoptError, shown
 from hdopt.files import read_text
+from hdopt.study.toml_faults import why_no_toml
 
 Keys = tuple[str, ...]
 
@@ -58,7 +59,7 @@ def parse_document(text: str, source: str) -> Document:
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise HdoptError(f"{source} is not valid TOML: {error}") from error
+        raise HdoptError(f"{source} {why_no_toml(error, text)}") from error
     except RecursionError as error:
         raise HdoptError(f"{source} is nested too deeply; a study has {DEEPEST} levels at most") from error
     except ValueError as error:  # Python refuses integers of more than 4300 digits

@@ -32,21 +32,32 @@ class StudySection(Section):
     """[study]: what the study is called and what `hdopt run` does with it."""
 
     title: str | None = None
+    """A line for reports and `hdopt studies`."""
     description: str | None = None
+    """What the study is for, in sentences."""
     steps: list[str] | None = None
+    """What `hdopt run` does, in this order; all that the study has data for if omitted."""
 
 
 class DriveSection(Section):
-    """[drive]"""
+    """[drive]: teeth and sizes of the drive; or `drive = "csf-25-80"` at the top of the file for a shipped one."""
 
     flexspline_teeth: int = Field(gt=0, le=MOST_TEETH)
+    """Teeth of the flexspline, Z_FS; the ratio is Z_FS/(Z_CS - Z_FS)."""
     circular_spline_teeth: int = Field(gt=0, le=MOST_TEETH + 2)
+    """Teeth of the circular spline, Z_CS: two more than the flexspline has."""
     module_mm: float = Field(ge=0.01, le=50)
+    """Module m."""
     pressure_angle_deg: float = Field(gt=0, lt=45)
+    """Pressure angle of the teeth, alpha."""
     flexspline_inner_radius_mm: Size
+    """Radius of the undeformed inner wall, R_b."""
     flexspline_addendum_mm: Size | None = None
+    """Addendum of the flexspline's teeth; for contact angle, k_e and flank pressure."""
     circular_spline_addendum_mm: Size | None = None
+    """Addendum of the circular spline's teeth; for the same."""
     flexspline_wall_mm: Size | None = None
+    """Thickness of the flexspline's wall under the teeth; for curvature and bending."""
 
     def build(self) -> DriveGeometry:
         return DriveGeometry(
@@ -62,11 +73,14 @@ class DriveSection(Section):
 
 
 class WaveGeneratorSection(Section):
-    """[wave_generator]"""
+    """[wave_generator]: profile, structure and size of the wave generator."""
 
     profile: Literal["ellipse", "resal", "two_disk", "measured"] = "ellipse"
+    """Shape of the flexspline's inner wall on the wave generator."""
     structure: Literal["integral", "automatic", "one_way_major", "one_way_minor"] = "integral"
+    """How the wave generator sits on the shaft: fixed, or free to align itself."""
     width_mm: float = Field(ge=0.1, le=LARGEST_MM)
+    """Axial width b."""
     semi_major_mm: Size | None = None
     """If omitted, the flexspline's inner radius plus the module, which is the usual greatest deflection."""
     semi_minor_mm: Size | None = None
@@ -80,6 +94,7 @@ class WaveGeneratorSection(Section):
     noise_um: float = Field(default=0.0, ge=0, le=1000)
     """Of the measured profile only: standard deviation of a measured radius; the curve is smoothed within it."""
     bearing_thickness_mm: Size | None = None
+    """Radial thickness of the flexible bearing: the cam lies that far inside the profile."""
 
     def build(self, drive: DriveGeometry, folder: Path) -> WaveGenerator:
         return WaveGenerator(
@@ -170,13 +185,18 @@ class ErrorsSection(Section):
 
 
 class ClearancesSection(Section):
-    """[clearances]"""
+    """[clearances]: what lag and the cross-slide need."""
 
     backlash_mm: NotNegativeSize | None = None
+    """Backlash e_t at the pitch line; for the lag at reversal."""
     cross_slide_clearance_mm: NotNegativeSize | None = None
+    """Play e_b between block and slot of a cross-slide; for its lag."""
     slot_1_width_mm: Size | None = None
+    """Width of the slot along the major axis."""
     slot_2_width_mm: Size | None = None
+    """Width of the slot along the minor axis."""
     disc_radius_mm: Size | None = None
+    """Radius of the floating disc, R_w."""
 
     def build(self) -> Clearances:
         return Clearances(
@@ -189,22 +209,28 @@ class ClearancesSection(Section):
 
 
 class MaterialSection(Section):
-    """[material]: of the flexspline"""
+    """[material]: of the flexspline."""
 
     modulus_mpa: float = Field(gt=0, le=2e6)
+    """Young's modulus of the flexspline."""
     poisson: float = Field(ge=0, lt=0.5)
+    """Poisson's ratio."""
     endurance_mpa: float | None = Field(default=None, gt=0, le=1e5)
+    """Endurance limit under alternating bending; for the safety against fatigue."""
 
     def build(self) -> Material:
         return Material(self.modulus_mpa, self.poisson, self.endurance_mpa)
 
 
 class LoadSection(Section):
-    """[load]"""
+    """[load]: what the drive carries, for flank pressure and design searches."""
 
     torque_nm: float | None = Field(default=None, ge=0, le=1e6)
+    """Torque at the output."""
     input_speed_rpm: float | None = Field(default=None, ge=0, le=1e6)
+    """Speed of the input."""
     tooth_face_width_mm: Size | None = None
+    """Face width of the teeth."""
 
     def build(self) -> Load:
         return Load(

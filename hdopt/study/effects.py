@@ -78,10 +78,13 @@ class OperationSection(Section):
     """[operation]: how the drive runs where the effects are evaluated, and which effects count."""
 
     motion: Literal["forward", "backward", "both"] = "forward"
+    """Which way the input turns; both: one full relative turn there and back."""
     output_torque_nm: float | None = None
+    """Constant torque at the output."""
     speed_rpm: Positive | None = None
     """Of the input."""
     temperature_difference_k: float | None = None
+    """From the reference at which the error was zero."""
     time_s: NotNegative | None = None
     """Since the start from cold, when the motion begins."""
     include: Literal["all", "drive", "none"] | None = Field(default=None)

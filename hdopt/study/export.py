@@ -13,7 +13,7 @@ from hdopt.study.base import NotNegative, Positive, Section
 
 
 class ExportSection(Section):
-    """[export]"""
+    """[export]: sizes of the wave generator's solids; one that is left out follows a rule, which is printed."""
 
     bore_mm: Positive | None = None
     mount: Mount | None = None

@@ -1,4 +1,4 @@
-"""The sections a study file may have, and the checking of each with a message that names the place."""
+"""The sections a study file may have, and the keys that each may have."""
 
 from __future__ import annotations
 
@@ -7,12 +7,8 @@ from importlib import import_module
 from types import UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints  # Any: values of TOML, and annotations
 
-from pydantic import ValidationError
-from pydantic_core import ErrorDetails
-
-from hdopt.errors import HdoptError, unknown_name
 from hdopt.study.base import Section
-from hdopt.study.document import KIND_KEYS, Document, Keys
+from hdopt.study.document import KIND_KEYS, Keys
 
 SECTIONS: dict[str, str] = {
     "study": "hdopt.study.drive:StudySection",
@@ -73,15 +69,15 @@ def _paths(model: type[Section], path: Keys, content: Any) -> set[Keys]:
     for name, field in model.model_fields.items():
         here = (*path, field.alias or name)
         value = content.get(here[-1]) if isinstance(content, Mapping) else None
-        named, containers = _sections_in(field.annotation), _containers(field.annotation)
+        named, held_in = sections_in(field.annotation), containers(field.annotation)
         found.add(here)
-        if dict in containers:
+        if dict in held_in:
             found |= _named_tables(named, here, value)
-        elif list not in containers:
+        elif list not in held_in:
             for kind in _kinds(named, value):
                 found |= _paths(kind, here, value)
     if model.__annotations__.get("__pydantic_extra__"):
-        found |= _named_tables(_sections_in(get_type_hints(model)["__pydantic_extra__"]), path, content)
+        found |= _named_tables(sections_in(get_type_hints(model)["__pydantic_extra__"]), path, content)
     return found
 
 
@@ -95,17 +91,17 @@ def _named_tables(kinds: list[type[Section]], path: Keys, content: Any) -> set[K
     return found
 
 
-def _containers(annotation: Any) -> set[Any]:
+def containers(annotation: Any) -> set[Any]:
     """`dict` and `list` where an annotation, or a part of its union, is one."""
     parts = get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)
     return {get_origin(part) for part in parts} & {dict, list}
 
 
-def _sections_in(annotation: Any) -> list[type[Section]]:
+def sections_in(annotation: Any) -> list[type[Section]]:
     """The section models that an annotation names, unions, optional ones and containers opened."""
     if isinstance(annotation, type) and issubclass(annotation, Section):
         return [annotation]
-    return [model for part in get_args(annotation) for model in _sections_in(part)]
+    return [model for part in get_args(annotation) for model in sections_in(part)]
 
 
 def _kinds(models: list[type[Section]], value: Any) -> list[type[Section]]:
@@ -120,75 +116,3 @@ def _kinds(models: list[type[Section]], value: Any) -> list[type[Section]]:
         )
     ]
     return fitting or models
-
-
-def check_sections(document: Document) -> dict[str, Section]:
-    """Every section of `document`, checked; unknown sections and keys are refused with the nearest known one."""
-    checked: dict[str, Section] = {}
-    for name, content in document.data.items():
-        if name not in SECTIONS and name not in (brought := step_sections()):
-            kind = "section" if isinstance(content, Mapping) else "key"
-            raise HdoptError(f"{document.where((name,))}: {unknown_name(kind, name, (*SECTIONS, *brought))}")
-        if not isinstance(content, Mapping):
-            raise HdoptError(f"{document.where((name,))}: is {content!r}; write it as a table, [{name}]")
-        try:
-            checked[name] = section_model(name).model_validate(dict(content))
-        except ValidationError as error:
-            raise HdoptError(_describe(error, document, name)) from error
-    return checked
-
-
-def _describe(error: ValidationError, document: Document, section: str) -> str:
-    """All faults of one section, a line each; unknown keys first, since a misspelt key is also a missing one."""
-    faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
-    return "\n".join(dict.fromkeys(_fault(fault, document, section) for fault in faults))
-
-
-def _fault(fault: ErrorDetails, document: Document, section: str) -> str:
-    # Union members and discriminator tags stand in pydantic's path but not in the file's.
-    path = (section, *(str(part) for part in _path_in_file(fault["loc"], document.data.get(section))))
-    where = document.where(path)
-    if fault["type"] == "extra_forbidden":
-        known = _known_keys(section_model(section), path[1:-1])
-        with_unit = [key for key in known if key.startswith(f"{path[-1]}_")]
-        if len(with_unit) == 1:
-            return f"{where}: unknown key {path[-1]!r}; write {with_unit[0]!r}, with its unit"
-        return f"{where}: {unknown_name('key', path[-1], known) if known else 'unknown key'}"
-    if fault["type"] == "union_tag_not_found":
-        return f"{where}: does not say its {fault['ctx']['discriminator'].strip(chr(39))}; give it"
-    if fault["type"] == "missing":
-        return f"{where}: is missing; give it"
-    if fault["type"] == "model_type":
-        return f"{where}: is {fault['input']!r}; write it as a table, [{'.'.join(path)}]"
-    message = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    value = fault["input"]
-    if isinstance(value, Mapping):
-        return f"{where}: {message}"
-    if message[0].isupper():
-        return f"{where}: {message}"
-    return f"{where}: is {value!r}; it must be {message}"
-
-
-def _known_keys(model: Any, path: Keys) -> tuple[str, ...]:
-    """The keys that the table at `path` of a section may have; () where that depends on what else it says."""
-    for part in path:
-        field = {field.alias or name: field for name, field in model.model_fields.items()}.get(part)
-        choices = () if field is None else (field.annotation, *get_args(field.annotation))
-        tables = [choice for choice in choices if isinstance(choice, type) and issubclass(choice, Section)]
-        if len(tables) != 1:
-            return ()
-        model = tables[0]
-    return tuple(field.alias or name for name, field in model.model_fields.items())
-
-
-def _path_in_file(location: tuple[Any, ...], content: Any) -> Keys:
-    path = []
-    for part in location:
-        if isinstance(content, Mapping) and part in content:
-            content = content[part]
-        elif isinstance(content, list) and isinstance(part, int):
-            content = content[part] if part < len(content) else None
-        elif part is not location[-1]:
-            continue
-        path.append(part)
-    return tuple(path)

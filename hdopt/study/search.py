@@ -14,9 +14,13 @@ class VariableSection(Section):
     """Bounds of one design variable, with `step` or `values` where only some of them can be had."""
 
     lower: float
+    """Smallest value."""
     upper: float
+    """Largest value."""
     step: Positive | None = None
+    """Only lower, lower + step, ... can be had."""
     values: list[float] | None = None
+    """Only these can be had."""
 
     @model_validator(mode="after")
     def _consistent(self) -> VariableSection:
@@ -42,10 +46,15 @@ class VariablesSection(Section):
     """[search.variables]: those that are left out keep the drive's own value."""
 
     pressure_angle_deg: VariableSection | None = None
+    """Pressure angle."""
     width_mm: VariableSection | None = None
+    """Width of the wave generator."""
     module_mm: VariableSection | None = None
+    """Module."""
     deflection_ratio: VariableSection | None = None
+    """Greatest deflection over the module."""
     wrap_angle_deg: VariableSection | None = None
+    """Wrap angle of the two-disk profile."""
 
     @model_validator(mode="after")
     def _possible(self) -> VariablesSection:
@@ -68,9 +77,13 @@ class LimitSection(Section):
     """A limit on a quantity: a number, or a share of what the study's own drive has."""
 
     max: float | None = None
+    """Largest value allowed."""
     min: float | None = None
+    """Smallest value allowed."""
     max_of_baseline: Positive | None = None
+    """Largest value allowed, as a multiple of what the study's own drive has."""
     min_of_baseline: Positive | None = None
+    """Smallest value allowed, as a multiple of what the study's own drive has."""
 
     @model_validator(mode="after")
     def _one(self) -> LimitSection:
@@ -83,38 +96,60 @@ class TradeSection(Section):
     """[search.trade]: constants of the trade's formulas; see `hdopt.mechanics.bearing_life` for their sources."""
 
     rated_torque_nm: Positive | None = None
+    """Torque at which the bearing's life is rated; that of [load] if omitted."""
     rated_speed_rpm: Positive | None = None
+    """Input speed at which it is rated; that of [load] if omitted."""
     bearing_l50_h: Positive = 35_000.0
+    """Median life of the flexible bearing at the rated load."""
     torque_exponent: Positive = 3.0
+    """Exponent of the torque in the life."""
     l10_share: Positive = 0.2
+    """L10 life over median life."""
     width_exponent: NotNegative = 17 / 15
+    """Exponent of the width in the bearing's capacity."""
     friction: NotNegative = 0.07
+    """Coefficient of friction of the flanks."""
     notch_factor: Positive = 2.2
+    """Notch factor of the bending stress under the teeth."""
 
 
 class SearchSection(Section):
-    """[search]"""
+    """[search]: what a design search may vary, what it minimises and what limits it."""
 
     size: Literal["fixed_tooth_counts", "fixed_outside_diameter"] = "fixed_tooth_counts"
+    """What stays while the module changes: tooth counts, or the outside diameter."""
     profiles: list[Literal["ellipse", "resal", "two_disk"]] = Field(
         default=["ellipse", "resal", "two_disk"], min_length=1
     )
+    """Profiles that may be chosen."""
     structures: list[Literal["integral", "automatic", "one_way_major", "one_way_minor"]] = Field(
         default=["integral", "automatic", "one_way_major", "one_way_minor"], min_length=1
     )
+    """Structures that may be chosen."""
     objective: str = "peak_to_peak_arcmin"
+    """Quantity that is minimised."""
     second_objective: str | None = "flank_pressure_mpa"
+    """Quantity of the second axis of the fronts."""
     robust: bool = False
     """Whether the front under the tolerances is made as well."""
     quantile: float = Field(default=0.9973, gt=0.5, lt=1)
+    """Share of drives that the robust objective speaks of."""
     samples: int = Field(default=2048, ge=128, le=1 << 20)
+    """Drives that make a quantile."""
     front_points: int = Field(default=30, ge=2, le=1000)
+    """Points of a front."""
     perturbation: float = Field(default=0.2, gt=0, lt=1)
+    """By which share constants are changed to see whether the choice stays."""
     global_algorithm: str | None = None
+    """Name of NLopt's algorithm for the global stage; its own choice if omitted."""
     local_algorithm: str | None = None
+    """The same for the local stage."""
     variables: VariablesSection | None = None
+    """Bounds of what varies."""
     limits: dict[str, LimitSection] | None = None
+    """Limits by quantity; those that carry no less than the study's drive if omitted."""
     trade: TradeSection = Field(default_factory=TradeSection)
+    """Constants of the formulas."""
 
 
 DEFAULT_VARIABLES = VariablesSection(

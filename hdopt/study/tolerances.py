@@ -35,8 +35,11 @@ class Row(Section):
     """What every distribution may carry: its truncation, and the cost of its tolerance."""
 
     lower: float = Field(default=-INFINITY, allow_inf_nan=True)
+    """Where the distribution is cut off below, in the error's unit."""
     upper: float = Field(default=INFINITY, allow_inf_nan=True)
+    """Where it is cut off above; the tolerance."""
     cost: Cost | None = None
+    """What tightening costs; for `hdopt allocate`."""
 
     @property
     def bounds(self) -> dict[str, float]:
@@ -45,8 +48,11 @@ class Row(Section):
 
 class NormalRow(Row):
     distribution: Literal["normal"]
+    """Normal."""
     mean: float = 0.0
+    """Mean."""
     std: Positive
+    """Standard deviation."""
 
     def build(self, folder: Path) -> Distribution:
         return Normal(mean=self.mean, std=self.std, **self.bounds)
@@ -54,8 +60,11 @@ class NormalRow(Row):
 
 class UniformRow(Row):
     distribution: Literal["uniform"]
+    """Uniform."""
     lower: float
+    """Smallest value."""
     upper: float
+    """Largest value."""
 
     def build(self, folder: Path) -> Distribution:
         return Uniform(**self.bounds)
@@ -63,9 +72,13 @@ class UniformRow(Row):
 
 class TriangularRow(Row):
     distribution: Literal["triangular"]
+    """Triangular."""
     minimum: float
+    """Smallest value."""
     mode: float
+    """Most frequent value."""
     maximum: float
+    """Largest value."""
 
     def build(self, folder: Path) -> Distribution:
         return Triangular(minimum=self.minimum, mode=self.mode, maximum=self.maximum, **self.bounds)
@@ -73,7 +86,9 @@ class TriangularRow(Row):
 
 class RayleighRow(Row):
     distribution: Literal["rayleigh"]
+    """Rayleigh: the size of an offset whose two components are normal."""
     scale: Positive
+    """Standard deviation of each component."""
 
     def build(self, folder: Path) -> Distribution:
         return Rayleigh(scale=self.scale, **self.bounds)
@@ -81,7 +96,9 @@ class RayleighRow(Row):
 
 class HalfNormalRow(Row):
     distribution: Literal["half_normal"]
+    """The size of a normal value."""
     scale: Positive
+    """Standard deviation of that value."""
 
     def build(self, folder: Path) -> Distribution:
         return HalfNormal(scale=self.scale, **self.bounds)
@@ -89,8 +106,11 @@ class HalfNormalRow(Row):
 
 class LogNormalRow(Row):
     distribution: Literal["lognormal"]
+    """Log-normal."""
     median: Positive
+    """Median."""
     log_std: Positive
+    """Standard deviation of the logarithm."""
 
     def build(self, folder: Path) -> Distribution:
         return LogNormal(median=self.median, log_std=self.log_std, **self.bounds)
@@ -98,10 +118,15 @@ class LogNormalRow(Row):
 
 class BetaRow(Row):
     distribution: Literal["beta"]
+    """Beta, between minimum and maximum."""
     a: Positive
+    """First shape parameter."""
     b: Positive
+    """Second shape parameter."""
     minimum: float = 0.0
+    """Smallest value."""
     maximum: float
+    """Largest value."""
 
     def build(self, folder: Path) -> Distribution:
         return Beta(a=self.a, b=self.b, minimum=self.minimum, maximum=self.maximum, **self.bounds)
@@ -109,6 +134,7 @@ class BetaRow(Row):
 
 class MeasuredRow(Row):
     distribution: Literal["measured"]
+    """A measured sample."""
     file: str
     """CSV of one number a line, in the error's unit, relative to the study file."""
 
@@ -120,8 +146,11 @@ class FixedRow(Section):
     """An input that does not vary, such as a direction that is known."""
 
     distribution: Literal["fixed"]
+    """No distribution."""
     value: float
+    """The value, in the error's unit."""
     cost: None = None
+    """None: what does not vary costs nothing."""
 
     def build(self, folder: Path) -> Distribution:
         return Fixed(value=self.value)
@@ -131,10 +160,13 @@ class PositionZoneRow(Section):
     """A position tolerance zone: a plane normal deviation truncated at its edge, or one uniform over the zone."""
 
     distribution: Literal["position_zone"]
+    """A position tolerance zone."""
     diameter: Positive
+    """Diameter of the zone, mm."""
     std: Positive | None = None
     """Standard deviation of each component; without it every place in the zone is alike."""
     cost: Cost | None = None
+    """What tightening costs; for `hdopt allocate`."""
 
     def build(self, folder: Path) -> Distribution:
         radius = self.diameter / 2
@@ -162,7 +194,9 @@ class CorrelationRow(Section):
     """Errors that vary together: the correlation matrix of their normal scores (Gaussian copula)."""
 
     errors: list[str] = Field(min_length=2)
+    """Study keys of the errors, two at least."""
     matrix: list[list[float]]
+    """Correlation matrix of their normal scores, row by row."""
 
     def build(self) -> CorrelationGroup:
         return CorrelationGroup(tuple(self.errors), self.matrix)
@@ -172,6 +206,7 @@ class TolerancesBase(Section):
     """[tolerances]: any error by its study key, and `correlation`, a list of groups of errors."""
 
     correlation: list[CorrelationRow] = Field(default_factory=list)
+    """Groups of errors that vary together."""
 
     @property
     def rows(self) -> dict[str, AnyRow]:
@@ -206,16 +241,20 @@ class RequirementSection(Section):
     """[requirement]: the largest peak-to-peak, the share of drives that must keep it, and whose k_e counts."""
 
     peak_to_peak_arcmin: Positive
+    """Largest converged peak-to-peak of the kinematic error that a drive may have."""
     required_yield: float = Field(default=0.9973, gt=0, lt=1, alias="yield")
-    """`yield` in the file, which is no name that Python allows."""
+    """Share of drives that must keep it (`yield` in the file, which is no name that Python allows)."""
     homogenization: Literal["single_tooth", "contact"] = "single_tooth"
+    """Whose error the limit is for: of a single tooth pair (k_e = 1), or evened out by the teeth in contact."""
 
 
 class ContributorRow(Section):
     """One drawing callout."""
 
     callout: str
+    """coaxiality, total_runout, perpendicularity, parallelism, fit_clearance or total_cumulative_pitch."""
     value_mm: Positive
+    """The callout's value, as on the drawing."""
     feeds: str
     """A vector error (axis_eccentricity, axis_tilt, ...) or the study key of one of its parts."""
     length_mm: Positive | None = None
@@ -223,6 +262,7 @@ class ContributorRow(Section):
     spread: Positive | None = None
     """Standard deviation of the plane deviation as a share of the value; a third if omitted."""
     cost: Cost | None = None
+    """What tightening costs; for `hdopt allocate`."""
 
     def build(self, name: str) -> tuple[Contributor, Distribution]:
         contributor = Contributor(name, self.callout, self.value_mm, vector_of(self.feeds), self.length_mm)
@@ -240,7 +280,7 @@ def vector_of(name: str) -> str:
 
 
 class ContributorsSection(Section):
-    """[contributors]: named callouts."""
+    """[contributors]: drawing callouts by name, each with the error that it feeds, in place of its tolerance."""
 
     model_config = ConfigDict(extra="allow", frozen=True)
     __pydantic_extra__: dict[str, ContributorRow]
@@ -267,7 +307,9 @@ class DimensionRow(Section):
     """One dimension of a linear stack: its tolerance to either side, and how the gap changes with it."""
 
     sensitivity: float = 1.0
+    """Change of the gap for a unit of the dimension."""
     tolerance: Positive
+    """Tolerance to either side."""
     cost: Cost | None = None
     """Without a cost the tolerance is fixed."""
     sigmas: Positive = 3.0
@@ -278,7 +320,10 @@ class LinearStackSection(Section):
     """[linear_stack]: any stack that is a sum of dimensions times sensitivities."""
 
     unit: str = "mm"
+    """Unit of the dimensions."""
     gap_tolerance: Positive
     """What the stack's deviation must keep, to either side."""
     required_yield: float = Field(default=0.9973, gt=0, lt=1)
+    """Share of assemblies that must keep the gap."""
     dimensions: dict[str, DimensionRow] = Field(min_length=1)
+    """A table for each dimension, by its name."""

@@ -15,6 +15,8 @@ from hdopt.geometry.formats import FORMATS
 from hdopt.tolerance.distributions import Normal, Rayleigh
 
 CALLS = {
+    "new": ("new_study",),
+    "check": ("check_study",),
     "ke": ("kinematic_error",),
     "profile": ("profile",),
     "stack": ("stack",),
@@ -35,6 +37,8 @@ OF_A_STUDY = {"drive": "load_study(drive=...)", "overrides": "study.with_(...)",
 OF_RECORDINGS = {"ratio": "recorded_drive", "columns": "recorded_drive", "bench_file": "recorded_drive"}
 EVERYWHERE = {"json_file": "result.to_dict()", "engine": "engine_in_force"}
 OTHERWISE = {
+    "new": {},
+    "check": {},
     "ke": OF_A_STUDY | {"seed": "nothing is random"},
     "profile": OF_A_STUDY | {"profile": "study.with_(profile=...)", "seed": "nothing is random"},
     "stack": OF_A_STUDY | {"resume": "engine"},

@@ -1,0 +1,43 @@
+"""`hdopt check`: what can be computed from a study, and what is missing for the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from hdopt.cli.common import emit, json_option
+
+if TYPE_CHECKING:
+    from hdopt.workflow.check_study import StudyCheck
+
+
+@click.command()
+@click.argument("study", metavar="FILE")
+@json_option
+def command(study: str, json_file: Path | None) -> int:
+    """What can be computed from FILE, a study file or a shipped study, and which keys are missing for the rest.
+
+    Exit status 1: nothing can be computed yet.
+    """
+    from hdopt.workflow.check_study import check_study
+
+    found = check_study(study)
+    emit(found.to_dict(), json_file, _lines(found))
+    return 0 if found.complete else 1
+
+
+def _lines(found: StudyCheck) -> Iterator[str]:
+    yield f"{found.study}:"
+    for one in found.capabilities:
+        commands = ", ".join(f"hdopt {name}" for name in one.commands)
+        if one.can:
+            yield f"  yes  {one.what} ({commands})"
+        elif one.missing:
+            yield f"  no   {one.what}: give {', '.join(one.missing)}"
+        else:
+            yield f"  no   {one.what}: {one.why}"
+    for said in found.defaults:
+        yield f"default: {said}"

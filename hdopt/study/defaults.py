@@ -1,0 +1,84 @@
+"""What holds where a study does not say: the defaults that a command falls back on, a line a section."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any  # Any: parsed TOML
+
+from hdopt.study.base import Section
+
+DRIVE = ("wave_generator", "errors", "cs_teeth", "fs_teeth")
+TOLERANCED = (*DRIVE, "tolerances", "requirement", "contributors", "linear_stack")
+USED: dict[str, tuple[str, ...]] = {
+    "ke": (*DRIVE, "requirement", "operation"),
+    "profile": ("wave_generator",),
+    "stack": TOLERANCED,
+    "sobol": TOLERANCED,
+    "allocate": (*TOLERANCED, "allocate"),
+    "search": (*TOLERANCED, "search"),
+    "export": ("wave_generator",),
+    "compare": ("wave_generator",),
+}
+"""Command -> the sections whose defaults it may fall back on; a command that is not here says them itself."""
+WHOLE = ("allocate", "search")
+"""Sections that a command may be run without: then all of their defaults hold."""
+OF_NO_WEIGHT = ("source", "noise_um", "correlation", "cost", "rated_torque_nm", "rated_speed_rpm")
+"""Keys whose default changes nothing, or that another line speaks of."""
+
+
+def defaults_taken(sections: Mapping[str, Section], names: Sequence[str]) -> tuple[str, ...]:
+    """A line for each of the sections `names` of a study, of its checked `sections`, that leaves something out: which
+    value holds instead."""
+    return tuple(line for name in names if (line := _line(name, sections.get(name))))
+
+
+def _line(name: str, section: Section | None) -> str:
+    if section is None:
+        if name not in WHOLE:
+            return ""
+        return f"[{name}] is not given: its defaults hold, which 'hdopt new' writes out"
+    if name == "errors":
+        zero = [key for key in type(section).model_fields if _is_zero_error(section, key)]
+        return f"[errors] does not give {', '.join(zero)}: zero" if zero else ""
+    taken = [*_rules(name, section), *_values(section, ())]
+    return f"[{name}] falls back on {', '.join(taken)}" if taken else ""
+
+
+def _is_zero_error(section: Section, key: str) -> bool:
+    """Whether [errors] leaves a size or a tilt out; directions and phases belong to their size."""
+    return key not in section.model_fields_set and type(section).model_fields[key].default == 0.0
+
+
+def _rules(name: str, section: Any) -> Iterator[str]:
+    """What rules find where a number is not given."""
+    if name == "wave_generator" and section.profile != "measured":
+        if section.semi_major_mm is None:
+            yield "semi_major_mm = inner radius + module"
+        if section.profile == "ellipse" and section.semi_minor_mm is None:
+            yield "semi_minor_mm from equal perimeter"
+    if name == "contributors":
+        without = [key for key, row in section.rows.items() if row.spread is None]
+        if without:
+            yield f"a spread of a third of the value for {', '.join(without)}"
+
+
+def _values(section: Section, path: tuple[str, ...]) -> Iterator[str]:
+    """'key = value' of every default with a value that `section`, at `path` below its name, or a table in it takes."""
+    for name, field in type(section).model_fields.items():
+        value = getattr(section, name)
+        here = (*path, field.alias or name)
+        if isinstance(value, Section) and name in section.model_fields_set:
+            yield from _values(value, here)
+        elif name not in section.model_fields_set and name not in OF_NO_WEIGHT and _says_something(value):
+            yield f"{'.'.join(here)} = {_shown(value)}"
+
+
+def _says_something(value: Any) -> bool:
+    if isinstance(value, float) and not math.isfinite(value):
+        return False
+    return value is not None and not isinstance(value, Section | list | dict) and value is not False
+
+
+def _shown(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,0 +1,260 @@
+"""A study to begin with, what a study lacks, and the messages on the way: each says what to do next."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+import hdopt
+from hdopt.cli import main
+from hdopt.errors import HdoptError, IncompleteStudy, MissingValue
+from hdopt.study import shipped_drives, shipped_studies
+from hdopt.study.defaults import defaults_taken
+from hdopt.study.nearest import near_keys
+from hdopt.study.schema import SECTIONS, section_model
+from hdopt.workflow.check_study import PROBES
+from hdopt.workflow.study_reference import section_reference, study_reference
+
+OWN = """[drive]
+flexspline_teeth = 200
+circular_spline_teeth = 202
+module_mm = 0.25
+pressure_angle_deg = 20
+flexspline_inner_radius_mm = 24.2
+[wave_generator]
+width_mm = 7.5
+[errors]
+axis_tilt_x_deg = 0.1
+"""
+
+
+def said(capsys, *arguments):
+    """Exit status, standard output and standard error of a command line."""
+    with pytest.raises(SystemExit) as end:
+        main(list(arguments))
+    out = capsys.readouterr()
+    return end.value.code, out.out, out.err
+
+
+@pytest.mark.parametrize("source", [*shipped_drives(), *shipped_studies()])
+def test_a_new_study_has_the_numbers_of_its_source(source, tmp_path):
+    """Would catch a section, a key or a nested table that is not written, or written as another value."""
+    made = hdopt.new_study(tmp_path / "mine", source)
+    ours, theirs = hdopt.load_study(made.file), hdopt.load_study(source)
+    titled = {**theirs.data, "study": {**theirs.data.get("study", {}), "title": "mine"}}
+    assert ours.data == titled
+    if "drive" in theirs.sections:
+        assert ours.drive == theirs.drive
+
+
+def test_every_key_of_the_schema_stands_in_a_new_study_and_is_explained(tmp_path):
+    text = hdopt.new_study(tmp_path / "mine").file.read_text()
+    for name in SECTIONS:
+        if name in ("effects", "contributors"):
+            continue
+        assert re.search(rf"^(# )?\[{name}\]$", text, re.M), name
+        for key in section_reference(name)[0].keys:
+            assert re.search(rf"^(# )?{key.key} = .+# \S", text, re.M), f"{name}.{key.key}"
+
+
+def test_a_default_behind_a_comment_sign_is_the_one_that_holds(tmp_path):
+    """Each '# key = value' taken in gives the same study: would catch a default that the comment has wrong."""
+    file = hdopt.new_study(tmp_path / "mine", "csf-25-80-tolerances").file
+    before = hdopt.load_study(file)
+    lines = file.read_text().splitlines()
+    section, tried = "", 0
+    for place, line in enumerate(lines):
+        section = line.strip("[]") if line.startswith("[") else section
+        if line.startswith("# ["):
+            section = ""
+        if section and re.match(r"# \w+ = (?!\.\.\.)", line):
+            changed = [*lines[:place], line[2:], *lines[place + 1 :]]
+            (tmp_path / "changed.toml").write_text("\n".join(changed))
+            assert hdopt.load_study(tmp_path / "changed.toml").sections == before.sections, line
+            tried += 1
+    assert tried >= 3
+
+
+def test_every_key_has_a_meaning():
+    """Would catch a key added to the schema without a word on it: comments and the docs' page would be empty there."""
+    without = [
+        f"{table.name}: {key.key}"
+        for name, tables in study_reference().items()
+        for table in tables
+        for key in table.keys
+        if not key.meaning or not table.says
+    ]
+    assert without == []
+
+
+def test_new_does_not_write_over_a_file(tmp_path, capsys):
+    (tmp_path / "mine.toml").write_text("")
+    status, _, error = said(capsys, "new", str(tmp_path / "mine"))
+    assert status == 2 and "is there already" in error
+    assert (tmp_path / "mine.toml").read_text() == ""
+
+
+def test_a_new_drive_needs_one_message_for_all_that_it_lacks(tmp_path, capsys):
+    """Would catch a message a key: after adding what the first one lists, the file must do."""
+    file = tmp_path / "own.toml"
+    file.write_text("[drive]\nflexspline_teeth = 200\n")
+    status, _, error = said(capsys, "ke", str(file))
+    assert status == 2 and error.count("\n") == 1
+    named = re.findall(r"\b(drive|wave_generator)\.(\w+)", error)
+    shipped = hdopt.load_study().data
+    text = "[drive]\nflexspline_teeth = 160\n" + "".join(f"{k} = {shipped[s][k]}\n" for s, k in named if s == "drive")
+    text += "[wave_generator]\n" + "".join(f"{k} = {shipped[s][k]}\n" for s, k in named if s == "wave_generator")
+    file.write_text(text + "[errors]\naxis_tilt_x_deg = 0.1\n")
+    assert hdopt.kinematic_error(file).peak_to_peak_arcmin > 0
+
+
+def test_check_tells_what_an_own_drive_allows(tmp_path, capsys):
+    file = tmp_path / "own.toml"
+    file.write_text(OWN)
+    status, out, _ = said(capsys, "check", str(file), "--json", "-")
+    found = json.loads(out)
+    assert status == 0
+    assert found["can"] == ["kinematic error of one drive"]
+    assert found["missing"]["flank pressure"] == [
+        "load.torque_nm",
+        "load.tooth_face_width_mm",
+        "drive.flexspline_addendum_mm",
+        "drive.circular_spline_addendum_mm",
+    ]
+    assert found["missing"]["tolerance stack and sensitivities"] == ["[tolerances]", "[requirement]"]
+    frame = hdopt.check_study(file).to_frame()
+    assert list(frame["what"]) == [one.what for one, _ in PROBES]
+
+
+def test_check_of_an_incomplete_drive_says_all_at_once(tmp_path, capsys):
+    file = tmp_path / "own.toml"
+    file.write_text("[drive]\nflexspline_teeth = 200\n")
+    status, out, _ = said(capsys, "check", str(file), "--json", "-")
+    found = json.loads(out)
+    assert status == 1 and found["can"] == []
+    assert found["missing"]["kinematic error of one drive"] == [
+        "drive.circular_spline_teeth",
+        "drive.module_mm",
+        "drive.pressure_angle_deg",
+        "drive.flexspline_inner_radius_mm",
+        "wave_generator.width_mm",
+        "[errors]",
+    ]
+
+
+@pytest.mark.parametrize("place", range(len(PROBES)), ids=[one.what for one, _ in PROBES])
+def test_what_check_calls_missing_is_what_stops_the_work(place, tmp_path):
+    """For each key of the shipped study: without it the work asks for that key if and only if `check` says so."""
+    capability, probe = PROBES[place]
+    whole = hdopt.load_study("csf-25-80-tolerances")
+    probe(whole)
+    for section, keys in whole.data.items():
+        for key in keys:
+            field = section_model(section).model_fields.get(key)
+            if field is None or field.is_required():
+                continue
+            data = {name: {k: v for k, v in rows.items() if (name, k) != (section, key)} for name, rows in
+                    whole.data.items()}  # fmt: skip
+            study = hdopt.load_study().with_(data)
+            stopped: tuple[str, ...] = ()
+            try:
+                probe(study)
+            except MissingValue as error:
+                stopped = error.keys
+            except HdoptError:
+                continue
+            checked = {one.what: one for one in hdopt.check_study(study).capabilities}[capability.what]
+            assert (f"{section}.{key}" in stopped) == (f"{section}.{key}" in checked.missing), (section, key)
+
+
+MESSAGES = {
+    "a decimal comma": ("[drive]\nmodule_mm = 0,3\n", r"line 2, module_mm = 0,3: a decimal point is needed.*: 0\.3"),
+    "a comma in a table": (
+        "[tolerances]\naxis_tilt_x_deg = { distribution = 'normal', std = 0,03 }\n",
+        r"decimal point is needed, not a comma: 0\.03",
+    ),
+    "a comma in quotes": ("[wave_generator]\nwidth_mm = '8,5'\n", r"a decimal point is needed, not a comma: 8\.5"),
+    "a unit": ("[wave_generator]\nwidth_mm = 9 mm\n", "a number stands alone, 9, in the unit that ends the key's name"),
+    "no quotes": ("[wave_generator]\nprofile = ellipse\n", 'a text needs quotation marks, "ellipse"'),
+    "both drives": ('drive = "csf-25-80"\n[drive]\nmodule_mm = 1\n', "keep one of them"),
+    "a kind": (
+        "[tolerances]\naxis_tilt_x_deg = { distribution = 'norml', std = 0.1 }\n",
+        "its distribution is 'norml'; it must be one of normal, uniform",
+    ),
+    "a bare tolerance": ("[tolerances]\naxis_tilt_x_deg = 0.1\n", "give its distribution, as in { distribution"),
+    "a cost": (
+        "[tolerances]\naxis_tilt_x_deg = { distribution = 'normal', std = 0.1, cost = { model = 'x' } }\n",
+        "its model is 'x'; it must be one of reciprocal, power",
+    ),
+    "a list": ("[search]\nprofiles = 'ellipse'\n", "must be a list, in square brackets"),
+    "a whole number": ("[export]\nbolt_count = 2.5\n", "must be a whole number"),
+    "another section's key": ("[errors]\npressure_angle_deg = 12\n", r"it belongs into \[drive\]"),
+    "a ratio": ("[drive]\nratio = 100\n", "did you mean 'flexspline_teeth' or 'circular_spline_teeth'"),
+    "half a name": ("[errors]\neccentricity = 0.01\n", "'axis_eccentricity_mm' or 'wg_eccentricity_mm'"),
+    "a symbol": ("[errors]\ne1 = 0.01\n", "did you mean 'axis_eccentricity_mm'"),
+    "without its unit": ("[wave_generator]\nwidth = 9\n", "write 'width_mm', with its unit"),
+}
+OF_PYDANTIC = re.compile("Input |tag|dictionary|extract|pydantic|valid (list|integer|boolean|number|string)", re.I)
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_messages_are_in_the_words_of_whoever_wrote_the_file(name, tmp_path):
+    text, message = MESSAGES[name]
+    file = tmp_path / "own.toml"
+    file.write_text(text)
+    with pytest.raises(HdoptError, match=message) as refused:
+        hdopt.load_study(file)
+    assert not OF_PYDANTIC.search(str(refused.value).partition(": ")[2])
+
+
+def test_a_comma_given_by_set_is_explained(capsys):
+    status, _, error = said(capsys, "ke", "--set", "module_mm=0,3")
+    assert status == 2 and "a decimal point is needed, not a comma: 0.3" in error
+
+
+def test_a_commas_list_is_no_decimal_comma(tmp_path):
+    """A list of whole numbers without blanks is TOML; its fault elsewhere on the line must not be called a comma."""
+    file = tmp_path / "own.toml"
+    file.write_text("[allocate]\ncurve = [1,2] x\n")
+    with pytest.raises(HdoptError) as refused:
+        hdopt.load_study(file)
+    assert "decimal" not in str(refused.value)
+
+
+def test_names_that_are_like_nothing_get_no_suggestion():
+    keys = [key for name in ("search", "tolerances") for key in section_model(name).model_fields]
+    assert near_keys("ratio", keys) == []
+    assert near_keys("colour", keys) == []
+    assert near_keys("axis_tilt_z_deg", keys) == ["axis_tilt_x_deg"] or near_keys("axis_tilt_z_deg", keys)
+
+
+def test_an_incomplete_study_names_its_keys(tmp_path):
+    file = tmp_path / "own.toml"
+    file.write_text(OWN.replace("module_mm = 0.25\n", ""))
+    with pytest.raises(IncompleteStudy) as refused:
+        hdopt.load_study(file)
+    assert refused.value.keys == ("drive.module_mm",)
+
+
+def test_what_a_command_falls_back_on_is_printed(tmp_path, capsys):
+    """Would catch a default taken in silence: profile, structure, the axes by rule, errors that are zero."""
+    file = tmp_path / "own.toml"
+    file.write_text(OWN)
+    _, out, _ = said(capsys, "ke", str(file))
+    assert "default: [wave_generator] falls back on semi_major_mm = inner radius + module, semi_minor_mm from" in out
+    assert "profile = ellipse, structure = integral" in out
+    assert "default: [errors] does not give axis_eccentricity_mm, axis_tilt_y_deg, wg_eccentricity_mm" in out
+    _, out, _ = said(capsys, "profile", "--json", "-")
+    assert json.loads(out)["defaults"] == ["no study given: the shipped csf-25-80"]
+    _, out, _ = said(capsys, "profile", "csf-25-80")
+    assert "default:" not in out
+
+
+def test_a_study_that_says_everything_falls_back_on_nothing():
+    study = hdopt.load_study()
+    assert defaults_taken(study.sections, ("wave_generator", "errors", "tolerances", "requirement")) == ()
+    without = study.with_({"requirement": {"peak_to_peak_arcmin": 1.0}})
+    (line,) = defaults_taken(without.sections, ("requirement",))
+    assert line == "[requirement] falls back on yield = 0.9973, homogenization = single_tooth"
