@@ -63,14 +63,19 @@ class LoadSharing:
     def table(self, teeth: MeasuredTeeth) -> Array:
         """Mean over the teeth in contact on an even grid of one turn of the spline of `teeth`, mm of arc,
         (12 Z,)."""
-        z = len(teeth.deviations)
-        n = z * PLACES_PER_TOOTH
-        impulses, ones = np.zeros(n), np.zeros(n)
-        impulses[::PLACES_PER_TOOTH], ones[::PLACES_PER_TOOTH] = teeth.deviations, 1.0
-        offset = np.mod(2 * math.pi * np.arange(n) / n - teeth.first_angle + math.pi, 2 * math.pi) - math.pi
-        window = np.fft.rfft(self.weights(offset))
-        summed, weight = (np.fft.irfft(np.fft.rfft(values) * window, n) for values in (impulses, ones))
-        return np.asarray(summed / weight)
+        return np.asarray(self.tables(np.array([teeth.deviations]), teeth.first_angle)[0])
+
+    def tables(self, deviations: Array, first_angle: float = 0.0) -> Array:
+        """The same of many splines whose teeth have the cumulative `deviations` (n, Z), mm of arc, (n, 12 Z); their
+        first teeth lie at `first_angle`, rad."""
+        z = deviations.shape[1]
+        places = np.arange(z * PLACES_PER_TOOTH).reshape(z, PLACES_PER_TOOTH)
+        offset = np.mod(2 * math.pi * places / places.size - first_angle + math.pi, 2 * math.pi) - math.pi
+        weights = self.weights(offset)
+        # One circular convolution over the teeth for each place within a tooth.
+        window = np.fft.rfft((weights / weights.sum(axis=0)).T)
+        shared = np.fft.irfft(np.fft.rfft(deviations)[:, None, :] * window, z)
+        return np.ascontiguousarray(shared.transpose(0, 2, 1)).reshape(len(deviations), places.size)
 
 
 NO_TABLE: Array = np.empty(0)

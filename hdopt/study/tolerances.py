@@ -9,6 +9,8 @@ from typing import Annotated, Any, Literal  # Any: fields that pydantic takes
 from pydantic import ConfigDict, Field, create_model
 
 from hdopt.drive.errors import PHASE_OF, STUDY_KEYS, study_key
+from hdopt.drive.geometry import DriveGeometry
+from hdopt.drive.pitch_tolerances import CLASSES, PitchTolerances, iso_1328_tolerances
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.study.base import Positive, Section
 from hdopt.study.costs import Cost
@@ -26,6 +28,7 @@ from hdopt.tolerance.distributions import (
     Triangular,
     Uniform,
 )
+from hdopt.tolerance.drawn_teeth import GradedTeeth
 from hdopt.tolerance.drive_inputs import contributor_distribution
 
 INFINITY = float("inf")
@@ -202,11 +205,56 @@ class CorrelationRow(Section):
         return CorrelationGroup(tuple(self.errors), self.matrix)
 
 
+class GradedTeethRow(Section):
+    """Tolerances of the pitch of a spline, from which its teeth are drawn: two lengths, or a class that gives both."""
+
+    iso_1328_class: int | None = Field(default=None, ge=CLASSES[0], le=CLASSES[1])
+    """ISO 1328-1:2013, which ANSI/AGMA ISO 1328-1-B14 adopts. Its scope begins at module 0.5 and at involutes."""
+    single_pitch_um: Positive | None = None
+    """Largest single pitch deviation by size, f_p."""
+    cumulative_pitch_um: Positive | None = None
+    """Range of the cumulative pitch deviations, F_p."""
+    share: float = Field(default=0.9973, ge=0.5, le=0.9995)
+    """Share of splines that keep each of both."""
+    spectrum: Literal["power_law", "one_wave"] = "power_law"
+    """How the deviations spread over waves a turn: as a power of the wave, or independent teeth and one wave a turn."""
+    sine: Literal["instead", "beside"] = "instead"
+    """Whether the teeth stand instead of the spline's tooth amplitude, or beside it."""
+
+    def build(self, name: str, module: float, teeth: int) -> GradedTeeth:
+        """The record of the spline `name` with so many `teeth` of this `module`, mm."""
+        single, cumulative, of_class = self.single_pitch_um, self.cumulative_pitch_um, self.iso_1328_class
+        if of_class is not None and single is None and cumulative is None:
+            tolerances = iso_1328_tolerances(of_class, module, teeth)
+        elif of_class is None and single is not None and cumulative is not None:
+            tolerances = PitchTolerances(single / 1000, cumulative / 1000)
+        else:
+            raise HdoptError(
+                f"[tolerances] {name}: give either iso_1328_class, or both single_pitch_um and cumulative_pitch_um"
+            )
+        return GradedTeeth(tolerances, self.share, self.spectrum, self.sine == "beside")
+
+
 class TolerancesBase(Section):
-    """[tolerances]: any error by its study key, and `correlation`, a list of groups of errors."""
+    """[tolerances]: any error by its study key, `cs_teeth` and `fs_teeth` by pitch, and `correlation`, a list of groups
+    of errors."""
 
     correlation: list[CorrelationRow] = Field(default_factory=list)
     """Groups of errors that vary together."""
+    cs_teeth: GradedTeethRow | None = None
+    """Tolerances of pitch that the circular spline's teeth are drawn from."""
+    fs_teeth: GradedTeethRow | None = None
+    """The same of the flexspline's."""
+
+    def graded(self, geometry: DriveGeometry) -> dict[str, GradedTeeth]:
+        """By spline of `geometry`, the tolerances of pitch that its teeth are drawn from."""
+        teeth = geometry.circular_spline_teeth, geometry.flexspline_teeth
+        rows = {"cs_teeth": self.cs_teeth, "fs_teeth": self.fs_teeth}
+        return {
+            name: row.build(name, geometry.module, number)
+            for (name, row), number in zip(rows.items(), teeth, strict=True)
+            if row is not None
+        }
 
     @property
     def rows(self) -> dict[str, AnyRow]:

@@ -16,12 +16,22 @@ from hdopt.errors import HdoptError, unknown_name
 from hdopt.tolerance.contributors import TILT, VECTORS, Contributor
 from hdopt.tolerance.copula import CorrelationGroup
 from hdopt.tolerance.distributions import Distribution, Rayleigh, Uniform
+from hdopt.tolerance.drawn_teeth import (
+    SPLINES,
+    WHICH_SPLINE,
+    DrawnTeeth,
+    GradedTeeth,
+    check_graded,
+    drawn_peak_to_peak_arcmin,
+)
 from hdopt.tolerance.space import InputSpace, Tolerance
 
 FULL_TURN = Uniform(lower=0.0, upper=360.0)
 """A free direction, deg."""
 
 TILTS = tuple(name for name in ERROR_NAMES if "tilt" in name)
+SINE_OF = dict(zip(SPLINES, ("cs_tooth_amplitude", "fs_tooth_amplitude"), strict=True))
+"""The sine that stands for all teeth of a spline where nothing better is known."""
 TURNING = tuple(PHASE_OF.values())
 """Directions and phases: they have no tolerance that could be narrowed."""
 
@@ -88,14 +98,15 @@ class VectorSum:
 class DriveResponse:
     """Converged peak-to-peak kinematic error (arcmin, times k_e) of the drive each row of inputs describes.
 
-    With measured teeth k_e is for the sines beside them, and misalignment has its own mean. Errors that no column feeds
-    keep the value they have in `held`.
+    With measured or drawn `teeth` k_e is for the sines beside them, and misalignment has its own mean. Errors that no
+    column feeds keep the value they have in `held`.
     """
 
     drive: Drive
     held: DriveErrors
     feeds: tuple[Feed, ...]
     homogenization: float = 1.0
+    teeth: tuple[DrawnTeeth, ...] = ()
 
     def errors(self, inputs: Array) -> DriveErrors:
         """The errors of all rows at once."""
@@ -108,7 +119,7 @@ class DriveResponse:
         """A proven bound of the response over the box, None where there is no proof; see `drive_bound`."""
         from hdopt.tolerance.drive_bound import peak_to_peak_bound_arcmin
 
-        if not self.drive.wave_generator.profile.tip_is_smooth:
+        if self.teeth or not self.drive.wave_generator.profile.tip_is_smooth:
             return None
         bound = peak_to_peak_bound_arcmin(self.drive, self.widest_errors(lower, upper))
         if bound is None:
@@ -144,6 +155,8 @@ class DriveResponse:
     def __call__(self, inputs: Array) -> Array:
         from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin, peak_to_peak_arcmin
 
+        if self.teeth:
+            return drawn_peak_to_peak_arcmin(self.drive, self.matrix(inputs), inputs, self.teeth, *self._shares)
         if self.drive.has_measured_teeth and self.homogenization != 1:
             return self._shared(inputs)
         if self.drive.wave_generator.profile.tip_is_smooth:
@@ -153,12 +166,17 @@ class DriveResponse:
     def _shared(self, inputs: Array) -> Array:
         """Each term of drives with `inputs` (n, d) as the teeth in contact share it: sines by k_e, misalignment by its
         mean, measured teeth by theirs; arcmin, (n,)."""
-        from hdopt.kinematics.load_sharing import misalignment_share
         from hdopt.kinematics.peak_to_peak import beat_extremes_arcmin
 
-        shares = misalignment_share(self.drive), self.homogenization
-        low, high = beat_extremes_arcmin(self.drive, self.matrix(inputs), None, *shares).T
+        low, high = beat_extremes_arcmin(self.drive, self.matrix(inputs), None, *self._shares).T
         return np.asarray(high - low)
+
+    @property
+    def _shares(self) -> tuple[float, float]:
+        """What is left of misalignment and of sines where the teeth in contact share them; all for a single pair."""
+        from hdopt.kinematics.load_sharing import misalignment_share
+
+        return (1.0, 1.0) if self.homogenization == 1 else (misalignment_share(self.drive), self.homogenization)
 
 
 @dataclass(frozen=True)
@@ -171,6 +189,8 @@ class DriveProblem:
     """Tolerances that callouts took the place of."""
     freed: tuple[str, ...] = ()
     """Directions and phases that no tolerance says anything of: they are free over the full turn."""
+    graded: Mapping[str, GradedTeeth] = field(default_factory=dict)
+    """By spline ('cs_teeth', 'fs_teeth'), tolerances of pitch that teeth are drawn from."""
 
 
 def tolerance_of(error: str, distribution: Distribution) -> Tolerance:
@@ -191,29 +211,54 @@ def drive_problem(
     contributors: Mapping[Contributor, Distribution] | None = None,
     correlations: Sequence[CorrelationGroup] = (),
     homogenization: float = 1.0,
+    graded: Mapping[str, GradedTeeth] | None = None,
 ) -> DriveProblem:
     """The stack of a `drive` from the distributions of its errors and of its callouts.
 
     `tolerances` are by study key (mm, deg), those of `contributors` by callout (mm). An error that callouts feed is
     theirs alone. A direction or phase that is not given is free over the full turn where its magnitude varies; what is
     given nowhere keeps its value in `held`. `correlations` group inputs that vary together, `homogenization` is k_e.
-    Raises `HdoptError` for a key that is not an error, and for a magnitude that could be negative.
+    `graded` holds tolerances of pitch by spline; the spline's sine leaves where they stand instead of it. Raises
+    `HdoptError` for a key that is not an error, and for a magnitude that could be negative.
     """
-    contributors = contributors or {}
+    contributors, graded = contributors or {}, graded or {}
+    check_graded(drive, graded)
+    held, tolerances = _without_sines(held or DriveErrors(), tolerances, graded)
     tolerances, freed = with_free_directions(tolerances)
     fed = {error for contributor in contributors for error in VECTORS[contributor.feeds][1:]}
     inputs: dict[str, Tolerance] = {}
-    feeds: list[Feed] = []
     groups: dict[str, list[str]] = {name: [] for name in ERROR_GROUPS}
-    replaced = []
+    own = {key: distribution for key, distribution in tolerances.items() if STUDY_KEYS.get(key) not in fed}
+    feeds = _add_errors(own, inputs, groups)
+    terms, free = _add_callouts(contributors, inputs, groups)
+    feeds += [VectorSum(vector, tuple(parts)) for vector, parts in terms.items()]
+    drawn = _add_teeth(drive, graded, inputs, groups)
+    space = InputSpace(
+        inputs,
+        tuple(correlations),
+        {group: tuple(names) for group, names in groups.items() if names},
+        folded=frozenset(study_key(name) for name in TILTS) & set(inputs),
+        turning=frozenset(name for name in inputs if STUDY_KEYS.get(name) in TURNING or name in free or name in graded),
+        fields=frozenset(graded),
+    )
+    return DriveProblem(
+        DriveResponse(drive, held, tuple(feeds), homogenization, drawn),
+        space,
+        tuple(key for key in tolerances if key not in own and key not in freed),
+        tuple(key for key in freed if key in inputs),
+        graded,
+    )
+
+
+def _add_errors(
+    tolerances: Mapping[str, Distribution], inputs: dict[str, Tolerance], groups: dict[str, list[str]]
+) -> list[Feed]:
+    """Add the errors that `tolerances` are of, by study key, to `inputs` and `groups`: what they feed."""
+    feeds: list[Feed] = []
     for key, distribution in tolerances.items():
         if key not in STUDY_KEYS:
             raise HdoptError(f"[tolerances]: {unknown_name('error', key, STUDY_KEYS)}")
         error = STUDY_KEYS[key]
-        if error in fed:
-            if key not in freed:
-                replaced.append(key)
-            continue
         if error in PHASE_OF and distribution.support[0] < 0:
             raise HdoptError(
                 f"[tolerances] {key} is a magnitude but may be as low as {distribution.support[0]:g}; give lower = 0, "
@@ -222,21 +267,31 @@ def drive_problem(
         feeds.append(Direct(len(inputs), error))
         inputs[key] = tolerance_of(error, distribution)
         groups[_group_of(error)].append(key)
-    terms, free = _add_callouts(contributors, inputs, groups)
-    feeds += [VectorSum(vector, tuple(parts)) for vector, parts in terms.items()]
-    space = InputSpace(
-        inputs,
-        tuple(correlations),
-        {group: tuple(names) for group, names in groups.items() if names},
-        folded=frozenset(study_key(name) for name in TILTS) & set(inputs),
-        turning=frozenset(name for name in inputs if STUDY_KEYS.get(name) in TURNING or name in free),
-    )
-    return DriveProblem(
-        DriveResponse(drive, held or DriveErrors(), tuple(feeds), homogenization),
-        space,
-        tuple(replaced),
-        tuple(key for key in freed if key in inputs),
-    )
+    return feeds
+
+
+def _without_sines(
+    held: DriveErrors, tolerances: Mapping[str, Distribution], graded: Mapping[str, GradedTeeth]
+) -> tuple[DriveErrors, Mapping[str, Distribution]]:
+    """`held` and `tolerances` without the tooth sines that drawn teeth stand instead of."""
+    amplitudes = [SINE_OF[spline] for spline, teeth in graded.items() if not teeth.sine]
+    left_out = {study_key(name) for amplitude in amplitudes for name in (amplitude, PHASE_OF[amplitude])}
+    kept = {key: distribution for key, distribution in tolerances.items() if key not in left_out}
+    return held.with_(**dict.fromkeys(amplitudes, 0.0)), kept
+
+
+def _add_teeth(
+    drive: Drive, graded: Mapping[str, GradedTeeth], inputs: dict[str, Tolerance], groups: dict[str, list[str]]
+) -> tuple[DrawnTeeth, ...]:
+    """Add an input for each spline of `drive` whose teeth are drawn to `inputs` and `groups`."""
+    numbers = (drive.geometry.circular_spline_teeth, drive.geometry.flexspline_teeth)
+    drawn = []
+    for spline, teeth in zip(SPLINES, numbers, strict=True):
+        if spline in graded:
+            drawn.append(DrawnTeeth(len(inputs), spline, graded[spline].field(teeth)))
+            inputs[spline] = WHICH_SPLINE
+            groups[_group_of(SINE_OF[spline])].append(spline)
+    return tuple(drawn)
 
 
 def _add_callouts(

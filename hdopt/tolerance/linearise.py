@@ -84,7 +84,17 @@ def linearise(response: Response, space: InputSpace, seed: int) -> Linearisation
     if space.copula.is_independent:
         covariance = np.diag(np.diag(covariance))  # what is left beside it is sampling noise
     parts = slopes * (covariance @ slopes)
-    alone = {name: _variance_alone(centre, u[:, space.index(name)]) for name in space.names if name in space.turning}
+    alone = {
+        name: _variance_alone(centre, u[:, space.index(name)])
+        for name in space.names
+        if name in space.turning - space.fields
+    }
+    for name in space.fields:
+        # A field's number has no neighbours: what it does alone is what two drives with the same field share.
+        others, kept = np.roll(inputs, 1, axis=0), space.index(name)
+        others[:, kept], others[:, columns] = inputs[:, kept], np.roll(signs, 1, axis=0) * point
+        shared = evaluate(response, np.asfortranarray(others), space.names, "the linearisation")
+        alone[name] = max(float(np.cov(centre, shared)[0, 1]), 0.0)
     turning = float(np.var(centre))
     total = float(parts.sum()) + turning
     shares = dict(zip(straight, (parts / total).tolist(), strict=True)) if total > 0 else dict.fromkeys(straight, 0.0)

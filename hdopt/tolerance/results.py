@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 from hdopt.kinematics.model_error import ModelError
@@ -28,11 +29,15 @@ class StackResult:
     """closed form or exact: the geometry of the drives' kinematic error; None where there is no drive."""
     model_error: ModelError | None = None
     """Of the closed form against the exact geometry, for a pilot of the drives."""
+    pitch: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    """By spline, the figures of teeth that were drawn from tolerances of pitch."""
 
     def to_dict(self) -> dict[str, Any]:
         result = {"study": self.study, "method": self.method, **self.stack.to_dict()}
         if self.model_error is not None:
             result["model_error"] = self.model_error.to_dict()
+        if self.pitch:
+            result["pitch"] = {spline: dict(figures) for spline, figures in self.pitch.items()}
         result["notes"] = [*result["notes"], *self.notes]
         if self.worst_case is not None:
             result[f"worst_case_{self.stack.unit}"] = self.worst_case.to_dict()

@@ -115,8 +115,8 @@ def run_screening(
 
     `method` is 'morris', 'delta', 'pawn', 'rbd_fast' or 'dgsm'; `n` its base points, its own number where None; `seed`
     that of sampling and resampling; `engine` computes the responses. 'delta', 'pawn' and 'rbd_fast' take the first
-    points that a stack of the same seed takes. Raises `HdoptError` for an unknown method, and for correlated inputs
-    where the method takes independent ones.
+    points that a stack of the same seed takes. Raises `HdoptError` for an unknown method, for correlated inputs where
+    the method takes independent ones, and for teeth that are drawn at random.
     """
     if method not in METHODS:
         raise HdoptError(unknown_name("sensitivity method", method, ("sobol", *METHODS)))
@@ -125,6 +125,11 @@ def run_screening(
         raise HdoptError(
             f"{method} takes independent inputs, but some of this study are correlated; take delta or pawn, which "
             "need no independence, or Shapley effects"
+        )
+    if space.fields:
+        raise HdoptError(
+            f"{method} compares neighbouring values of an input, and {', '.join(sorted(space.fields))} are drawn at "
+            "random, without neighbours; take the method 'sobol', or tooth amplitudes instead of pitch tolerances"
         )
     n = chosen.n if n is None else n
     if n < 2**7:

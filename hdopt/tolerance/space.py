@@ -50,13 +50,15 @@ class Tolerance:
 @dataclass(frozen=True)
 class InputSpace:
     """All random inputs, in the order of the columns of a sample. `groups` names sets of inputs that belong together,
-    `folded` those whose response has its kink at zero (a tilt to either side), `turning` directions and phases."""
+    `folded` those whose response has its kink at zero (a tilt to either side), `turning` directions and phases. An
+    input of `fields`, all of which turn, picks a whole random field: its numbers have neither order nor bounds."""
 
     tolerances: Mapping[str, Tolerance]
     correlations: tuple[CorrelationGroup, ...] = ()
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     folded: frozenset[str] = frozenset()
     turning: frozenset[str] = frozenset()
+    fields: frozenset[str] = frozenset()
     copula: GaussianCopula = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -116,4 +118,4 @@ class InputSpace:
             self.index(name)
             tolerance = self.tolerances[name]
             changed[name] = Tolerance(tolerance.scaled_to(value), value, tolerance.centre)
-        return InputSpace(changed, self.correlations, self.groups, self.folded, self.turning)
+        return InputSpace(changed, self.correlations, self.groups, self.folded, self.turning, self.fields)

@@ -108,6 +108,8 @@ def find_worst_case(
 
 def check_bounded(space: InputSpace) -> None:
     """Raise `Unbounded` unless every input of `space` has finite bounds."""
+    if space.fields:
+        raise Unbounded(f"the worst case needs bounded inputs; {', '.join(sorted(space.fields))} are drawn at random")
     lower, upper = space.box
     loose = [n for n, a, b in zip(space.names, lower, upper, strict=True) if not (np.isfinite(a) and np.isfinite(b))]
     if loose:

@@ -156,5 +156,10 @@ def sample_rows(study: Study, n: int, seed: int) -> Array:
     from hdopt.workflow.stack import drive_problem_of
 
     problem = drive_problem_of(study)
+    if problem.graded:
+        raise HdoptError(
+            f"a search does not draw the teeth of {', '.join(problem.graded)} from tolerances of pitch; give tooth "
+            "amplitudes in [tolerances] instead, or search the nominal error (search.robust=false)"
+        )
     points = np.concatenate(list(ScrambledSobol(1).blocks(seed, 0, n, problem.space.dimension)))
     return problem.response.errors(problem.space.sample(points)).to_matrix()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from hdopt.drive.errors import PHASE_OF, DriveErrors, study_key
@@ -39,7 +39,8 @@ SHAPLEY_INPUTS = 8
 @dataclass(frozen=True)
 class ToleranceProblem:
     """What is asked of tolerances: the `response` to the inputs of a `space`, its upper `limit` in `unit`, and the
-    share of drives that must keep it. `study` is its name, `notes` what is to be said of it."""
+    share of drives that must keep it. `study` is its name, `notes` what is to be said of it, `pitch` by spline the
+    figures of teeth that are drawn from tolerances of pitch."""
 
     study: str
     response: Response
@@ -48,6 +49,7 @@ class ToleranceProblem:
     required_yield: float
     unit: str
     notes: tuple[str, ...] = ()
+    pitch: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
 
     @classmethod
     def of_drive(
@@ -95,6 +97,7 @@ def study_problem(study: AnyProblem) -> ToleranceProblem:
     if problem.replaced:
         notes.append(f"callouts take the place of the tolerances of {', '.join(problem.replaced)}")
     notes += _freed(problem.freed)
+    notes += words_on_graded_teeth(problem)
     response, said = with_effects(study, problem.response)
     return ToleranceProblem(
         study.name,
@@ -104,6 +107,7 @@ def study_problem(study: AnyProblem) -> ToleranceProblem:
         requirement.required_yield,
         "arcmin",
         (*notes, *said),
+        {spline: given.to_dict(_teeth_of(study.drive, spline)) for spline, given in problem.graded.items()},
     )
 
 
@@ -120,7 +124,19 @@ def drive_problem_of(study: Study) -> DriveProblem:
         contributors=contributors.build() if contributors else None,
         correlations=[row.build() for row in tolerances.correlation],
         homogenization=_homogenization(study, requirement.homogenization),
+        graded=tolerances.graded(study.drive.geometry),
     )
+
+
+def words_on_graded_teeth(problem: DriveProblem) -> list[str]:
+    """What teeth that are drawn from tolerances of pitch in `problem` rest on, a sentence each."""
+    drive = problem.response.drive
+    return [words for spline, given in problem.graded.items() for words in given.says(spline, _teeth_of(drive, spline))]
+
+
+def _teeth_of(drive: Drive, spline: str) -> int:
+    gear = drive.geometry
+    return {"cs_teeth": gear.circular_spline_teeth, "fs_teeth": gear.flexspline_teeth}[spline]
 
 
 def _freed(names: Sequence[str]) -> tuple[str, ...]:
@@ -145,6 +161,11 @@ def with_effects(study: Study, response: DriveResponse) -> tuple[Response, tuple
     chosen = inclusion(study, "drive")
     if not chosen.counted:
         return response, chosen.says
+    if response.teeth:
+        raise HdoptError(
+            "effects and teeth drawn from tolerances of pitch do not go together; leave either out, as with "
+            "operation.include=none"
+        )
     from hdopt.simulation.batch import tabulate
     from hdopt.tolerance.drive_effects import ExtendedResponse
 
@@ -228,7 +249,7 @@ def stack(
     method, distance = _method(problem, seed)
     if distance is not None and distance.says is not None:
         notes.append(distance.says)
-    return StackResult(problem.study, result, worst, rare, tuple(notes), method, distance)
+    return StackResult(problem.study, result, worst, rare, tuple(notes), method, distance, problem.pitch)
 
 
 def _method(problem: ToleranceProblem, seed: int) -> tuple[str | None, ModelError | None]:
@@ -239,7 +260,7 @@ def _method(problem: ToleranceProblem, seed: int) -> tuple[str | None, ModelErro
     if not response.drive.wave_generator.profile.tip_is_smooth:
         return EXACT, None
     points = next(SAMPLINGS["sobol"]().blocks(seed, 0, PILOT_N, problem.space.dimension))
-    if response.drive.has_measured_teeth:
+    if response.drive.has_measured_teeth or response.teeth:
         points = points[:PILOT_MEASURED]
     return CLOSED_FORM, model_error(response.drive, response.matrix(problem.space.sample(points)))
 

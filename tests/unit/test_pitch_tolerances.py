@@ -1,0 +1,215 @@
+"""Teeth drawn from tolerances of pitch: the class's numbers, the field's known answers, and what a study says of it."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cases import drive, random_errors
+from scipy import stats
+
+from hdopt.drive.pitch_tolerances import PitchTolerances, iso_1328_tolerances
+from hdopt.drive.teeth import MeasuredTeeth
+from hdopt.drive.values import DriveError
+from hdopt.errors import HdoptError
+from hdopt.kinematics.load_sharing import LoadSharing
+from hdopt.kinematics.peak_to_peak import beat_extremes_arcmin, matrix_peak_to_peak_arcmin
+from hdopt.mechanics.contact import contact_angle, meshing_teeth
+from hdopt.study import load_study
+from hdopt.tolerance.distributions import Uniform
+from hdopt.tolerance.drawn_teeth import DrawnTeeth, GradedTeeth, drawn_peak_to_peak_arcmin
+from hdopt.tolerance.drive_inputs import drive_problem
+from hdopt.tolerance.linearise import linearise
+from hdopt.tolerance.screening import run_screening
+from hdopt.tolerance.space import InputSpace, Tolerance
+from hdopt.tolerance.tooth_field import ToothField, largest_single, tooth_field
+from hdopt.tolerance.worst_case import Unbounded, check_bounded
+from hdopt.workflow.search_setup import sample_rows
+from hdopt.workflow.stack import study_problem
+
+Z = 162
+TOLERANCES = PitchTolerances(0.005, 0.017)
+
+
+def numbers(n, seed=0):
+    return np.random.default_rng(seed).random(n)
+
+
+@pytest.mark.parametrize(
+    ("tolerance_class", "module", "teeth", "single", "cumulative"),
+    [
+        (6, 3.0, 40, 9.0, 29.0),  # d = 120: 8.938 and 28.80 um, by hand from formulae (5) and (6)
+        (5, 1.0, 100, 5.5, 18.0),  # 5.5 and 18.40
+        (3, 0.5, 100, 2.6, 8.0),  # 2.625 and 8.17: below 5 um to tenths, below 10 to halves
+    ],
+)
+def test_iso_class_gives_the_formulas_values_rounded(tolerance_class, module, teeth, single, cumulative):
+    found = iso_1328_tolerances(tolerance_class, module, teeth)
+    assert (1000 * found.single, 1000 * found.cumulative) == pytest.approx((single, cumulative))
+
+
+def test_a_class_outside_its_scope_says_so():
+    assert iso_1328_tolerances(5, 0.396, Z).beyond == (
+        "involute flanks (these are of a strain wave gear)",
+        "module 0.5 to 70 (here 0.396)",
+    )
+    assert len(iso_1328_tolerances(5, 0.5, Z).beyond) == 1
+    with pytest.raises(DriveError, match="the classes 1 to 11, not 12"):
+        iso_1328_tolerances(12, 1.0, Z)
+
+
+@pytest.mark.parametrize("family", ["power_law", "one_wave"])
+@pytest.mark.parametrize("share", [0.9, 0.9973])
+def test_both_tolerances_are_kept_by_the_share_asked_for(family, share):
+    """Splines that the calibration never saw. A field fitted to one tolerance alone misses the other by far."""
+    deviations = tooth_field(Z, TOLERANCES, share, family).drawn(numbers(20_000))
+    kept = [
+        (largest_single(deviations) <= TOLERANCES.single).mean(),
+        (np.ptp(deviations, 1) <= TOLERANCES.cumulative).mean(),
+    ]
+    # Sampling error of 8,192 and of 20,000 splines together, three times.
+    assert kept == pytest.approx([share, share], abs=3 * math.sqrt(share * (1 - share) * (1 / 8192 + 1 / 20_000)))
+
+
+def test_independent_teeth_give_one_over_the_root_of_those_in_mesh():
+    """The same standard deviation for every wave makes teeth independent, but for the mean that none has."""
+    design, sigma = drive(), 0.001
+    deviations = ToothField(Z, (sigma,) * (Z // 2), 0.0).drawn(numbers(2000))
+    assert deviations.mean(axis=1) == pytest.approx(np.zeros(2000), abs=1e-15)
+    each = sigma * math.sqrt((Z - 1) / 2)
+    assert deviations.std() == pytest.approx(each, rel=0.01)
+    neighbours = np.mean(deviations * np.roll(deviations, 1, axis=1)) / each**2
+    assert neighbours == pytest.approx(-1 / (Z - 1), abs=0.005)
+    z_mp = meshing_teeth(design.geometry, contact_angle(design.geometry, design.wave_generator.profile))
+    shared = LoadSharing.of(design).tables(deviations)
+    # Without the common mean of Z teeth, Z_mp of them keep 1 - Z_mp/Z of their variance.
+    expected = each / math.sqrt(z_mp) * math.sqrt((1 - z_mp / Z) * Z / (Z - 1))
+    assert shared.std() == pytest.approx(expected, rel=0.02)
+
+
+def test_one_wave_is_a_sine_of_free_phase():
+    field = ToothField(Z, (0.002, *[0.0] * (Z // 2 - 1)), 0.0)
+    waves = np.fft.rfft(field.drawn(numbers(5000)))[:, 1] * 2 / Z
+    assert stats.kstest(np.angle(waves) / (2 * math.pi) + 0.5, "uniform").pvalue > 0.01
+    assert stats.kstest(np.abs(waves) / 0.002, "rayleigh").pvalue > 0.01
+
+
+def test_drives_of_one_wave_are_drives_of_sines():
+    """Each drive with a sine of the amplitude that the teeth in contact leave of its own wave."""
+    design, n = drive(), 40
+    u = numbers(n)
+    fields = {
+        spline: ToothField(z, (0.002, *[0.0] * (z // 2 - 1)), 0.0) for spline, z in (("cs_teeth", Z), ("fs_teeth", 160))
+    }
+    matrix = random_errors(n, 4).to_matrix()
+    matrix[:, [8, 10]] = 0.0
+    teeth = [DrawnTeeth(0, spline, field) for spline, field in fields.items()]
+    found = drawn_peak_to_peak_arcmin(design, matrix, u[:, None], teeth, 1.0, 1.0)
+    for column, (spline, z) in zip((8, 10), (("cs_teeth", Z), ("fs_teeth", 160)), strict=True):
+        wave = np.fft.rfft(fields[spline].drawn(u))[:, 1] * 2 / z * LoadSharing.of(design).response(1, z)
+        matrix[:, column], matrix[:, column + 1] = np.abs(wave), np.angle(wave) + math.pi / 2
+    # What is left of whole teeth that enter and leave the window: below 1e-3 of the amplitudes.
+    assert found == pytest.approx(np.ptp(beat_extremes_arcmin(design, matrix), axis=1), abs=4e-4)
+
+
+def test_each_drive_has_the_teeth_that_its_number_picks():
+    design, n = drive(), 600
+    problem = drive_problem(
+        design, {"axis_eccentricity_mm": Uniform(lower=0.0, upper=0.01)}, graded={"fs_teeth": GradedTeeth(TOLERANCES)}
+    )
+    inputs = problem.space.sample(np.random.default_rng(1).random((n, problem.space.dimension)))
+    found = problem.response(inputs)
+    (teeth,) = problem.response.teeth
+    for row in (0, 255, 256, 599):  # in the first, at the end of it, and in later blocks
+        own = MeasuredTeeth(tuple(teeth.field.drawn(inputs[[row], teeth.column])[0]))
+        alone = matrix_peak_to_peak_arcmin(replace(design, fs_teeth=own), problem.response.matrix(inputs[[row]]))
+        assert found[row] == pytest.approx(alone[0], abs=1e-9)
+
+
+def test_neighbouring_numbers_pick_unrelated_splines():
+    field = tooth_field(Z, TOLERANCES, 0.9973)
+    near = field.drawn(0.3 + np.arange(4000) * 2.0**-30)
+    related = np.corrcoef(near[:-1, 0], near[1:, 0])[0, 1]
+    assert abs(related) < 4 / math.sqrt(4000)
+    assert near[7] == pytest.approx(field.drawn(np.array([0.3 + 7 * 2.0**-30]))[0])
+
+
+def test_tolerances_that_no_spectrum_has_are_refused():
+    with pytest.raises(HdoptError, match="162 teeth have between .*independent deviations"):
+        tooth_field(Z, PitchTolerances(0.005, 0.004), 0.9973)
+    with pytest.raises(HdoptError, match="one wave a turn"):
+        tooth_field(Z, PitchTolerances(0.001, 0.08), 0.9973)
+
+
+def test_a_field_alone_has_the_share_that_it_has():
+    """y = first tooth of a field + x: variances s^2 and 1/12, nothing jointly."""
+    field = ToothField(Z, (0.3, *[0.0] * (Z // 2 - 1)), 0.0)
+    space = InputSpace(
+        {
+            "cs_teeth": Tolerance(Uniform(lower=0.0, upper=1.0), None),
+            "x": Tolerance(Uniform(lower=0.0, upper=1.0), 1.0),
+        },
+        turning=frozenset({"cs_teeth"}),
+        fields=frozenset({"cs_teeth"}),
+    )
+    found = linearise(lambda inputs: field.drawn(inputs[:, 0])[:, 0] + inputs[:, 1], space, 1)
+    # The first tooth is normal with spread 0.3; 4,096 points know its variance to 2.2 %.
+    assert found.shares["cs_teeth"] == pytest.approx(0.09 / (0.09 + 1 / 12), abs=0.03)
+    assert abs(found.shares["directions_jointly"]) < 0.03
+
+
+def study(*changes):
+    return load_study("csf-25-80", ["tolerances.cs_teeth={iso_1328_class=5}", *changes])
+
+
+def test_a_study_draws_teeth_instead_of_the_sine_and_says_what_it_rests_on():
+    problem = study_problem(study())
+    names = problem.space.names
+    assert "cs_teeth" in names
+    assert not {"cs_tooth_amplitude_mm", "cs_tooth_phase_deg"} & set(names)
+    assert "fs_tooth_amplitude_mm" in names
+    assert problem.response.held.cs_tooth_amplitude == 0
+    assert problem.space.groups["CS teeth"] == ("cs_teeth",)
+    said = " ".join(problem.notes)
+    assert "single pitch 5 um and cumulative pitch 17 um (class 5, ISO 1328-1:2013" in said
+    assert "extrapolated, the source serves only involute flanks" in said
+    assert problem.pitch["cs_teeth"]["extrapolated"][1] == "module 0.5 to 70 (here 0.396)"
+    beside = study_problem(study("tolerances.cs_teeth.sine=beside"))
+    assert {"cs_teeth", "cs_tooth_amplitude_mm"} <= set(beside.space.names)
+
+
+def test_what_needs_bounds_or_neighbours_says_that_drawn_teeth_have_none():
+    problem = study_problem(study())
+    with pytest.raises(Unbounded, match="cs_teeth are drawn at random"):
+        check_bounded(problem.space)
+    with pytest.raises(HdoptError, match="compares neighbouring values"):
+        run_screening(problem.response, problem.space, "delta")
+    lower, upper = problem.space.box
+    assert problem.response.upper_bound(lower, upper) is None
+    with pytest.raises(HdoptError, match="a search does not draw the teeth of cs_teeth"):
+        sample_rows(study(), 8, 1)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("{single_pitch_um=4}", "either iso_1328_class, or both"),
+        ("{iso_1328_class=5, single_pitch_um=4, cumulative_pitch_um=12}", "either iso_1328_class, or both"),
+        ("{iso_1328_class=0}", "greater than or equal to 1"),
+    ],
+)
+def test_half_a_tolerance_is_refused(given, message):
+    with pytest.raises(HdoptError, match=message):
+        study_problem(load_study("csf-25-80", [f"tolerances.cs_teeth={given}"]))
+
+
+def test_teeth_that_were_measured_are_not_drawn(tmp_path):
+    rows = "\n".join(f"{tooth},left,0.0" for tooth in range(1, Z + 1))
+    (tmp_path / "cs.csv").write_text(rows, encoding="utf-8")
+    (tmp_path / "own.toml").write_text(
+        'drive = "csf-25-80"\n[cs_teeth]\nfile = "cs.csv"\ndeviation = "cumulative"\n'
+        "[tolerances]\ncs_teeth = { iso_1328_class = 5 }\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(HdoptError, match="measured one by one in .cs_teeth. and toleranced"):
+        study_problem(load_study(tmp_path / "own.toml"))
