@@ -5,7 +5,7 @@ TEST_VENV := build/test-environment
 OUT ?= out
 SHIPPED := csf-25-80 paper-reproduction csf-25-80-design-trade
 
-.PHONY: study test check lint types lock benchmark fuzz clean
+.PHONY: study test check lint types lock benchmark fuzz mutants faults clean
 
 study: $(VENV)/ready
 	for study in $(SHIPPED); do $(VENV)/bin/hdopt run $$study -o $(OUT)/$$study || exit 1; done
@@ -35,6 +35,10 @@ fuzz: $(VENV)/ready-to-test
 # Faults put in one at a time: which do the tests notice? Hours; continues where it stopped. MUTANTS="mechanics --sample 40"
 mutants: $(VENV)/ready-to-test
 	$(VENV)/bin/python -m tests.mutants $(MUTANTS)
+
+# Those made by hand, an hour for all: docs/mutants.md. FAULTS="diagnosis"
+faults: $(VENV)/ready-to-test
+	$(VENV)/bin/python -m tests.mutants.faults $(FAULTS)
 
 benchmark: $(VENV)/ready-to-test
 	$(VENV)/bin/python -m pytest tests/benchmarks --benchmark-only

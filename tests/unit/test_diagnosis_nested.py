@@ -1,6 +1,7 @@
 """The held-out figure is of turns that no stage of the diagnosis saw."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -8,11 +9,15 @@ import pytest
 
 from hdopt.diagnosis import diagnose
 from hdopt.diagnosis.inference.cross_validation import held_out, turn_folds
+from hdopt.diagnosis.inference.fit import evaluate
 from hdopt.diagnosis.inference.hidden_turns import hidden_samples, uncut_blocks, without_samples
 from hdopt.diagnosis.inference.residual_gains import FitProbe
-from hdopt.diagnosis.nested import as_seen, nested_held_out
+from hdopt.diagnosis.nested import as_seen, nested_held_out, ripple_of
 from hdopt.diagnosis.orientation import AS_COUNTED, turn_round
+from hdopt.diagnosis.predict import predict
 from hdopt.diagnosis.search.candidates import Candidate, joint_fit
+from hdopt.diagnosis.search.high_order import left_as_recorded
+from hdopt.diagnosis.search.subset_search import Selection
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.stages import begin, fit_base_in_noise
 from hdopt.drive.geometry import ARCMIN
@@ -148,6 +153,30 @@ def test_hidden_turns_are_looked_at_as_the_others_were(turned):
     np.testing.assert_allclose(seen.error_arcmin[~hidden[0]], state.recordings[0].error_arcmin, atol=1e-9)
     np.testing.assert_allclose(seen.input_angle[~hidden[0]], state.recordings[0].input_angle, atol=1e-12)
     assert np.std(seen.error_arcmin) < 2 * NOISE
+
+
+def test_a_ripple_is_taken_out_of_hidden_turns_as_of_the_others():
+    """What was found on the rows as recorded, added up anew on all of them: here on the same ones."""
+    recording = record(0.3 * np.sin(17.3 * THETA) + noise())
+    state = base_alone([recording])
+    left = left_as_recorded([recording], state.base, state.nuisances)
+    bare = evaluate(left, np.zeros(0), np.zeros(1), (), ())
+    high = joint_fit(bare, [left.explanations["_sine_in_angle"].term(left.rows, {"order": 17.3})])
+    found = Selection(bare, (Candidate(high, 1.0, 1.0),), 1.0)
+    ripple = ripple_of([recording], replace(state, high=found, ripple=high.contributions))
+    np.testing.assert_allclose(ripple, high.contributions, atol=1e-9)
+    assert np.std(ripple) == pytest.approx(0.3 / np.sqrt(2), rel=0.02)
+    assert not ripple_of([recording], state).any()
+
+
+def test_a_prediction_takes_the_slope_out_that_was_taken():
+    """An output gain of 1.005 is 25 arcmin a turn of input: recorded and predicted are both free of it."""
+    recording = record(30.0 + noise(), gain=1.005)
+    state = base_alone([recording])
+    evidence = SimpleNamespace(nuisances=state.nuisances, selection=state.selection, orientation=state.orientation)
+    recorded, expected = predict(SimpleNamespace(evidence=evidence, effects=()), recording)
+    assert np.std(recorded) < 2 * NOISE
+    assert np.std(recorded - expected) == pytest.approx(NOISE, rel=0.1)
 
 
 @pytest.mark.slow

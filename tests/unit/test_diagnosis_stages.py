@@ -1,18 +1,23 @@
 """Each stage of the diagnosis, and of its search, on a short record of a known drive."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from hdopt.diagnosis import stages
+from hdopt.diagnosis.checks.assessment import assess
 from hdopt.diagnosis.checks.scale import fitted_scale
 from hdopt.diagnosis.inference.fit import evaluate
-from hdopt.diagnosis.orientation import as_counted, turn_round
+from hdopt.diagnosis.orientation import as_counted, preference, turn_round
 from hdopt.diagnosis.search import subset_search
 from hdopt.diagnosis.search.search_state import SearchPlan, SearchState
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.stages import (
     STAGES,
+    STAGES_OF_A_PART,
     begin,
     choose_orientation,
     choose_orientation_by_base,
@@ -24,6 +29,8 @@ from hdopt.diagnosis.stages import (
     search_without_ripple,
     set_strong_ripple_aside,
 )
+from hdopt.diagnosis.verdict.draw import draw_verdict
+from hdopt.diagnosis.verdict.named_effect import describe
 from hdopt.drive.geometry import ARCMIN
 from hdopt.effects import EFFECTS
 from hdopt.effects.declared import Shaft
@@ -268,3 +275,78 @@ def test_on_a_part_of_the_turns_an_open_orientation_is_not_searched_for(in_noise
     assert choose_orientation_by_base(in_noise).orientation.input == counted
     with pytest.raises(TypeError, match="not callable"):
         choose_orientation(in_noise)
+
+
+def test_every_stage_has_its_place():
+    """Fault caught: a stage skipped or exchanged with another."""
+    assert [stage.__name__ for stage in STAGES] == [
+        "set_strong_ripple_aside",
+        "fit_time_warp",
+        "fit_base_in_noise",
+        "choose_orientation",
+        "search_effects",
+        "measure_noise_again",
+        "search_high_orders",
+        "search_without_ripple",
+        "settle_shapes",
+    ]
+    assert [a.__name__ for a, b in zip(STAGES, STAGES_OF_A_PART, strict=True) if a is not b] == ["choose_orientation"]
+
+
+def test_the_search_starts_from_the_clean_base_too(in_noise, monkeypatch):
+    plans = []
+
+    def select(base, inflation, rng, plan):
+        plans.append(plan)
+        return in_noise.selection
+
+    monkeypatch.setattr(stages, "select", select)
+    search_effects(replace(in_noise, ruled_out=("bearing_pass",)))
+    (plan,) = plans
+    assert plan.clean is in_noise.clean is not None
+    assert plan.skip == ("bearing_pass",)
+
+
+def test_turned_round_every_sign_changes(in_noise):
+    (one,) = in_noise.recordings
+    loaded = replace(one, torque=np.linspace(-3.0, 5.0, len(one)))
+    (turned,) = turn_round([loaded])
+    for name in ("input_angle", "error_arcmin", "torque"):
+        np.testing.assert_array_equal(getattr(turned, name), -getattr(loaded, name))
+    np.testing.assert_array_equal(turned.time, loaded.time)
+    (back,) = turn_round([turned])
+    np.testing.assert_array_equal(back.error_arcmin, loaded.error_arcmin)
+
+
+def test_the_way_that_leaves_less_is_preferred():
+    """log of the power left turned over that left as counted: 3 in 1 twice is 2 log 3."""
+    less, more = SimpleNamespace(objective=2.0), SimpleNamespace(objective=6.0)
+    assert preference([less, less], [more, more]) == pytest.approx(2 * np.log(3.0))
+    assert preference([more], [less]) == pytest.approx(-np.log(3.0))
+
+
+def test_a_wave_in_the_zones_keeps_its_height_when_turned():
+    """a sin(h theta + phi) of the tooth itself at theta = -theta' is a sin(h theta' + 180 deg - phi)."""
+    in_zones = EFFECTS["cs_tooth_harmonics"].term(search_rows(), {"members": (2,)})
+    found = as_counted({"phase_2_deg": Parameter(30.0, 25.0, 36.0, "deg")}, in_zones)
+    assert found["phase_2_deg"] == Parameter(150.0, 144.0, 155.0, "deg")
+
+
+def search_rows():
+    return SimpleNamespace(theta=np.linspace(0, 20, 100))
+
+
+def test_the_verdict_speaks_in_the_counting_of_the_recording(searched):
+    """The same best set, said of a recording that was turned round: the other phase."""
+    evidence = assess(searched)
+    orientation = replace(evidence.orientation, input=-1, output=-1)
+    (as_is,) = describe(evidence.selection.best, evidence)
+    (turned,) = describe(evidence.selection.best, replace(evidence, orientation=orientation))
+    assert turned.parameters["phase_deg"].value == pytest.approx(-as_is.parameters["phase_deg"].value)
+
+
+def test_what_is_named_is_not_below_detection(searched):
+    diagnosis = draw_verdict(assess(searched), ())
+    assert [found.id for found in diagnosis.effects] == ["encoder_input_eccentricity"]
+    assert "encoder_input_eccentricity" not in diagnosis.below_detection
+    assert "output_coupling" in diagnosis.below_detection

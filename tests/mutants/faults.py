@@ -1,0 +1,77 @@
+"""Put hand-made faults in one at a time and see whether the tests notice: `python -m tests.mutants.faults [ROOM...]`.
+
+Each fault in `hand_made/ROOM.toml` is one that a reviewer who knows the physics would look for: a term dropped, a sign
+turned, rows leaked. The tests that should notice it are those of its room, or those that it names, one file after the
+other; golden answers do not count. Outcomes are kept below `build/mutants`; those that survived are asked again. Whole
+rooms are written to docs/mutants.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from tests.mutants.hand_made import ROOT, Fault, faults_of, rooms
+from tests.mutants.trial import load_libraries, refreshed_tree, tried
+
+PAGE = ROOT / "docs" / "mutants.md"
+
+
+def section(room: str, faults: Sequence[Fault], found: dict[str, str]) -> str:
+    """The part of the page about one `room`: counts, survivors, and what cannot be seen, with its reason."""
+    counted = [fault for fault in faults if not fault.equivalent]
+    said = [found[fault.key] for fault in counted]
+    killed, survived, late = (said.count(word) for word in ("killed", "survived", "timeout"))
+    share = killed / max(killed + survived, 1)
+    lines = [f"## {room}", "", f"{killed} of {killed + survived} noticed ({share:.0%}); {late} ran out of time.", ""]
+    for fault in counted:
+        if found[fault.key] != "killed":
+            lines.append(f"- {found[fault.key]}: {fault.name} (`{fault.file}`)")
+    lines += [f"- nothing to see: {fault.name}: {fault.equivalent}" for fault in faults if fault.equivalent]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def with_sections(page: str, written: dict[str, str]) -> str:
+    """`page` with the sections of the rooms `written`, each in place of its old one, in the order of the alphabet."""
+    head, *old = re.split(r"(?m)^(?=## )", page)
+    by_room = {one.split("\n", 1)[0].removeprefix("## ").strip(): one for one in old} | written
+    return "\n".join([head.rstrip() + "\n", *(by_room[room].rstrip() + "\n" for room in sorted(by_room))])
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m tests.mutants.faults", description=__doc__)
+    parser.add_argument("rooms", nargs="*", metavar="ROOM", help=f"of {', '.join(rooms())}; all where omitted")
+    parser.add_argument("--only", default="", help="only faults whose name holds this text; the page stays as it is")
+    parser.add_argument("--afresh", action="store_true", help="ask again for those that were noticed too")
+    parser.add_argument("--new", action="store_true", help="ask only for those that never were asked for")
+    parser.add_argument("--folder", type=Path, default=ROOT / "build" / "mutants", help="what was run is kept here")
+    options = parser.parse_args()
+    folder = options.folder.resolve()
+    load_libraries()
+    tree, kept = refreshed_tree(folder), folder / "faults.json"
+    found: dict[str, str] = json.loads(kept.read_text()) if kept.exists() else {}
+    listed = {room: [one for one in faults_of(room) if options.only in one.name] for room in options.rooms or rooms()}
+    pending = [
+        fault
+        for faults in listed.values()
+        for fault in faults
+        if not fault.equivalent
+        and (options.afresh or found.get(fault.key) != "killed")
+        and not (options.new and fault.key in found)
+    ]
+    for number, (fault, said) in enumerate(tried(pending, tree, folder), start=1):
+        found[fault.key] = said
+        kept.write_text(json.dumps(found, indent=1))
+        print(f"{number}/{len(pending)} {said}: {fault.room}: {fault.name}", flush=True)
+    written = {room: section(room, faults, found) for room, faults in listed.items()}
+    print("\n".join(written.values()))
+    if not options.only and PAGE.exists():
+        PAGE.write_text(with_sections(PAGE.read_text(encoding="utf-8"), written), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,89 @@
+"""A fault put into functions that are in memory already: a new process would read all files again."""
+
+from __future__ import annotations
+
+import functools
+import gc
+import os
+import sys
+from pathlib import Path
+from types import CodeType, FunctionType
+
+CO_OPTIMIZED = 0x1
+"""Flag of a function's code, which the body of a module or class does not have."""
+
+
+class NotInMemory(Exception):
+    """The fault changes more than functions: a new process must read the file."""
+
+
+def put_in_memory(path: Path, old: str, new: str) -> None:
+    """Give every function of the file `path`, whose text was `old`, the code that it has in the text `new`.
+
+    Nothing is done where the file was never imported. Raises `NotInMemory` where more than functions differ, or where
+    machine code was made of one of them.
+    """
+    changed = _changed(compile(old, str(path), "exec"), compile(new, str(path), "exec"))
+    live = [one for one in gc.get_objects() if isinstance(one, FunctionType) and _is_from(one, path)]
+    if not live:
+        return
+    if missing := set(changed) - {one.__code__.co_qualname for one in live}:
+        raise NotInMemory(f"not found: {', '.join(missing)}")
+    if compiled := _compiled_functions(path) & set(changed):
+        raise NotInMemory(f"machine code: {', '.join(compiled)}")
+    for function in live:
+        code = changed.get(function.__code__.co_qualname)
+        if code is not None:
+            if code.co_freevars != function.__code__.co_freevars:
+                raise NotInMemory(f"other closure: {code.co_qualname}")
+            function.__code__ = code
+
+
+def forget_results() -> None:
+    """Without what functions were told to remember, threads among it that a new process does not have."""
+    for one in gc.get_objects():
+        if isinstance(one, functools._lru_cache_wrapper):
+            one.cache_clear()
+
+
+def forget_modules(folder: Path) -> None:
+    """Without the modules below `folder`: they are read again."""
+    for name, module in list(sys.modules.items()):
+        file = getattr(module, "__file__", None)
+        if file is not None and Path(file).is_relative_to(folder):
+            del sys.modules[name]
+
+
+def _is_from(function: FunctionType, path: Path) -> bool:
+    name = function.__code__.co_filename
+    return name.endswith(path.name) and os.path.realpath(name) == str(path)
+
+
+def _compiled_functions(path: Path) -> set[str]:
+    from numba.core.dispatcher import Dispatcher
+
+    made = (one.py_func for one in gc.get_objects() if isinstance(one, Dispatcher))
+    return {one.__code__.co_qualname for one in made if _is_from(one, path)}
+
+
+def _changed(old: CodeType, new: CodeType) -> dict[str, CodeType]:
+    """Functions by qualified name whose code differs between two bodies of a module or class."""
+    if old.co_code != new.co_code or old.co_names != new.co_names or _plain(old) != _plain(new):
+        raise NotInMemory("more than functions")
+    changed: dict[str, CodeType] = {}
+    for one, other in zip(_codes(old), _codes(new), strict=True):
+        if not one.co_flags & CO_OPTIMIZED:
+            changed |= _changed(one, other)
+        elif one != other:
+            if one.co_name.startswith("<"):
+                raise NotInMemory("a nameless function")
+            changed[one.co_qualname] = other
+    return changed
+
+
+def _codes(code: CodeType) -> list[CodeType]:
+    return [one for one in code.co_consts if isinstance(one, CodeType)]
+
+
+def _plain(code: CodeType) -> list[str]:
+    return [one.co_name if isinstance(one, CodeType) else repr(one) for one in code.co_consts]

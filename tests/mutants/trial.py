@@ -1,0 +1,206 @@
+"""Trials of faults in a copy of the project: one test file after the other, each first without any fault.
+
+A process reads the libraries once, one for each test file runs it as it stands, and a third has the fault put into the
+functions that are in memory. Where a fault is more than that, a process that has read nothing of the project takes it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NoReturn, TextIO
+
+from tests.mutants.hand_made import ROOT, Fault
+from tests.mutants.in_memory import NotInMemory, forget_modules, forget_results, put_in_memory
+
+LOG = "faults-last.log"
+TIMEOUT_S = 400.0
+QUICK = ("-q", "-x", "-m", "not slow and not browser", "--benchmark-disable", "-p", "no:cacheprovider")
+LIBRARIES = ("numpy", "numba", "pytest", "hypothesis", "pandas", "scipy.optimize", "scipy.stats", "scipy.ndimage")
+KILLED, SURVIVED, TIMEOUT, ANEW = "killed", "survived", "timeout", "anew"
+SAID = {0: SURVIVED, 1: KILLED, 2: KILLED, -signal.SIGKILL: TIMEOUT, 99: ANEW}
+"""By exit code: pytest's own 0 to 2, a process that was stopped, and one that could not put the fault in."""
+
+
+def load_libraries() -> None:
+    """Read what the tests need besides the project: no fault is in it."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    for library in LIBRARIES:
+        importlib.import_module(library)
+
+
+def refreshed_tree(folder: Path) -> Path:
+    """The project's files as they stand, below `folder`: faults are put in there and nowhere else."""
+    tree = folder / "faults-tree"
+    listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    names = subprocess.run(listed, cwd=ROOT, capture_output=True, check=True).stdout.decode().split("\0")
+    wanted = {name for name in names if name and (ROOT / name).is_file()}
+    for name in wanted:
+        source, copy = ROOT / name, tree / name
+        if not copy.exists() or copy.stat().st_mtime != source.stat().st_mtime:
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(source, copy)
+    for gone in [p for p in tree.rglob("*.py") if str(p.resolve().relative_to(tree)) not in wanted]:
+        gone.unlink(missing_ok=True)
+    for name in ("geometry", "studies"):  # As they are installed: the environment's own would be found otherwise.
+        link = tree / "hdopt" / name
+        if not link.exists():
+            link.symlink_to(tree / name)
+    return tree
+
+
+def tried(faults: Sequence[Fault], tree: Path, folder: Path) -> Iterator[tuple[Fault, str]]:
+    """Each of `faults` and what its tests make of it in `tree`: killed, survived, or timeout."""
+    left = {fault: 0 for fault in faults}
+    while left:
+        file = min((fault.tests[at] for fault, at in left.items()), key=lambda name: -_count(left, name))
+        here = [fault for fault, at in left.items() if fault.tests[at] == file]
+        for fault, said in _on_file(file, here, tree, folder):
+            left[fault] += 1
+            if said != SURVIVED or left[fault] == len(fault.tests):
+                del left[fault]
+                yield fault, said
+
+
+def _count(left: dict[Fault, int], name: str) -> int:
+    return sum(fault.tests[at] == name for fault, at in left.items())
+
+
+def _on_file(file: str, faults: Sequence[Fault], tree: Path, folder: Path) -> Iterator[tuple[Fault, str]]:
+    """What one test `file` makes of each of `faults`."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reading)
+        with os.fdopen(writing, "w") as out:
+            _in_session(lambda: _session(file, faults, tree, folder, out), tree, folder)
+    os.close(writing)
+    anew = []
+    with os.fdopen(reading) as lines:
+        for line in lines:
+            number, said = json.loads(line)
+            if number is None:
+                raise SystemExit(f"{file} fails without any fault: see {folder / LOG}")
+            fault = faults[number]
+            if said == ANEW:
+                anew.append(fault)
+            else:
+                yield fault, said
+    os.waitpid(child, 0)
+    for fault in anew:
+        with put_in(fault, tree):
+            said = _in_child(lambda: _in_session(lambda: _pytest(file), tree, folder))
+        yield fault, said
+
+
+def _session(file: str, faults: Sequence[Fault], tree: Path, folder: Path, out: TextIO) -> int:
+    """Run `file` as it stands, then with each of `faults` in a child of this process; a line of `out` says what."""
+    if _pytest(file):
+        out.write(json.dumps([None, "failed"]) + "\n")
+        return 0
+    for number, fault in enumerate(faults):
+        with put_in(fault, tree) as (path, before, after):
+
+            def child(path: Path = path, before: str = before, after: str = after) -> NoReturn:
+                try:
+                    put_in_memory(path, before, after)
+                except NotInMemory:
+                    os._exit(99)
+                forget_results()
+                forget_modules(tree / "tests")
+                os._exit(_pytest(file))
+
+            said = _in_child(child)
+        out.write(json.dumps([number, said]) + "\n")
+        out.flush()
+    return 0
+
+
+@contextmanager
+def put_in(fault: Fault, tree: Path) -> Iterator[tuple[Path, str, str]]:
+    """`fault` in the files of `tree`, and out again: the file, its text before, and with the fault."""
+    path = tree / fault.file
+    before = path.read_text(encoding="utf-8")
+    if before.count(fault.old) != 1:
+        raise SystemExit(f"{fault.room}: {fault.name}: the old text stands {before.count(fault.old)} times")
+    after = before.replace(fault.old, fault.new)
+    try:
+        path.write_text(after, encoding="utf-8")
+        _forget_compiled(path)
+        yield path, before, after
+    finally:
+        shutil.copy2(ROOT / fault.file, path)
+        _forget_compiled(path)
+
+
+def _forget_compiled(path: Path) -> None:
+    """Without what was compiled of `path`: two texts of one length and one second are one to the compiler's cache."""
+    for compiled in (path.parent / "__pycache__").glob(f"{path.stem}.*.pyc"):
+        compiled.unlink(missing_ok=True)
+
+
+def _in_child(work: Callable[[], object]) -> str:
+    """What a child process that does `work` makes of it."""
+    child = os.fork()
+    if child == 0:
+        try:
+            work()
+        finally:
+            os._exit(70)
+    end = time.monotonic() + TIMEOUT_S
+    while time.monotonic() < end:
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done:
+            return SAID[os.waitstatus_to_exitcode(status)]
+        time.sleep(0.02)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return TIMEOUT
+
+
+def _in_session(work: Callable[[], int], tree: Path, folder: Path) -> NoReturn:
+    """Do `work` as a process of the project in `tree`, and end with its code."""
+    import numba
+
+    code = 70
+    try:
+        log = os.open(folder / LOG, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        os.dup2(log, 1)
+        os.dup2(log, 2)
+        os.environ["NUMBA_CACHE_DIR"] = str(_machine_code(tree, folder))
+        numba.core.config.reload_config()
+        os.chdir(tree)
+        sys.path[:] = [str(tree), *(path for path in sys.path if Path(path or ".").resolve() != ROOT)]
+        forget_modules(ROOT / "tests")
+        code = work()
+    finally:
+        sys.stdout.flush()
+        os._exit(code)
+
+
+def _machine_code(tree: Path, folder: Path) -> Path:
+    """Where machine code is kept: its own place for every state of the compiled files, which take each other in."""
+    digest = hashlib.sha256()
+    for path in sorted((tree / "hdopt").rglob("*.py")):
+        text = path.read_bytes()
+        if b"njit" in text or b"closed_form" in path.name.encode():
+            digest.update(text)
+    return folder / "faults-compiled" / digest.hexdigest()[:16]
+
+
+def _pytest(file: str) -> int:
+    import pytest
+
+    code = int(pytest.main([*QUICK, f"tests/{file}"]))
+    sys.stdout.flush()
+    return code

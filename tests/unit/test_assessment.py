@@ -1,0 +1,107 @@
+"""The numbers behind a verdict: noise of neighbours, limits of detection, what is left, placebo, chance."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_cross_validation import RATE, noisy, rows_of, without_base
+from test_diagnosis_evidence import state
+
+from hdopt.diagnosis.checks import assessment
+from hdopt.diagnosis.checks.assessment import assess, detection_limits, look_at_remainder, noise_between_neighbours
+from hdopt.diagnosis.inference.catalogue import SCALE
+from hdopt.diagnosis.inference.fit import extend
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.search.candidates import Candidate, penalty_scale, search_terms
+from hdopt.diagnosis.search.penalty import Scale, penalty
+from hdopt.diagnosis.verdict.facts import find
+from hdopt.effects.term import Term
+
+THETA = np.arange(40 * RATE) * 2 * np.pi / RATE
+
+
+@pytest.fixture(scope="module")
+def hidden():
+    """The evidence on an eccentric input encoder that no search has looked for."""
+    return assess(state(0.3 * np.sin(THETA + 0.5)))
+
+
+def test_noise_of_neighbours_is_that_of_the_samples():
+    """A drive's own waves and a ramp vanish in second differences."""
+    place = np.linspace(0, 40, 40_000)
+    smooth = 2.0 * np.sin(2 * place) + 3.0 * place
+    records = [SimpleNamespace(error_arcmin=smooth + np.random.default_rng(i).normal(0, 0.3, 40_000)) for i in range(3)]
+    # The median of 40 000 is known to 0.8 %.
+    assert noise_between_neighbours(records) == pytest.approx(0.3, rel=0.02)
+
+
+def wave(trials=1.0):
+    columns = np.column_stack([np.sin(3.5 * THETA), np.cos(3.5 * THETA)])
+    return Term("output_coupling", {}, columns=columns, trials=trials)
+
+
+def test_what_is_as_large_as_its_limit_just_pays():
+    scale = Scale(1000.0, inflation=1.8)
+    limit = detection_limits(FitProbe(without_base(noisy(40))), [wave()], scale)["output_coupling"]
+    probe = FitProbe(without_base(rows_of(limit * np.sqrt(2) * np.sin(3.5 * THETA))))
+    assert probe.gain(wave()) / 2 / 1.8 == pytest.approx(penalty([wave()], 0.0, scale), rel=1e-3)
+
+
+def test_the_limit_of_an_effect_is_that_of_its_best_variant():
+    probe, scale = FitProbe(without_base(noisy(40))), Scale(1000.0)
+    alone = detection_limits(probe, [wave()], scale)
+    assert detection_limits(probe, [wave(1e6), wave(), wave(1e3)], scale) == alone
+
+
+def test_a_basis_without_physics_wins_where_something_is_left():
+    noise = np.random.default_rng(1).normal(0, 0.02, len(THETA))
+    left, quiet = (without_base(rows_of(noise + wave)) for wave in (0.2 * np.sin(4.37 * THETA), 0.0))
+    found = look_at_remainder(left, left.problem.rows.block % 5, 1.0)
+    assert found.t > 5
+    # The basis pays for its freedom: some twenty columns of 1 920 rows, and lines beside the true one.
+    assert found.held_out.rms == pytest.approx(0.02, rel=0.15)
+    assert max(found.domains, key=found.domains.get) == "asynchronous order"
+    assert look_at_remainder(quiet, quiet.problem.rows.block % 5, 1.0).t < 4
+
+
+def test_floor_and_placebo_of_what_was_not_searched(hidden):
+    """The floor is what the better of explanation and generic basis leaves; the placebo is the encoder's sine."""
+    assert hidden.extended_held_out.rms == pytest.approx(0.3 / np.sqrt(2), rel=0.05)
+    assert hidden.noise_floor == pytest.approx(0.02, rel=0.1)
+    assert hidden.placebo == "encoder_input_eccentricity"
+    assert hidden.placebo_held_out.rms == pytest.approx(0.02, rel=0.1)
+    assert hidden.false_alarm_p <= 0.01
+
+
+def test_the_chance_is_that_of_all_that_was_looked_at(monkeypatch):
+    """Every term of the search stands against the sign flips, each with its own penalty."""
+    asked = []
+
+    def family(probe, terms, penalties, rng, observed, inflation):
+        asked.append((terms, penalties))
+        return 0.5
+
+    monkeypatch.setattr(assessment, "family_wise_p", family)
+    last = state(np.zeros_like(THETA))
+    assert assess(last).false_alarm_p == 0.5
+    ((terms, penalties),) = asked
+    searched = search_terms(FitProbe(last.base), skip=last.ruled_out)
+    assert [term.effect for term in terms] == [term.effect for term in searched]
+    scale = penalty_scale(last.base.problem, last.inflation)
+    assert penalties == [penalty([term], 0.0, scale) for term in terms]
+
+
+def test_noise_is_held_against_the_larger_of_neighbours_and_sensors(hidden):
+    rms = hidden.extended_held_out.rms
+    for neighbours, sensors in ((0.01, 0.5), (0.5, 0.01)):
+        facts = find(replace(hidden, neighbours_arcmin=neighbours, sensor_arcmin=sensors)).facts
+        assert facts.noise_over_neighbours == pytest.approx(rms / 0.5)
+
+
+def test_a_scale_alone_explains_nothing(hidden):
+    """It is told as what it is: no effect."""
+    base = hidden.selection.base
+    off = extend(base, [base.problem.explanations[SCALE].term(base.problem.rows, {})])
+    selection = replace(hidden.selection, candidates=(Candidate(off, 50.0, 100.0), *hidden.selection.candidates))
+    assert not find(replace(hidden, selection=selection)).facts.explained

@@ -1,0 +1,90 @@
+"""The noise's autoregression: its filter, its gaps, its order, and how much rougher the noise is than it."""
+
+import numpy as np
+import pytest
+from scipy import linalg, signal
+from test_cross_validation import RATE, noisy, without_base
+
+from hdopt.diagnosis.inference import residual_noise
+from hdopt.diagnosis.inference.noise import Noise, autoregression, estimate, weights_with_a_past
+from hdopt.diagnosis.inference.residual_noise import measure_noise, roughness
+from hdopt.diagnosis.settings import DEFAULT
+
+AR = np.array([0.5, -0.3, 0.15])
+
+
+def in_pieces(rows, length):
+    """`rows` with a gap after every `length` of them."""
+    from dataclasses import replace
+
+    return replace(rows, piece=np.arange(len(rows)) // length)
+
+
+@pytest.mark.parametrize("columns", [1, 3, 11])
+def test_the_filter_is_that_of_the_signal_library(columns):
+    """x_t - sum a_k x_{t-k}, for a few columns and for many side by side."""
+    values = np.random.default_rng(0).normal(size=(200, columns))
+    white = Noise(AR, 1.0, np.ones(200)).whiten(values)
+    assert white == pytest.approx(signal.lfilter(np.r_[1.0, -AR], [1.0], values, axis=0), abs=1e-12)
+    assert Noise(AR, 1.0, np.ones(200)).whiten(values[:, 0]) == pytest.approx(white[:, 0], abs=1e-12)
+
+
+def test_weights_stop_at_a_gap():
+    rows = in_pieces(noisy(2), 12)
+    weighed = weights_with_a_past(rows, 3) > 0
+    assert np.array_equal(weighed, np.arange(len(rows)) % 12 >= 3)
+
+
+def test_rows_left_out_take_those_with_them_that_the_filter_reaches():
+    rows = noisy(2)
+    left_out = np.zeros(len(rows), bool)
+    left_out[[10, 30]] = True
+    kept = Noise(AR, 1.0, np.ones(len(rows))).without(left_out).root_weight
+    assert np.array_equal(np.flatnonzero(kept == 0), [10, 11, 12, 13, 30, 31, 32, 33])
+
+
+def test_noise_is_not_looked_for_across_a_gap():
+    """Pieces with means of their own, 40 rows each, that flip from piece to piece: within a piece rows are alike, and
+    the coefficient is near 1; across the gaps they are opposite. The innovations are those of the rows with a past.
+    """
+    rows = in_pieces(noisy(40), 40)
+    rng = np.random.default_rng(1)
+    own = np.where(rows.piece % 2, 1.0, -1.0) + rng.normal(0, 0.05, len(rows))
+    noise = estimate(rows, own)
+    same = rows.piece[1:] == rows.piece[:-1]
+    products, powers = own[1:][same] @ own[:-1][same] / same.sum(), own @ own / len(rows)
+    assert noise.ar.sum() == pytest.approx(products / powers, abs=0.01)
+    white = noise.whiten(own)
+    assert noise.sigma**2 * np.sum(noise.root_weight > 0) == pytest.approx(white @ white, rel=1e-9)
+
+
+def test_coefficients_solve_yule_and_walker():
+    """The covariance of a known autoregression gives its coefficients back, as the Toeplitz system does."""
+    impulse = signal.lfilter([1.0], np.r_[1.0, -AR], np.r_[1.0, np.zeros(400)])
+    covariance = np.array([impulse[lag:] @ impulse[: len(impulse) - lag] for lag in range(5)])
+    found = autoregression(covariance, 20_000)
+    assert found == pytest.approx(linalg.solve_toeplitz(covariance[:3], covariance[1:4]), rel=1e-9)
+    assert found == pytest.approx(AR, abs=1e-6)
+
+
+def test_one_more_coefficient_must_be_worth_it():
+    """A correlation of 0.09 among 1000 rows gains 8.1 in 2 log L: more than the margin of 6, less than that and
+    Schwarz's log(1000) = 6.9 together; one of 0.15 gains 22.8."""
+    assert len(autoregression(np.array([1.0, 0.09, 0.0]), 1000)) == 0
+    assert len(autoregression(np.array([1.0, 0.15, 0.0225]), 1000)) == 1
+
+
+def test_roughness_is_the_power_of_the_turns_sums():
+    """Noise that is one number g a turn: its sum over m rows has m^2 g^2, that of white noise m s^2."""
+    block = np.arange(60).repeat(RATE)
+    g = np.random.default_rng(2).normal(size=60)
+    noise = Noise(np.zeros(0), 0.7, np.ones(len(block)))
+    found = roughness(noise, g[block], np.ones((len(block), 3)), block)
+    assert found == pytest.approx(RATE * np.mean(g**2) / 0.7**2, rel=1e-12)
+
+
+@pytest.mark.parametrize(("power", "inflation"), [(0.3, 1.0), (5.0, 5.0), (1e4, DEFAULT.noise.largest_inflation)])
+def test_noise_is_rougher_by_what_its_scores_show(monkeypatch, power, inflation):
+    """Never smoother than its model, and no rougher than noise can be."""
+    monkeypatch.setattr(residual_noise, "roughness", lambda *_: power)
+    assert measure_noise(without_base(noisy(12))).inflation == inflation

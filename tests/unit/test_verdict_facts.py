@@ -1,0 +1,159 @@
+"""What the rules look at, from numbers that are known: gains, ripples, rivals, remainders, confidence."""
+
+from dataclasses import replace
+from math import exp
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_verdict_rules import CLEAN, FIRED, held
+
+from hdopt.diagnosis.inference.catalogue import SCALE
+from hdopt.diagnosis.inference.cross_validation import HeldOut
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.diagnosis.verdict.facts import own_gain, stands_out, too_little
+from hdopt.diagnosis.verdict.named_effect import confidences
+from hdopt.diagnosis.verdict.residual_structure import clearly_unexplained, outside_share
+from hdopt.diagnosis.verdict.rivals import placebo_as_good, rivals, scale_is_as_good
+from hdopt.diagnosis.verdict.rules import RULES, rule_for
+from hdopt.effects.term import Term
+
+SWING = np.array([1.0, -1.0] * 50)
+"""Of power one."""
+
+
+def candidate(powers, log_bayes_factor=100.0, outside=False, residual=1.0):
+    """A set of effects by the power of each."""
+    terms = tuple(Term(name, {}, columns=SWING[:, None]) for name in powers)
+    sizes = list(powers.values())
+    fit = SimpleNamespace(
+        terms=terms,
+        contribution=lambda i: np.sqrt(sizes[i]) * SWING,
+        contributions=np.sqrt(sum(sizes)) * SWING,
+        residual=np.sqrt(residual) * SWING,
+    )
+    return SimpleNamespace(
+        fit=fit, effects=tuple(powers), outside=outside, log_bayes_factor=log_bayes_factor, gain=2 * log_bayes_factor
+    )
+
+
+def evidence(*candidates, base=3.0, extended=1.0, **more):
+    rows = SimpleNamespace(locked=False, blocks=20, span_turns=20.0, rows_per_turn=60.0)
+    known = {"settings": DEFAULT, "rows": rows, "high": None, "false_alarm_p": 0.002, "below_detection": {}}
+    return SimpleNamespace(
+        base_held_out=held(20, base),
+        extended_held_out=held(20, extended),
+        selection=SimpleNamespace(
+            best=candidates[0] if candidates else None,
+            candidates=candidates,
+            base=SimpleNamespace(base_value=np.sqrt(more.pop("base_power", 0.0)) * SWING),
+        ),
+        **(known | more),
+    )
+
+
+def changes_of(facts):
+    return {name: value for name, value in vars(facts).items() if value != getattr(CLEAN, name)}
+
+
+@pytest.mark.parametrize("first", range(len(RULES)))
+def test_an_earlier_rule_is_asked_before_every_later_one(first):
+    """Facts that fire two rules are judged by the earlier: any two that are exchanged would be seen."""
+    fires = {name: changes_of(facts) for name, facts, _ in reversed(FIRED)}
+    for later in RULES[first:]:
+        both = replace(CLEAN, **(fires[later.name] | fires[RULES[first].name]))
+        assert rule_for(both).name == RULES[first].name
+
+
+def test_effects_gain_what_they_carry_themselves():
+    """2 of 1 left where they carry it; twice their own power where a better drive beside them did the rest."""
+    assert own_gain(evidence(candidate({"hysteresis": 2.0}))) == pytest.approx(2.0)
+    assert own_gain(evidence(candidate({"hysteresis": 0.1}))) == pytest.approx(0.2)
+    assert own_gain(evidence(candidate({"hysteresis": 0.1, SCALE: 5.0}))) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("power", "base", "said"), [(0.5, 2.0, True), (0.01, 2.0, False), (0.5, 100.0, False)])
+def test_a_ripple_stands_out_of_rows_and_of_what_else_was_found(power, base, said):
+    """Half of the rows' power; a hundredth of it; half, beside a hundred that may leave a hundredth of itself there."""
+    assert stands_out(candidate({"tooth_mesh": power}), evidence(base=base)) is said
+
+
+@pytest.mark.parametrize(
+    ("limits", "base_power", "changes", "said"),
+    [
+        ((5.0, 3.0, 0.1), 1.0, {}, True),
+        ((5.0, 3.0, 0.1), 16.0, {}, False),
+        ((), 1.0, {}, False),
+        ((), 1.0, {"span_turns": 1.5}, True),
+        ((), 1.0, {"blocks": 5}, True),
+        ((), 1.0, {"rows_per_turn": 4.0}, True),
+        ((), 1.0, {"blocks": 5, "locked": True}, False),
+    ],
+)
+def test_too_little_is_short_sparse_or_below_most_limits(limits, base_power, changes, said):
+    found = evidence(base_power=base_power, below_detection=dict(enumerate(limits)))
+    found.rows = SimpleNamespace(**(vars(found.rows) | changes))
+    assert too_little(found) is said
+
+
+def test_rivals_are_other_sets_within_a_tie():
+    """Kass and Raftery's 5: as large or smaller, of physics, and another set of effects than the one that is said."""
+    best = candidate({"lost_motion": 1.0, "thermal_drift": 1.0}, 100.0)
+    others = [
+        candidate({"hysteresis": 1.0, "thermal_drift": 1.0}, 96.0),
+        candidate({"channel_delay": 1.0}, 95.0),
+        candidate({"output_coupling": 1.0}, 94.9),
+        candidate({"hysteresis": 1.0, "output_coupling": 1.0, "thermal_drift": 1.0}, 99.0),
+        candidate({"_sine_in_angle": 1.0}, 99.0, outside=True),
+        candidate({"thermal_drift": 1.0, "lost_motion": 1.0}, 99.0),
+        candidate({}, 98.0),
+    ]
+    assert rivals(evidence(best, *others), None) == (("hysteresis", "thermal_drift"), ("channel_delay",))
+
+
+@pytest.mark.parametrize(("behind", "said"), [(4.0, True), (6.0, False)])
+def test_a_scale_that_explains_as_well(behind, said):
+    alone, beside = candidate({SCALE: 1.0}, 100 - behind), candidate({SCALE: 1.0, "hysteresis": 1.0}, 99.0)
+    assert scale_is_as_good(evidence(candidate({"thermal_drift": 1.0}), beside, alone)) is said
+
+
+def test_a_placebo_must_reach_the_gain():
+    """Half of it, in errors whose turns differ too little to say so: no explanation."""
+    half = HeldOut(np.full(20, 2.0), np.full(20, 1.0), np.ones(20))
+    found = evidence(candidate({"lost_motion": 2.0}), placebo="hysteresis", placebo_held_out=half)
+    assert placebo_as_good(found, []) == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, True),
+        ({"t": 3.9}, False),
+        ({"extended": 1.3}, False),
+        ({"extended": 1.03, "base": 1.04}, False),
+        ({"base_power": 600.0}, False),
+        ({"high": 10.0}, False),
+    ],
+)
+def test_what_is_left_counts_where_it_is_sure_and_a_fair_part(changes, said):
+    """Left is 1 of 2 that can be explained, over noise of 1: with t below 4; 0.3 of 2; 0.03 beside noise of 1; less
+    than the model's own error; a small part of what the high orders explain."""
+    given = {"extended": 2.0, "base": 3.0, "base_power": 0.0, "t": 5.0} | changes
+    high = SimpleNamespace(best=candidate({"tooth_mesh": given.pop("high")})) if "high" in given else None
+    remainder = SimpleNamespace(held_out=held(20, 1.0), t=given.pop("t"))
+    found = evidence(**given, remainder=remainder, generic_held_out=held(20, 1.0), high=high)
+    assert clearly_unexplained(found) is said
+
+
+def test_the_share_without_physics_is_of_all_that_is_explained():
+    assert outside_share(candidate({"hysteresis": 3.0, "_sine_in_angle": 1.0})) == pytest.approx(0.25)
+
+
+def test_confidence_is_the_weight_of_the_sets_that_hold_an_effect():
+    """Two sets 2 apart, flattened by 2: 1 to exp(-1), less the chance of a false alarm; never above its cap."""
+    pair = (candidate({"hysteresis": 1.0, "thermal_drift": 1.0}, 10.0), candidate({"thermal_drift": 1.0}, 8.0))
+    found = confidences(evidence(*pair, false_alarm_p=0.2))
+    assert DEFAULT.verdict.flatten == 2.0
+    assert found["hysteresis"] == pytest.approx(0.8 / (1 + exp(-1)))
+    assert found["thermal_drift"] == pytest.approx(0.8)
+    assert confidences(evidence(*pair, false_alarm_p=0.0))["thermal_drift"] == DEFAULT.verdict.most_confident
