@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from hdopt.drive.profiles import WaveGeneratorProfile
+from hdopt.drive.roundness import MeasuredRoundness
 from hdopt.drive.teeth import MeasuredTeeth
 from hdopt.drive.values import require, require_not_negative, require_positive, require_positive_if_given
 
@@ -193,8 +194,9 @@ class Drive:
     load: Load = field(default_factory=Load)
     cs_teeth: MeasuredTeeth | None = None
     fs_teeth: MeasuredTeeth | None = None
+    cs_roundness: MeasuredRoundness | None = None
 
     @property
     def has_measured_teeth(self) -> bool:
-        """Whether the teeth of either spline are known one by one."""
-        return self.cs_teeth is not None or self.fs_teeth is not None
+        """Whether the teeth of either spline are known one by one, in pitch or in radius."""
+        return self.cs_teeth is not None or self.fs_teeth is not None or self.cs_roundness is not None

@@ -310,31 +310,7 @@ class MeasuredProfile:
     @classmethod
     def from_csv(cls, path: str | Path, noise: float = 0.0) -> MeasuredProfile:
         """Read `angle_deg,radius_mm` rows (a header line is optional, `#` starts a comment)."""
-        path = Path(path)
-        try:
-            text = read_text(path, "a CSV text file")
-        except HdoptError as error:
-            raise DriveError(f"measured profile {path}: cannot be read ({error})") from error
-        points: list[tuple[float, float]] = []
-        header_allowed = True
-        for number, line in enumerate(text.splitlines(), 1):
-            row = line.split(",")
-            if not line.strip() or row[0].lstrip().startswith("#"):
-                continue
-            try:
-                angle, radius = (float(cell) for cell in row)
-            except ValueError:
-                require(
-                    header_allowed,
-                    f"measured profile {path}, line {number}: {shown(line)}; "
-                    "each line must hold two numbers, angle_deg,radius_mm",
-                )
-            else:
-                points.append((math.radians(angle), radius))
-            header_allowed = False
-        require(bool(points), f"measured profile {path} holds no points; give lines of angle_deg,radius_mm")
-        angles, radii = np.array(points).T
-        return cls(angles, radii, noise, source=str(path))
+        return cls(*read_polar(Path(path), "measured profile"), noise, source=str(path))
 
     @property
     def semi_major(self) -> float:
@@ -357,6 +333,36 @@ class MeasuredProfile:
     def perimeter(self) -> float:
         knots = np.unique(np.clip(self._spline[0], self._spline[0][5], self._spline[0][5] + 2 * math.pi))
         return sum(_arc_length(self, a, b) for a, b in itertools.pairwise(knots))
+
+
+def read_polar(path: Path, what: str) -> tuple[Array, Array]:
+    """Angles (rad) and radii (mm) from the CSV file `path` of rows angle_deg, radius_mm, (n,) each, as they stand.
+
+    A header line is optional, `#` starts a comment. Raises `DriveError` that names `what`, file and line.
+    """
+    try:
+        text = read_text(path, "a CSV text file")
+    except HdoptError as error:
+        raise DriveError(f"{what} {path}: cannot be read ({error})") from error
+    points: list[tuple[float, float]] = []
+    header_allowed = True
+    for number, line in enumerate(text.splitlines(), 1):
+        row = line.split(",")
+        if not line.strip() or row[0].lstrip().startswith("#"):
+            continue
+        try:
+            angle, radius = (float(cell) for cell in row)
+        except ValueError:
+            require(
+                header_allowed,
+                f"{what} {path}, line {number}: {shown(line)}; each line must hold two numbers, angle_deg,radius_mm",
+            )
+        else:
+            points.append((math.radians(angle), radius))
+        header_allowed = False
+    require(bool(points), f"{what} {path} holds no points; give lines of angle_deg,radius_mm")
+    angles, radii = np.array(points).T
+    return angles, radii
 
 
 def parallel_profile(profile: WaveGeneratorProfile, distance: float, points: int = 1440) -> MeasuredProfile:

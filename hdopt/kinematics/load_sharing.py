@@ -84,13 +84,29 @@ NO_TABLE: Array = np.empty(0)
 def mesh_tables(drive: Drive) -> tuple[Array, Array]:
     """Tables of the measured teeth of CS and FS of `drive` over one turn of each spline, mm of arc; empty for a spline
     whose teeth are not measured. Raises `MissingValue` where the contact angle lacks an addendum."""
-    if drive.cs_teeth is None and drive.fs_teeth is None:
+    if not drive.has_measured_teeth:
         return NO_TABLE, NO_TABLE
     sharing = LoadSharing.of(drive)
+    circular = [*([] if drive.cs_teeth is None else [drive.cs_teeth]), *_out_of_round(drive)]
     return (
-        NO_TABLE if drive.cs_teeth is None else sharing.table(drive.cs_teeth),
+        np.asarray(sum(map(sharing.table, circular))) if circular else NO_TABLE,
         NO_TABLE if drive.fs_teeth is None else sharing.table(drive.fs_teeth),
     )
+
+
+def _out_of_round(drive: Drive) -> tuple[MeasuredTeeth, ...]:
+    """The teeth of a measured circular spline that is out of round, () where none was measured.
+
+    The wave generator presses a tooth into a space that lies dr further out by dr less: the depth delta, whose arc is
+    delta tan(alpha) (Jia 2021, Eqs. (24)-(26)), becomes delta - dr, and the tooth drives as one with the pitch
+    deviation -dr tan(alpha) does. So a circular spline off-centre by e acts as an input axis off by -e. First order:
+    the deepest point itself stays where the wave generator has it.
+    """
+    if drive.cs_roundness is None:
+        return ()
+    z = drive.geometry.circular_spline_teeth
+    radial = drive.cs_roundness.radial(np.arange(z, dtype=np.float64) * (2 * math.pi / z))
+    return (MeasuredTeeth(tuple((-math.tan(drive.geometry.pressure_angle) * radial).tolist())),)
 
 
 def misalignment_share(drive: Drive) -> float:

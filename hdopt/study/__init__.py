@@ -81,6 +81,7 @@ class Study:
             DriveSection,
             LoadSection,
             MaterialSection,
+            RoundnessSection,
             WaveGeneratorSection,
         )
 
@@ -99,7 +100,10 @@ class Study:
             load = (self.find("load", LoadSection) or LoadSection()).build()
         cs_teeth = self._teeth("cs_teeth", geometry.circular_spline_teeth)
         fs_teeth = self._teeth("fs_teeth", geometry.flexspline_teeth)
-        return Drive(geometry, wave_generator, clearances, material, load, cs_teeth, fs_teeth)
+        with self._placed("cs_roundness"):
+            ring = self.find("cs_roundness", RoundnessSection)
+            roundness = None if ring is None else ring.build(self.folder)
+        return Drive(geometry, wave_generator, clearances, material, load, cs_teeth, fs_teeth, roundness)
 
     def _teeth(self, name: str, teeth: int) -> MeasuredTeeth | None:
         from hdopt.study.drive import TeethSection

@@ -8,7 +8,7 @@ from typing import Any  # Any: parsed TOML
 
 from hdopt.study.base import Section
 
-DRIVE = ("wave_generator", "errors", "cs_teeth", "fs_teeth")
+DRIVE = ("wave_generator", "errors", "cs_teeth", "fs_teeth", "cs_roundness")
 TOLERANCED = (*DRIVE, "tolerances", "requirement", "contributors", "linear_stack")
 USED: dict[str, tuple[str, ...]] = {
     "ke": (*DRIVE, "requirement", "operation"),

@@ -11,6 +11,7 @@ from pydantic import Field
 from hdopt.drive.errors import PHASE_OF, STUDY_KEYS, DriveErrors, study_key
 from hdopt.drive.geometry import Clearances, DriveGeometry, Load, Material, Structure, WaveGenerator
 from hdopt.drive.profiles import Ellipse, MeasuredProfile, Resal, TwoDisk, WaveGeneratorProfile, parallel_profile
+from hdopt.drive.roundness import MeasuredRoundness, read_roundness
 from hdopt.drive.teeth import MeasuredTeeth, read_teeth
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.study.base import Section
@@ -155,6 +156,33 @@ class TeethSection(Section):
         values = read_teeth(path, teeth, self.flank)
         first = math.radians(self.first_tooth_deg)
         return MeasuredTeeth.of(values, self.deviation, first, self.recentre, source=self.file)
+
+
+class RoundnessSection(Section):
+    """[cs_roundness]: a circular spline whose roundness was measured. It acts beside its teeth's pitch."""
+
+    file: str
+    """CSV of angle_deg, radius_mm, relative to the study file; any radius of the ring that the teeth follow."""
+    upr: int = Field(default=50, ge=2, le=500)
+    """Cut-off of the Gaussian filter (ISO 12181-2), undulations per revolution: half of such a wave is kept."""
+    zero_deg: float = 0.0
+    """Where the file's angle 0 lies, clockwise from the major axis at input angle 0."""
+    angles: Literal["clockwise", "counterclockwise"] = "clockwise"
+    """How the file's angles count, seen as the study's directions are."""
+    recentre: bool = True
+    """Take the first wave out, as roundness does; false keeps the ring's eccentricity against the file's centre."""
+
+    def build(self, folder: Path) -> MeasuredRoundness:
+        """The record; the file lies in `folder`."""
+        points = read_roundness(folder / self.file)
+        return MeasuredRoundness.of(
+            *points,
+            self.upr,
+            zero=math.radians(self.zero_deg),
+            counterclockwise=self.angles == "counterclockwise",
+            recentre=self.recentre,
+            source=self.file,
+        )
 
 
 class ErrorsSection(Section):

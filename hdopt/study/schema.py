@@ -16,6 +16,7 @@ SECTIONS: dict[str, str] = {
     "wave_generator": "hdopt.study.drive:WaveGeneratorSection",
     "cs_teeth": "hdopt.study.drive:TeethSection",
     "fs_teeth": "hdopt.study.drive:TeethSection",
+    "cs_roundness": "hdopt.study.drive:RoundnessSection",
     "errors": "hdopt.study.drive:ErrorsSection",
     "effects": "hdopt.study.effects:EffectsSection",
     "operation": "hdopt.study.effects:OperationSection",

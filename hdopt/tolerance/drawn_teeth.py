@@ -101,7 +101,7 @@ def drawn_peak_to_peak_arcmin(
 ) -> Array:
     """Peak-to-peak (arcmin) of drives with errors as rows of `matrix` (n, 12), each with teeth of its own, (n,).
 
-    `inputs` (n, d) hold the numbers that pick the `teeth`; a spline that is not drawn keeps its table in `drive`.
+    `inputs` (n, d) hold the numbers that pick the `teeth`; what is measured of `drive` stays beside them.
     `misalignment` and `sine_share` as in `beat_extremes_arcmin`.
     """
     sharing = LoadSharing.of(drive)
@@ -111,7 +111,7 @@ def drawn_peak_to_peak_arcmin(
     def fill(rows: slice) -> None:
         tables = dict(zip(SPLINES, whole, strict=True))
         for one in teeth:
-            tables[one.spline] = sharing.tables(one.field.drawn(inputs[rows, one.column]))
+            tables[one.spline] = tables[one.spline] + sharing.tables(one.field.drawn(inputs[rows, one.column]))
         cs, fs = (tables[spline] for spline in SPLINES)
         low, high = beat_extremes_arcmin(drive, matrix[rows], (cs, fs), misalignment, sine_share).T
         out[rows] = high - low

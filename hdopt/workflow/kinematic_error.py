@@ -62,6 +62,8 @@ class KinematicErrorResult:
     effects: tuple[dict[str, Any], ...] = ()
     measured_teeth: Mapping[str, dict[str, Any]] = field(default_factory=dict)
     """By spline, what is known of teeth measured one by one; their deviation is the mean over the teeth in contact."""
+    measured_roundness: Mapping[str, object] | None = None
+    """What is known of a circular spline whose roundness was measured."""
 
     def to_dict(self) -> dict[str, Any]:
         return asdict(self)
@@ -164,6 +166,7 @@ def kinematic_error(
         base_peak_to_peak_arcmin=base,
         effects=effects,
         measured_teeth=_measured(drive),
+        measured_roundness=_roundness(drive),
     )
 
 
@@ -211,6 +214,20 @@ def _measured(drive: Drive) -> dict[str, dict[str, Any]]:
     }
 
 
+def _roundness(drive: Drive) -> dict[str, object] | None:
+    """What is known of a measured circular spline."""
+    ring = drive.cs_roundness
+    if ring is None:
+        return None
+    return {
+        "file": ring.source,
+        "upr": ring.cutoff,
+        "roundness_um": 1000 * ring.peak_to_valley,
+        "eccentricity_um": 1000 * ring.eccentricity,
+        "recentred": ring.recentred,
+    }
+
+
 def _words_on_teeth(drive: Drive) -> list[str]:
     """That a table was re-centred, or shows what a part measured off-centre shows."""
     found = []
@@ -221,6 +238,12 @@ def _words_on_teeth(drive: Drive) -> list[str]:
         size = f"{name}: a first harmonic of {1000 * teeth.eccentricity:.2f} um, as of {as_offset:.1f} um eccentricity,"
         done = "was taken out" if teeth.recentred else "is kept; recentre = true takes it out, for a part off-centre"
         found.append(f"{size} {done}")
+    ring = drive.cs_roundness
+    if ring is not None:
+        size = f"cs_roundness: {1000 * ring.peak_to_valley:.2f} um from peak to valley up to {ring.cutoff} UPR;"
+        centre = f"an eccentricity of {1000 * ring.eccentricity:.2f} um"
+        done = "was taken out" if ring.recentred else "is kept and adds to axis_eccentricity_mm"
+        found.append(f"{size} {centre} {done}")
     return found
 
 
