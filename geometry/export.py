@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, MissingLibrary, unknown_name
@@ -15,11 +16,15 @@ from hdopt.files import JsonReady, replacing_all
 from hdopt.geometry.budget import CalloutTables
 from hdopt.geometry.dimensions import Dimension
 from hdopt.geometry.formats import FORMATS
+from hdopt.geometry.inspection import COLUMNS, Check, inspection_plan
 from hdopt.geometry.job import make_job
 from hdopt.geometry.mating import MatingRow
 from hdopt.geometry.model import WaveGeneratorModel
 from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.step import Identity
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,8 @@ class ExportResult:
     dimensions: tuple[Dimension, ...]
     identity: Identity
     mating: tuple[MatingRow, ...]
+    plan: tuple[Check, ...]
+    """The inspection plan."""
     replaced: tuple[str, ...] = ()
     """Kinds of file of which an earlier one bore the name."""
 
@@ -62,6 +69,24 @@ class ExportResult:
             "assumptions": {assumption.key: assumption.value for assumption in self.model.assumptions},
             "notes": list(self.model.notes),
             "fingerprint": self.identity.fingerprint,
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """The inspection plan, one row a check."""
+        import pandas as pd
+
+        return pd.DataFrame([check.to_dict() for check in self.plan], columns=list(COLUMNS))
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet: inspection plan, key dimensions, parts, what shaft and housing must keep."""
+        import pandas as pd
+
+        parts = [(part["name"], part["volume_mm3"], *part["bounding_box_mm"]) for part in self.to_dict()["parts"]]
+        return {
+            "inspection plan": self.to_frame(),
+            "dimensions": pd.DataFrame([dimension.to_dict() for dimension in self.dimensions]),
+            "parts": pd.DataFrame(parts, columns=["part", "volume_mm3", "x_mm", "y_mm", "z_mm"]),
+            "mating": pd.DataFrame([row.to_dict() for row in self.mating]),
         }
 
 
@@ -99,7 +124,9 @@ def export_drive(
             FORMATS[kind].write(path, job)
         for kind, path in passing.items():
             checks[kind] = FORMATS[kind].check(path, job, targets[kind].name)
-    return ExportResult(targets, checks, job.model, job.dimensions, job.identity, job.mating, replaced)
+    return ExportResult(
+        targets, checks, job.model, job.dimensions, job.identity, job.mating, inspection_plan(job), replaced
+    )
 
 
 def require_cadquery() -> None:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from hdopt.drive.geometry import DriveGeometry as DriveGeometry
     from hdopt.drive.geometry import WaveGenerator as WaveGenerator
     from hdopt.errors import HdoptError as HdoptError
+    from hdopt.files import write_tables as write_tables
     from hdopt.geometry.export import ExportResult as ExportResult
     from hdopt.optimize.records import SearchResult as SearchResult
     from hdopt.recordings.bench import Bench as Bench
@@ -74,6 +75,7 @@ _EXPORTS: dict[str, str] = {
     "DriveGeometry": "hdopt.drive.geometry",
     "WaveGenerator": "hdopt.drive.geometry",
     "HdoptError": "hdopt.errors",
+    "write_tables": "hdopt.files",
     "ExportResult": "hdopt.geometry.export",
     "SearchResult": "hdopt.optimize.records",
     "Bench": "hdopt.recordings.bench",

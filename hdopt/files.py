@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import secrets
 import stat
 import tempfile
@@ -19,7 +20,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn  # Any: values of JSON
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol  # Any: values of JSON
 
 from hdopt.errors import HdoptError
 
@@ -187,6 +188,61 @@ def harmless(frame: pd.DataFrame) -> pd.DataFrame:
     safe.index = safe.index.map(harmless_cell) if len(safe.index) else safe.index
     safe.index.names = [harmless_cell(name) for name in frame.index.names]
     return safe
+
+
+class HasTables(Protocol):
+    """A result with tables for a spreadsheet, by name, the main one first."""
+
+    def tables(self) -> dict[str, pd.DataFrame]: ...
+
+
+def write_tables(result: HasTables, path: str | Path, kind: str | None = None) -> None:
+    """Write the tables of a `result` to `path` by `kind`: "xlsx", an Excel workbook of all of them, a sheet each, or
+    "csv", the main one; by the ending of `path` if None.
+
+    Whole or not at all; texts that begin like formulas are made harmless, numbers stay numbers. Raises `HdoptError` for
+    another kind, and where the file cannot be written.
+    """
+    path = Path(path)
+    kind = path.suffix.lower().lstrip(".") if kind is None else kind
+    check_output(path)
+    if kind == "xlsx":
+        write_bytes(path, to_xlsx(result.tables()))
+    elif kind == "csv":
+        write_text(path, to_csv(next(iter(result.tables().values()))))
+    else:
+        raise HdoptError(f"cannot write {path}: tables are written as .csv or .xlsx; give one of these endings")
+
+
+def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
+    """An Excel workbook of `tables`, a sheet each by its name, with a bold head that stays while the rest scrolls."""
+    import io
+
+    import pandas as pd
+
+    content = io.BytesIO()
+    with pd.ExcelWriter(content, engine="openpyxl") as book:
+        for name, frame in tables.items():
+            sheet = _NOT_IN_SHEET_NAMES.sub(" ", _without_controls(name))[:LONGEST_SHEET_NAME].strip("' ") or "table"
+            printable = frame.map(_without_controls).rename(columns=_without_controls)
+            harmless(printable).to_excel(book, sheet_name=sheet, index=False, freeze_panes=(1, 0))
+            for column in book.sheets[sheet].columns:
+                widest = max(len(str(cell.value)) for cell in column if cell.value is not None)
+                book.sheets[sheet].column_dimensions[column[0].column_letter].width = min(max(widest + 2, 8), 60)
+    return content.getvalue()
+
+
+LONGEST_SHEET_NAME = 31
+"""Letters of a sheet's name that Excel takes; it takes none of []:*?/\\."""
+
+
+def _without_controls(cell: Any) -> Any:
+    """A text `cell` without what XML cannot hold, such as control characters; anything else as it is."""
+    return _CONTROLS.sub(" ", cell) if isinstance(cell, str) else cell
+
+
+_CONTROLS = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+_NOT_IN_SHEET_NAMES = re.compile(r"[\[\]:*?/\\\t\r\n]")
 
 
 def harmless_cell(cell: Any) -> Any:

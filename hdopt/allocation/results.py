@@ -132,6 +132,21 @@ class AllocateResult:
         columns = ["error", "unit", "present tolerance", "tolerance", "grade", "present cost", "cost"]
         return pd.DataFrame(rows, columns=columns).set_index("error")
 
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet: tolerances, the rules side by side, cost over the limit."""
+        import pandas as pd
+
+        found = {"tolerances": self.to_frame().reset_index()}
+        if self.comparison:
+            rows = [
+                (o.rule, o.total_cost, o.conforming.value, o.conforming.low, o.conforming.high, o.note)
+                for o in self.comparison
+            ]
+            found["rules"] = pd.DataFrame(rows, columns=["rule", "cost", "yield", "yield low", "yield high", "note"])
+        if self.cost_curve:
+            found["cost curve"] = pd.DataFrame(self.cost_curve, columns=[f"limit_{self.unit}", "cost"])
+        return found
+
 
 def allocated_errors(
     items: Sequence[Item],

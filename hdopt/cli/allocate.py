@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import StudyOptions, emit, progress, status, study_options, work_options
+from hdopt.cli.common import StudyOptions, emit, progress, status, study_options, table_options, work_options
 
 if TYPE_CHECKING:
     from hdopt.allocation.results import AllocateResult
 
 
 @click.command()
+@table_options
 @study_options
 @click.option("--rule", metavar="RULE", help="worst_case, rss or yield; the study's own if omitted.")
 @click.option("--compare/--no-compare", default=None, help="Also the other rules, in one table.")
@@ -43,7 +44,7 @@ def command(asked: StudyOptions, rule: str | None, compare: bool | None, json_fi
         print(f"hdopt: {error}", file=sys.stderr)
         return 1
     verdict = of_allocation(result)
-    emit(result.to_dict(), json_file, _lines(result), verdict)
+    emit(result.to_dict(), json_file, _lines(result), verdict, tables=result)
     return status(result.accepted, verdict)
 
 

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import emit, json_option
+from hdopt.cli.common import emit, json_option, table_options
 
 if TYPE_CHECKING:
     from hdopt.workflow.check_study import StudyCheck
 
 
 @click.command()
+@table_options
 @click.argument("study", metavar="FILE")
 @json_option
 def command(study: str, json_file: Path | None) -> int:
@@ -25,7 +26,7 @@ def command(study: str, json_file: Path | None) -> int:
     from hdopt.workflow.check_study import check_study
 
     found = check_study(study)
-    emit(found.to_dict(), json_file, _lines(found))
+    emit(found.to_dict(), json_file, _lines(found), tables=found)
     return 0 if found.complete else 1
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar  # Any: values of JSON; what the 
 
 import click
 
-from hdopt.files import claim_output, to_json, write_text
+from hdopt.files import HasTables, claim_output, to_csv, to_json, write_tables, write_text
 
 if TYPE_CHECKING:
     from hdopt.parallel.engine import Engine
@@ -42,6 +42,46 @@ json_option = click.option(
     type=OutputFile(),
     help="Write the result as JSON; '-' writes it, alone, to standard output.",
 )
+TABLES = "hdopt.tables"
+"""The tables' files that were asked for."""
+
+
+def _tables_asked(ctx: click.Context, parameter: click.Parameter, path: Path | None) -> None:
+    if path is None:
+        return
+    if parameter.name == "xlsx" and path.suffix.lower() != ".xlsx":
+        raise click.BadParameter(f"{path} does not end with .xlsx, by which spreadsheets know a workbook")
+    ctx.meta.setdefault(TABLES, []).append((parameter.name, path))
+
+
+def table_options(command: Callable[..., R]) -> Callable[..., R]:
+    """--csv and --xlsx of a `command` that gives its result to `emit` as `tables`."""
+    texts = {"csv": "Write the table as CSV.", "xlsx": "Write all tables as an Excel workbook, a sheet each."}
+    decorated = command
+    for name, text in reversed(texts.items()):
+        option = click.option(
+            f"--{name}", metavar="FILE", type=OutputFile(), expose_value=False, callback=_tables_asked, help=text
+        )
+        decorated = option(decorated)
+    return decorated
+
+
+def _write_tables(result: HasTables | None) -> None:
+    """Write the tables of `result` to the files that the command line asked for."""
+    if result is None:
+        return  # an answer such as "infeasible" has none
+    for kind, path in _tables_wanted():
+        if str(path) == "-":
+            click.echo(to_csv(next(iter(result.tables().values()))), nl=False)
+        else:
+            write_tables(result, path, kind)
+
+
+def _tables_wanted() -> list[tuple[str, Path]]:
+    context = click.get_current_context(silent=True)
+    return [] if context is None else context.meta.get(TABLES, [])
+
+
 seed_option = click.option(
     "--seed", type=click.IntRange(0, 2**63 - 1), default=1, show_default=True, help="Random seed."
 )
@@ -119,13 +159,18 @@ def status(answer: bool, verdict: Verdict | None) -> int:
 
 
 def emit(
-    result: Mapping[str, Any], json_file: str | Path | None, lines: Iterable[str], verdict: Verdict | None = None
+    result: Mapping[str, Any],
+    json_file: str | Path | None,
+    lines: Iterable[str],
+    verdict: Verdict | None = None,
+    tables: HasTables | None = None,
 ) -> None:
     """Write `result` as JSON where asked, and `lines` for a person unless JSON takes standard output.
 
     The verdict, where there is one, is the last line, and `requirement` in the JSON; `provenance` is there always, and
     `defaults` where the command falls back on any.
-    Where the JSON cannot be written, the lines are printed all the same: the work is not lost.
+    `tables` is what --csv and --xlsx take theirs from. Where a file cannot be written, the lines are printed all the
+    same: the work is not lost.
     """
     result = dict(result)
     context = click.get_current_context(silent=True)
@@ -136,19 +181,26 @@ def emit(
         result["requirement"] = verdict.to_dict()
     if json_file is not None:
         result["provenance"] = _provenance()
-    if str(json_file) == "-":
-        click.echo(to_json(result))
-        return
+    alone = [path for path in (json_file, *(path for _, path in _tables_wanted())) if str(path) == "-"]
+    if len(alone) > 1:
+        raise click.UsageError("standard output can take one of --json and --csv; give the other a file")
     try:
-        if json_file:
+        _write_tables(tables)
+        if str(json_file) == "-":
+            click.echo(to_json(result))
+        elif json_file:
             write_text(Path(json_file), to_json(result) + "\n")
     finally:
-        for line in lines:
-            click.echo(line)
-        for said in defaults:
-            click.echo(f"default: {said}")
-        if verdict is not None:
-            click.echo(verdict.line)
+        _say(() if alone else lines, () if alone else defaults, None if alone else verdict)
+
+
+def _say(lines: Iterable[str], defaults: Iterable[str], verdict: Verdict | None) -> None:
+    for line in lines:
+        click.echo(line)
+    for said in defaults:
+        click.echo(f"default: {said}")
+    if verdict is not None:
+        click.echo(verdict.line)
 
 
 def _provenance() -> dict[str, Any]:

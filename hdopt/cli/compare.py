@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any  # Any: what the command's other options g
 
 import click
 
-from hdopt.cli.common import OutputFile, drive_option, emit, json_option, seed_option, set_option
+from hdopt.cli.common import OutputFile, drive_option, emit, json_option, seed_option, set_option, table_options
 
 if TYPE_CHECKING:
     from hdopt.workflow.compare import CompareResult
 
 
 @click.command()
+@table_options
 @click.argument("cam", metavar="CAM.csv")
 @click.option("--study", metavar="STUDY", help="A study file or a shipped study; the shipped drive if omitted.")
 @drive_option
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     help="What was measured: the cam itself, or the outside of the bearing on it.",
 )
 @click.option("--part", metavar="NAME", help="disc_1 or disc_2 of a two-disk wave generator.")
-@click.option("--csv", "csv_file", metavar="FILE", type=OutputFile(), help="Deviation of every point.")
 @click.option("--plot", metavar="FILE", type=OutputFile(), help="Deviations over the angle, with the zone (SVG).")
 @click.option("--write-study", metavar="FILE", type=OutputFile(), help="The study with the measured cam (TOML).")
 @json_option
@@ -49,9 +49,9 @@ def command(cam: str, study: str | None, drive: str | None, overrides: tuple[str
     result = compare(
         loaded, cam, probe_radius_mm=options["probe_radius_mm"], surface=options["surface"], part=options["part"]
     )
-    wanted = {"csv": options["csv_file"], "plot": options["plot"], "study": options["write_study"]}
+    wanted = {"plot": options["plot"], "study": options["write_study"]}
     table = write_comparison(result, {kind: path for kind, path in wanted.items() if path}, loaded, cam)
-    emit(result.to_dict(), options["json_file"], _lines(result, options["write_study"], table))
+    emit(result.to_dict(), options["json_file"], _lines(result, options["write_study"], table), tables=result)
     return 0 if result.met else 1
 
 

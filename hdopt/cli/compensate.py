@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import OutputFile, answer_options, emit
+from hdopt.cli.common import OutputFile, answer_options, emit, table_options
 from hdopt.cli.recorded import RecordingOptions, recording_options
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
+@table_options
 @recording_options
 @click.option("-o", "output", metavar="FILE", type=OutputFile(), required=True, help="Where the table goes.")
 @click.option("--as", "form", type=click.Choice(["csv", "json", "c"]), help="By default what FILE ends with, else CSV.")
@@ -38,7 +39,7 @@ def command(
     try:
         write_compensation(found, {form: output})
     finally:
-        emit(found.to_dict(str(output) if found.worth else None), json_file, _lines(found, output))
+        emit(found.to_dict(str(output) if found.worth else None), json_file, _lines(found, output), tables=found)
     return 0 if found.worth else 1
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import OutputFile, answer_options, emit, engine_option
+from hdopt.cli.common import OutputFile, answer_options, emit, engine_option, table_options
 from hdopt.cli.recorded import RecordingOptions, recording_options
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ MOST_LISTED = 12
 
 
 @click.command()
+@table_options
 @recording_options
 @click.option(
     "--nuisance", metavar="NAME,...", default="", help="Fit beside every model, and never name: drift, time-warp."
@@ -58,7 +59,7 @@ def command(
         write_diagnosis(diagnosis, files, [recording.name for recording in read], source)
     finally:
         # A file that cannot be written after minutes of work must not take the answer with it.
-        emit(diagnosis.to_dict(), json_file, _lines(diagnosis))
+        emit(diagnosis.to_dict(), json_file, _lines(diagnosis), tables=diagnosis)
 
 
 def _lines(diagnosis: Diagnosis) -> Iterator[str]:

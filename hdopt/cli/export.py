@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar  # Any: what the command's other 
 
 import click
 
-from hdopt.cli.common import OutputFile, StudyOptions, answer_options, emit, study_options
+from hdopt.cli.common import OutputFile, StudyOptions, answer_options, emit, study_options, table_options
 
 if TYPE_CHECKING:
     from hdopt.geometry.export import ExportResult
@@ -50,6 +50,7 @@ def file_options(command: Callable[..., R]) -> Callable[..., R]:
 
 
 @click.command()
+@table_options
 @study_options
 @click.option("--structure", metavar="S", help="integral, automatic, one_way_major or one_way_minor.")
 @file_options
@@ -82,7 +83,7 @@ def command(
     except CheckFailed as failed:
         print(f"hdopt: {failed}", file=sys.stderr)
         return 1
-    emit(result.to_dict(), json_file, _lines(result))
+    emit(result.to_dict(), json_file, _lines(result), tables=result)
     return 0
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any  # Any: what the command's other options g
 
 import click
 
-from hdopt.cli.common import OutputFile, answer_options, emit, engine_option
+from hdopt.cli.common import OutputFile, answer_options, emit, engine_option, table_options
 from hdopt.cli.recorded import RecordingOptions, recording_options
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ UNITS = {"slope": "arcmin/deg"}
 
 
 @click.command()
+@table_options
 @recording_options
 @click.option("--limit", "limits", metavar="NAME=VALUEarcmin,...", help="Limits, such as peak_to_peak=1.0arcmin.")
 @click.option("--each", is_flag=True, help="Each file is a drive of its own: one table, one plot, Ppk.")
@@ -26,7 +27,6 @@ UNITS = {"slope": "arcmin/deg"}
 @click.option("--serial", default="", help="Serial number, for the sheet.")
 @click.option("--conditions", default="", help="Conditions in words, for the sheet.")
 @click.option("--check", is_flag=True, help="End with status 1 where a limit is missed (not where it is undecided).")
-@click.option("--csv", "csv_file", metavar="FILE", type=OutputFile(), help="Write the figures as a table.")
 @click.option("--report", "report_file", metavar="FILE", type=OutputFile(), help="Write a one-page HTML report.")
 @click.option("--write-bench", "bench_out", metavar="FILE", type=OutputFile(), help="Write what was understood.")
 @engine_option
@@ -60,12 +60,12 @@ def _one(given: RecordingOptions, limits: dict[str, float] | None, options: dict
     try:
         write_inspection(found, _files(options), given.recordings, source)
     finally:
-        emit(found.to_dict(), options["json_file"], _lines(found))
+        emit(found.to_dict(), options["json_file"], _lines(found), tables=found)
     return 1 if options["check"] and found.missed else 0
 
 
 def _files(options: dict[str, Any]) -> dict[str, Path]:
-    wanted = {"csv": options["csv_file"], "report": options["report_file"], "bench": options["bench_out"]}
+    wanted = {"report": options["report_file"], "bench": options["bench_out"]}
     return {kind: path for kind, path in wanted.items() if path is not None}
 
 
@@ -76,7 +76,7 @@ def _each(given: RecordingOptions, limits: dict[str, float] | None, options: dic
     try:
         write_batch(batch, _files(options))
     finally:
-        emit(batch.to_dict(), options["json_file"], _batch_lines(batch))
+        emit(batch.to_dict(), options["json_file"], _batch_lines(batch), tables=batch)
     return 1 if options["check"] and batch.missed else 0
 
 

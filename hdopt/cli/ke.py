@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import StudyOptions, check_option, emit, json_option, status, study_options
+from hdopt.cli.common import StudyOptions, check_option, emit, json_option, status, study_options, table_options
 
 if TYPE_CHECKING:
     from hdopt.workflow.kinematic_error import KinematicErrorResult
 
 
 @click.command()
+@table_options
 @study_options
 @click.option("--structure", metavar="S", help="integral, automatic, one_way_major or one_way_minor.")
 @click.option("--sampling-deg", type=float, help="Also take the peak-to-peak only on this grid, from 0.")
@@ -42,7 +43,7 @@ def command(
     loaded = asked.load(*chosen)
     result = kinematic_error(loaded, sampling_deg=sampling_deg, turns=turns, method=method)
     verdict = of_kinematic_error(loaded, result)
-    emit(result.to_dict(), json_file, _lines(result), verdict)
+    emit(result.to_dict(), json_file, _lines(result), verdict, tables=result)
     return status(True, verdict)
 
 

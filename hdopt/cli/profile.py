@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import StudyOptions, answer_options, emit, study_options
+from hdopt.cli.common import StudyOptions, answer_options, emit, study_options, table_options
 
 if TYPE_CHECKING:
     from hdopt.workflow.kinematic_error import ProfileResult
 
 
 @click.command()
+@table_options
 @study_options
 @click.option("--profile", metavar="P", help="ellipse, resal, two_disk or measured.")
 @answer_options
@@ -27,7 +28,7 @@ def command(asked: StudyOptions, profile: str | None, json_file: Path | None, se
 
     chosen = (f"wave_generator.profile={profile}",) if profile else ()
     result = analyse(asked.load(*chosen))
-    emit(result.to_dict(), json_file, _lines(result))
+    emit(result.to_dict(), json_file, _lines(result), tables=result)
 
 
 ROWS = (

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import click
 
-from hdopt.cli.common import StudyOptions, answer_options, emit, engine_option, study_options
+from hdopt.cli.common import StudyOptions, answer_options, emit, engine_option, study_options, table_options
 
 
 @click.command()
+@table_options
 @study_options
 @click.option("--fronts/--no-fronts", default=True, help="Also trace the fronts between the two objectives.")
 @engine_option
@@ -26,7 +27,7 @@ def command(asked: StudyOptions, fronts: bool, json_file: Path | None, seed: int
     from hdopt.workflow.search import search
 
     result = search(asked.load(), seed, _stages() if sys.stderr.isatty() else lambda stage: None, fronts)
-    emit(result.to_dict(), json_file, result_lines(result))
+    emit(result.to_dict(), json_file, result_lines(result), tables=result)
     return 0 if result.feasible else 1
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any  # Any: what the command's other options g
 
 import click
 
-from hdopt.cli.common import StudyOptions, emit, status, study_options, watched, work_options
+from hdopt.cli.common import StudyOptions, emit, status, study_options, table_options, watched, work_options
 
 if TYPE_CHECKING:
     from hdopt.study import Study
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
+@table_options
 @study_options
 @click.option("-n", "n", type=click.IntRange(1, 2**30), help="Base points in all; 16384, or the method's own number.")
 @click.option(
@@ -41,7 +42,7 @@ def command(asked: StudyOptions, json_file: Path | None, seed: int, **options: A
     loaded = asked.load()
     result, lines = _analysed(loaded, seed, **options)
     verdict = of_tolerances(loaded, seed)
-    emit(result.to_dict(), json_file, lines, verdict)
+    emit(result.to_dict(), json_file, lines, verdict, tables=result)
     return status(True, verdict)
 
 

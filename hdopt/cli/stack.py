@@ -15,6 +15,7 @@ from hdopt.cli.common import (
     resume_option,
     status,
     study_options,
+    table_options,
     watched,
     work_options,
 )
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
+@table_options
 @study_options
 @click.option("-n", "n", type=click.IntRange(1, 10**13), default=2**18, show_default=True, help="Samples in all.")
 @click.option("--tail", type=float, metavar="LIMIT", help="Also the probability of exceeding LIMIT, down to 1e-7.")
@@ -51,7 +53,7 @@ def command(asked: StudyOptions, resume: bool, json_file: Path | None, **options
     with finished_parts_kept(loaded, resume):
         result = stack(loaded, engine=watched("samples"), **options)
     verdict = of_stack(result)
-    emit(result.to_dict(), json_file, _lines(result), verdict)
+    emit(result.to_dict(), json_file, _lines(result), verdict, tables=result)
     return status(True, verdict)
 
 

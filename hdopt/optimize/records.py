@@ -113,11 +113,39 @@ class SearchResult:
         }
 
     def to_frame(self) -> pd.DataFrame:
-        """The front as a table."""
+        """The front as a table; the best design of each combination where no front was traced."""
+        return _designs(self.front or self.combinations)
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet: the front if any, the best design and the present one, the best of each
+        combination, and what holds the best."""
         import pandas as pd
 
-        rows = [{"profile": d.profile, "structure": d.structure, **d.variables, **d.quantities} for d in self.front]
-        return pd.DataFrame(rows)
+        found = {"front": _designs(self.front)} if self.front else {}
+        found["combinations"] = _designs(self.combinations)
+        found["best and present"] = _designs((self.best, self.baseline))
+        if self.active:
+            found["active limits"] = pd.DataFrame(list(self.active))
+        return found
+
+
+def _designs(designs: Sequence[DesignRecord]) -> pd.DataFrame:
+    """One row a design."""
+    import pandas as pd
+
+    return pd.DataFrame(
+        [
+            {
+                "profile": d.profile,
+                "structure": d.structure,
+                **d.variables,
+                **d.quantities,
+                "feasible": d.feasible,
+                "broken limits": "; ".join(d.broken_limits),
+            }
+            for d in designs
+        ]
+    )
 
 
 @dataclass(frozen=True)

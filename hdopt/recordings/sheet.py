@@ -142,6 +142,17 @@ class Inspection:
         rows += [(f"order_{line.symbol}", line.amplitude_arcmin, "arcmin") for line in self.orders]
         return pd.DataFrame(rows, columns=["figure", "value", "unit"])
 
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet: figures, orders, limits, checks."""
+        import pandas as pd
+
+        content = self.to_dict()
+        found = {"figures": self.to_frame(), "orders": pd.DataFrame(content["orders"])}
+        if self.limits:
+            found["limits"] = pd.DataFrame(content["limits"])
+        found["checks"] = pd.DataFrame(list(self.checks.items()), columns=["check", "outcome"])
+        return found
+
 
 def _spread(values: Array) -> dict[str, float] | None:
     if len(values) == 0:
@@ -195,3 +206,12 @@ class Batch:
         import pandas as pd
 
         return pd.DataFrame([vars(drive) for drive in self.drives])
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet: the drives, and Ppk where there is one."""
+        import pandas as pd
+
+        found = {"drives": self.to_frame()}
+        if self.performance is not None:
+            found["performance"] = pd.DataFrame([vars(self.performance)])
+        return found

@@ -49,6 +49,24 @@ class StackResult:
         """One row a figure, with its interval."""
         return self.stack.to_frame()
 
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet: figures with intervals, contributions; tail and worst case where asked for."""
+        import pandas as pd
+
+        unit, shares = self.stack.unit, self.stack.linearisation.shares
+        found = {
+            "stack": self.to_frame().reset_index(),
+            "contributions": pd.DataFrame(list(shares.items()), columns=["input", "share of the variance"]),
+        }
+        if self.worst_case is not None:
+            worst = [(self.worst_case.value, self.worst_case.bound, unit)]
+            found["worst case"] = pd.DataFrame(worst, columns=["found", "no drive exceeds", "unit"])
+        if self.tail is not None:
+            t = self.tail
+            columns = ["limit", "unit", "probability above", "low", "high", "method"]
+            found["tail"] = pd.DataFrame([(t.limit, unit, t.probability, t.low, t.high, t.method)], columns=columns)
+        return found
+
 
 @dataclass(frozen=True)
 class SobolResult:
@@ -72,3 +90,17 @@ class SobolResult:
         table = self.sobol or self.shapley
         assert table is not None, "a result holds indices, effects, or both"
         return table.to_frame()
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet: indices, those of pairs, Shapley effects, as far as there are any."""
+        import pandas as pd
+
+        found = {}
+        if self.sobol is not None:
+            found["indices"] = self.sobol.to_frame().reset_index()
+            pairs = [(a, b, e.value, e.low, e.high) for (a, b), e in self.sobol.second.items()]
+            if pairs:
+                found["pairs"] = pd.DataFrame(pairs, columns=["input", "with", "S2", "S2 low", "S2 high"])
+        if self.shapley is not None:
+            found["Shapley effects"] = self.shapley.to_frame().reset_index()
+        return found

@@ -86,6 +86,10 @@ class Screening:
 
         return pd.DataFrame.from_dict(self.inputs, orient="index").rename_axis("name")
 
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet."""
+        return {self.method: self.to_frame().reset_index()}
+
     def to_salib(self) -> Any:
         """SALib's own result: a `ResultDict` with `to_df()` and `plot()`."""
         return self.result

@@ -67,6 +67,10 @@ class StudyCheck:
         ]
         return pd.DataFrame(rows, columns=["what", "commands", "can", "missing", "why"])
 
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet."""
+        return {"check": self.to_frame()}
+
 
 def check_study(study: AnyStudy = None) -> StudyCheck:
     """What can be computed from `study` (a study, its name or its path), and what is missing for the rest.

@@ -8,20 +8,23 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal  # Any: values of JSON
+from typing import TYPE_CHECKING, Any, Literal  # Any: values of JSON
 
 from hdopt.errors import HdoptError, unknown_name
-from hdopt.files import replacing_all, to_csv, write_text
+from hdopt.files import replacing_all, write_text
 from hdopt.geometry.compare import CamFit, fit_cam, read_cam, table_of
 from hdopt.geometry.contour import Contour
 from hdopt.geometry.dimensions import tolerance_bounds
 from hdopt.geometry.job import Job, make_job
 from hdopt.study import AnyStudy, Study, as_study
 from hdopt.workflow.export import export_options
-from hdopt.workflow.output_files import Files, checked_files
+from hdopt.workflow.output_files import Files, checked_files, write_table_files
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Surface = Literal["cam", "bearing"]
-FILES = ("csv", "plot", "study")
+FILES = ("csv", "xlsx", "plot", "study")
 
 
 @dataclass(frozen=True)
@@ -71,11 +74,15 @@ class CompareResult:
             "met": self.met,
         }
 
-    def to_frame(self) -> Any:
+    def to_frame(self) -> pd.DataFrame:
         """One row a point: angle in degrees, deviation in um."""
         import pandas as pd
 
         return pd.DataFrame(table_of(self.fit))
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet."""
+        return {"deviations": self.to_frame()}
 
 
 def compare(
@@ -91,9 +98,9 @@ def compare(
 
     `measured` has angle_deg,radius_mm or x_mm,y_mm of the centre of a ball of `probe_radius_mm` mm; `surface` says
     whether the cam itself was measured or the outside of the bearing on it; `part` is one of two discs. `files`
-    to write: {"csv": PATH} the deviation of every point, {"plot": PATH} an SVG of them, {"study": PATH} the study with
-    the measured cam. Raises `HdoptError` for points that are not of this cam, and before any work where a file cannot
-    be written.
+    to write: {"csv": PATH} or {"xlsx": PATH} the deviation of every point, {"plot": PATH} an SVG of them,
+    {"study": PATH} the study with the measured cam. Raises `HdoptError` for points that are not of this cam, and before
+    any work where a file cannot be written.
     """
     study, wanted = as_study(study), checked_files(files, FILES)
     bounds = tolerance_bounds(study.data)
@@ -107,14 +114,13 @@ def compare(
 
 
 def write_comparison(result: CompareResult, files: Mapping[str, Path], study: Study, source: str) -> Path | None:
-    """Write of a comparison `result` what `files` asks for ("csv", "plot", "study" -> path).
+    """Write of a comparison `result` what `files` asks for ("csv", "xlsx", "plot", "study" -> path).
 
     `study` is the one that the cam was laid onto, `source` the name of the measured file for the plot. Returns the path
     of the cam's table beside a study, None where none was asked for. Raises `HdoptError` where a file cannot be
     written.
     """
-    if "csv" in files:
-        write_text(files["csv"], to_csv(result.to_frame()))
+    write_table_files(result, files)
     if "plot" in files:
         from hdopt.geometry.deviation_plot import deviation_plot
 

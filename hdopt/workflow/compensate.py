@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any  # Any: values of JSON
+from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from hdopt.recordings.rows import Rows, gather, neighbours_for
 from hdopt.workflow.output_files import Files, checked_files
 from hdopt.workflow.recorded_drive import AnyDrive, AnyRecordings, recorded_drive
 from hdopt.workflow.waveform_fit import WaveformFit, fit_rows
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Found = Harmonics | Surface
 
@@ -107,6 +110,24 @@ class Compensated:
             "needs": homing_words(self.homing),
             "void": VOID,
             "warnings": list(self.warnings),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a recording: held-out peak-to-peak without and with the compensation."""
+        import pandas as pd
+
+        rows = [(part.name, part.speed_rpm, part.before, part.after) for part in self.recordings]
+        columns = ["recording", "speed_rpm", "before_arcmin", "after_arcmin"]
+        return pd.DataFrame(rows, columns=columns)
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet: recordings, directions, the methods that were tried."""
+        import pandas as pd
+
+        return {
+            "recordings": self.to_frame(),
+            "directions": pd.DataFrame(list(self.both.items()), columns=["direction", "left_arcmin"]),
+            "methods": pd.DataFrame(list(self.scores.items()), columns=["method", "heldout_rms_arcmin"]),
         }
 
 

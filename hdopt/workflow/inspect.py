@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from hdopt.errors import HdoptError
-from hdopt.files import to_csv, write_text
+from hdopt.files import write_text
 from hdopt.recordings.recording import Recording
 from hdopt.recordings.sheet import Inspection
 from hdopt.workflow.acceptance_sheet import NO_LABEL, SheetLabel, acceptance_sheet
-from hdopt.workflow.output_files import Files, checked_files
+from hdopt.workflow.output_files import Files, checked_files, write_table_files
 from hdopt.workflow.recorded_drive import AnyDrive, AnyRecordings, RecordedDrive, recorded_drive
 from hdopt.workflow.requirement import required_limits
 
-FILES = ("csv", "report", "bench")
+FILES = ("csv", "xlsx", "report", "bench")
 
 
 def inspect(
@@ -62,13 +62,12 @@ def limits_for(source: RecordedDrive, limits: Mapping[str, float] | None) -> Map
 def write_inspection(
     found: Inspection, files: Mapping[str, Path], recordings: AnyRecordings, source: RecordedDrive
 ) -> None:
-    """Write of a sheet `found` what `files` asks for ("csv", "report", "bench" -> path).
+    """Write of a sheet `found` what `files` asks for ("csv", "xlsx", "report", "bench" -> path).
 
     `recordings` and their `source` are those inspected; a bench file says how the first of them was read. Raises
     `HdoptError` where a file cannot be written.
     """
-    if "csv" in files:
-        write_text(files["csv"], to_csv(found.to_frame()))
+    write_table_files(found, files)
     if "report" in files:
         from hdopt.report.html import render
         from hdopt.report.sections.inspection import inspection_report

@@ -8,16 +8,16 @@ from functools import partial
 from pathlib import Path
 
 from hdopt.errors import HdoptError
-from hdopt.files import to_csv, write_text
+from hdopt.files import write_text
 from hdopt.recordings.capability import outliers, performance
 from hdopt.recordings.recording import Recording
 from hdopt.recordings.sheet import Batch, Unit
 from hdopt.workflow.acceptance_sheet import acceptance_sheet
 from hdopt.workflow.inspect import limits_for
-from hdopt.workflow.output_files import Files, checked_files
+from hdopt.workflow.output_files import Files, checked_files, write_table_files
 from hdopt.workflow.recorded_drive import AnyDrive, RecordedDrive, recorded_drive
 
-FILES = ("csv", "report")
+FILES = ("csv", "xlsx", "report")
 
 
 def inspect_many(
@@ -55,10 +55,9 @@ def inspect_many(
 
 
 def write_batch(batch: Batch, files: Mapping[str, Path]) -> None:
-    """Write of a `batch` of sheets what `files` asks for ("csv", "report" -> path). Raises `HdoptError` where a file
-    cannot be written."""
-    if "csv" in files:
-        write_text(files["csv"], to_csv(batch.to_frame()))
+    """Write of a `batch` of sheets what `files` asks for ("csv", "xlsx", "report" -> path). Raises `HdoptError` where a
+    file cannot be written."""
+    write_table_files(batch, files)
     if "report" in files:
         from hdopt.report.html import render
         from hdopt.report.sections.inspection import batch_report

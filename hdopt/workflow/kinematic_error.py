@@ -18,6 +18,7 @@ from hdopt.mechanics.bending import max_bending_stress, max_curvature_change
 from hdopt.mechanics.contact import contact_angle, homogenization_coefficient, mean_flank_pressure, meshing_teeth
 from hdopt.mechanics.lag import lag
 from hdopt.recordings.orders import OrderSpectrum, order_spectrum
+from hdopt.report.cells import heading
 from hdopt.simulation.extremes import peak_to_peak_arcmin as extended_peak_to_peak_arcmin
 from hdopt.study import AnyStudy, Study, as_study, study_of_drive
 from hdopt.workflow.effect_selection import inclusion
@@ -72,7 +73,15 @@ class KinematicErrorResult:
         """The order table."""
         import pandas as pd
 
-        return pd.DataFrame(self.orders)
+        return pd.DataFrame(self.orders, columns=["order", "symbol", "amplitude_arcmin", "phase_deg", "origin"])
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet: orders, figures, and what each effect adds where there are any."""
+        import pandas as pd
+
+        lag = {f"lag_{key}_arcmin": self.lag_arcmin[key] for key in ("mean", "min", "max")} if self.lag_arcmin else {}
+        tables = {"orders": self.to_frame(), "figures": figures({**asdict(self), **lag})}
+        return tables | ({"effects": pd.DataFrame(self.effects)} if self.effects else {})
 
 
 @dataclass(frozen=True)
@@ -96,6 +105,27 @@ class ProfileResult:
 
     def to_dict(self) -> dict[str, Any]:
         return asdict(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a figure."""
+        return figures(asdict(self))
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet."""
+        return {"profile": self.to_frame()}
+
+
+def figures(values: Mapping[str, object]) -> pd.DataFrame:
+    """The numbers and words among `values` as a table: figure, value, and unit as the name's ending says."""
+    import pandas as pd
+
+    rows = [
+        (*heading(name), value)
+        for name, value in values.items()
+        if value is not None and isinstance(value, float | int)
+    ]
+    frame = pd.DataFrame(rows, columns=["figure", "unit", "value"])
+    return frame[["figure", "value", "unit"]]
 
 
 class _Notes:

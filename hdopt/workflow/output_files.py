@@ -6,10 +6,21 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from hdopt.errors import HdoptError, unknown_name
-from hdopt.files import claim_output
+from hdopt.files import HasTables, claim_output, write_tables
 
 Files = Mapping[str, str | Path]
 """Kind of file, such as "report", to its path."""
+
+
+TABLE_KINDS = ("csv", "xlsx")
+
+
+def write_table_files(result: HasTables, files: Mapping[str, Path]) -> None:
+    """Write the tables of `result` to those of `files` (kind -> path) that are tables. Raises `HdoptError` where one
+    cannot be written."""
+    for kind in TABLE_KINDS:
+        if kind in files:
+            write_tables(result, files[kind], kind)
 
 
 def checked_files(files: Files | None, kinds: Sequence[str]) -> dict[str, Path]:

@@ -45,7 +45,7 @@ OTHERWISE = {
     "sobol": OF_A_STUDY | {"no_second_order": "second_order"},
     "allocate": OF_A_STUDY,
     "inspect": OF_RECORDINGS
-    | dict.fromkeys(("csv_file", "report_file", "bench_out"), "files")
+    | dict.fromkeys(("report_file", "bench_out"), "files")
     | {"each": "inspect_many", "serial": "label", "conditions": "label", "check": "result.missed"},
     "compensate": OF_RECORDINGS | {"output": "files", "form": "files"},
     "diagnose": OF_RECORDINGS | dict.fromkeys(("report_file", "study_file"), "files"),
@@ -54,7 +54,7 @@ OTHERWISE = {
     | {f"file_{kind}": "files" for kind in FORMATS}
     | {"context": "study.with_(context=...)", "allocation": "tolerances", "seed": "nothing is random"},
     "compare": OF_A_STUDY
-    | dict.fromkeys(("csv_file", "plot", "write_study"), "files")
+    | dict.fromkeys(("plot", "write_study"), "files")
     | {"cam": "measured", "seed": "nothing is random"},
     "run": OF_A_STUDY | {"verify": "verify_run"},
     "studies": {},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypedDict
+from typing import TYPE_CHECKING, TypedDict
 
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding
@@ -13,6 +13,9 @@ from hdopt.diagnosis.inference.base_fit import BaseEstimate
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.diagnosis.verdict.where import Where
 from hdopt.effects.estimate import Parameter
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class FitNumbers(TypedDict):
@@ -86,3 +89,28 @@ class Diagnosis:
         if self.where is not None:
             result["where"] = self.where
         return result
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a parameter, of the effects that were named and of the base model, with its interval."""
+        import pandas as pd
+
+        rows: list[tuple[str, float | None, str, float, float, float, str]] = [
+            (effect.id, effect.confidence, name, p.value, p.low, p.high, p.unit)
+            for effect in self.effects
+            for name, p in effect.parameters.items()
+        ]
+        rows += [("base model", None, name, p.value, p.low, p.high, p.unit) for name, p in self.base.parameters.items()]
+        return pd.DataFrame(rows, columns=["of", "confidence", "parameter", "value", "low", "high", "unit"])
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet: parameters, figures of the fit, where structure was found, what is said."""
+        import pandas as pd
+
+        found = {
+            "parameters": self.to_frame(),
+            "fit": pd.DataFrame(list(self.fit.items()), columns=["figure", "value"]),
+            "verdict": pd.DataFrame([("verdict", self.verdict), ("says", self.says)], columns=["of", "text"]),
+        }
+        if self.located:
+            found["located"] = pd.DataFrame([location.to_dict() for location in self.located])
+        return found
