@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from hdopt.workflow.compensate import Compensated as Compensated
     from hdopt.workflow.compensate import compensate as compensate
     from hdopt.workflow.diagnose import diagnose as diagnose
+    from hdopt.workflow.explore import ExploreResult as ExploreResult
+    from hdopt.workflow.explore import explore as explore
     from hdopt.workflow.export import export as export
     from hdopt.workflow.inspect import inspect as inspect
     from hdopt.workflow.inspect_many import inspect_many as inspect_many
@@ -100,6 +102,8 @@ _EXPORTS: dict[str, str] = {
     "Compensated": "hdopt.workflow.compensate",
     "compensate": "hdopt.workflow.compensate",
     "diagnose": "hdopt.workflow.diagnose",
+    "ExploreResult": "hdopt.workflow.explore",
+    "explore": "hdopt.workflow.explore",
     "export": "hdopt.workflow.export",
     "inspect": "hdopt.workflow.inspect",
     "inspect_many": "hdopt.workflow.inspect_many",

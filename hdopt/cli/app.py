@@ -20,6 +20,7 @@ COMMANDS: dict[str, str] = {
     "search": "Which design: the best under limits, fronts, and what the choice costs.",
     "export": "The wave generator as checked STEP, DXF, STL, 3MF, drawing and picture.",
     "compare": "A measured cam against the one that a study designs.",
+    "explore": "A page with the drive under sliders: waveform, beat, orders, peak-to-peak, tolerance cloud.",
     "run": "Everything a study file asks for, with report.html.",
     "studies": "The shipped studies, a line each.",
 }

@@ -82,7 +82,7 @@ def render(report: Report, csv_files: Collection[str] = ()) -> str:
             for section in report.sections
         ],
         figures=[(figure.key, _figure_json(figure)) for figure in figures],
-        template_json=_script_safe(json.dumps(template().to_plotly_json())),
+        template_json=script_safe(json.dumps(template().to_plotly_json())),
         plotly_js=_plotly_js() if figures else "",
         css=(templates / "report.css").read_text(encoding="utf-8"),
         js=(templates / "report.js").read_text(encoding="utf-8"),
@@ -194,11 +194,11 @@ def _figure_json(figure: Figure) -> str:
     """Data and layout of a figure; the template is left out, because the page gives the same one to all."""
     content = json.loads(figure.figure.to_json())
     content["layout"].pop("template", None)
-    return _script_safe(json.dumps({"data": content["data"], "layout": content["layout"]}, separators=(",", ":")))
+    return script_safe(json.dumps({"data": content["data"], "layout": content["layout"]}, separators=(",", ":")))
 
 
-def _script_safe(text: str) -> str:
-    """JSON that cannot end the script element that holds it."""
+def script_safe(text: str) -> str:
+    """The JSON `text` so written that it cannot end the script element that holds it."""
     return text.replace("<", "\\u003c")
 
 

@@ -28,6 +28,7 @@ CALLS = {
     "search": ("search",),
     "export": ("export",),
     "compare": ("compare",),
+    "explore": ("explore",),
     "run": ("run_study", "verify_run"),
     "studies": ("shipped_studies",),
 }
@@ -56,6 +57,7 @@ OTHERWISE = {
     "compare": OF_A_STUDY
     | dict.fromkeys(("plot", "write_study"), "files")
     | {"cam": "measured", "seed": "nothing is random"},
+    "explore": OF_A_STUDY,
     "run": OF_A_STUDY | {"verify": "verify_run"},
     "studies": {},
 }

@@ -6,6 +6,38 @@ from collections.abc import Sequence
 
 from hdopt.effects import EFFECTS
 
+ERROR_LABELS = {
+    "axis_eccentricity": "Axis eccentricity",
+    "axis_eccentricity_direction": "Axis eccentricity, direction",
+    "axis_tilt_y": "Axis tilt along y",
+    "axis_tilt_x": "Axis tilt along x",
+    "wg_eccentricity": "WG eccentricity",
+    "wg_eccentricity_direction": "WG eccentricity, direction",
+    "wg_tilt_major": "WG tilt, major axis",
+    "wg_tilt_minor": "WG tilt, minor axis",
+    "cs_tooth_amplitude": "CS tooth amplitude",
+    "cs_tooth_phase": "CS tooth phase",
+    "fs_tooth_amplitude": "FS tooth amplitude",
+    "fs_tooth_phase": "FS tooth phase",
+}
+"""Drive error -> how a page calls it."""
+
+ERROR_SYMBOLS = {
+    "axis_eccentricity": "e_1",
+    "axis_eccentricity_direction": "β_1",
+    "axis_tilt_y": "β_2",
+    "axis_tilt_x": "β_3",
+    "wg_eccentricity": "e_2",
+    "wg_eccentricity_direction": "α_1",
+    "wg_tilt_major": "α_2",
+    "wg_tilt_minor": "α_3",
+    "cs_tooth_amplitude": "a_CS",
+    "cs_tooth_phase": "φ_CS",
+    "fs_tooth_amplitude": "a_FS",
+    "fs_tooth_phase": "φ_FS",
+}
+"""Drive error -> its symbol in Jia 2021, an underscore before what is set low."""
+
 
 def label(name: str) -> str:
     """A name from the code as a heading: 'one_way_major' reads 'One-way, major axis'."""

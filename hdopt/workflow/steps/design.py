@@ -16,6 +16,7 @@ from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin
 from hdopt.kinematics.waveform import CLOSED_FORM, DEFAULT_METHOD
 from hdopt.report.sections.design_map import Design, pressure_angle_width_section
 from hdopt.report.sections.tornado import sensitivities_section
+from hdopt.report.sections.words import ERROR_LABELS
 from hdopt.study import Study
 from hdopt.workflow.steps import Context, StepResult, requirement_arcmin
 
@@ -26,21 +27,6 @@ DIRECTION_CHANGE = math.radians(30)
 MAP_POINTS = 25
 MAP_REACH = (0.6, 1.6)
 """From and to this many times the design's own pressure angle and width."""
-
-NAMES = {
-    "axis_eccentricity": "Axis eccentricity",
-    "axis_eccentricity_direction": "Axis eccentricity, direction",
-    "axis_tilt_y": "Axis tilt along y",
-    "axis_tilt_x": "Axis tilt along x",
-    "wg_eccentricity": "WG eccentricity",
-    "wg_eccentricity_direction": "WG eccentricity, direction",
-    "wg_tilt_major": "WG tilt, major axis",
-    "wg_tilt_minor": "WG tilt, minor axis",
-    "cs_tooth_amplitude": "CS tooth amplitude",
-    "cs_tooth_phase": "CS tooth phase",
-    "fs_tooth_amplitude": "FS tooth amplitude",
-    "fs_tooth_phase": "FS tooth phase",
-}
 
 
 def sensitivities(study: Study, context: Context) -> StepResult:
@@ -115,7 +101,7 @@ def _of_error(drive: Drive, errors: DriveErrors, name: str) -> dict[str, object]
     ends = (value - change, value + change)
     low, high = (converged_peak_to_peak_arcmin(drive, errors.with_(**{name: end})) for end in ends)
     first, last = (_written(name, end) for end in ends)
-    return _row(NAMES[name], first, last, low, high)
+    return _row(ERROR_LABELS[name], first, last, low, high)
 
 
 def _written(name: str, value: float) -> str:
