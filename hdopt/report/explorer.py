@@ -10,7 +10,7 @@ import json
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from importlib.resources import files
-from typing import Any
+from typing import Any  # Any: the JSON of the page, as `hdopt.files.to_json` takes it
 
 from hdopt.report import theme
 from hdopt.report.html import CONTENT_SECURITY_POLICY, script_safe

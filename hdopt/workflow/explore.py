@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any  # Any: the JSON of the page, as `hdopt.files.to_json` takes it
 
 import numpy as np
 
