@@ -30,7 +30,11 @@ EXACT_DIGITS, LISTED_DIGITS = 6, 5
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """One named effect: its `id`, the probability that it is there, where it lives, its parameters, one sentence."""
+    """One named effect: its `id`, the probability that it is there, where it lives, its parameters, one sentence.
+
+    `log_evidence_apart`: how far (natural log of a Bayes factor) the best explanation without it lies behind; None
+    for one found in orders above the averaged rows, which has evidence of its own.
+    """
 
     id: str
     confidence: float
@@ -38,12 +42,14 @@ class NamedEffect:
     parameters: dict[str, Parameter]
     says: str
     categories: dict[str, str] = field(default_factory=dict)
+    log_evidence_apart: float | None = None
 
     def to_dict(self) -> dict[str, object]:
         """As in the JSON."""
         return {
             "id": self.id,
             "confidence": self.confidence,
+            "log_evidence_apart": self.log_evidence_apart,
             "where": self.where,
             "parameters": {name: p.to_dict() for name, p in self.parameters.items()},
             "categories": self.categories,
@@ -67,6 +73,17 @@ def confidences(evidence: Evidence) -> dict[str, float]:
     return result
 
 
+def evidence_apart(evidence: Evidence) -> dict[str, float]:
+    """How far, as log Bayes factor, the best explanation without each effect of the best set lies behind it.
+    `evidence` is that of the diagnosis.
+    """
+    best, *others = evidence.selection.candidates
+    return {
+        effect: best.log_bayes_factor - max(c.log_bayes_factor for c in others if effect not in c.effects)
+        for effect in best.effects
+    }
+
+
 def describe(candidate: Candidate, evidence: Evidence, high: bool = False) -> list[NamedEffect]:
     """The effects of a `candidate`, as they stand in the `evidence`; `high` for one found on the rows as recorded."""
     fit = candidate.fit
@@ -74,6 +91,7 @@ def describe(candidate: Candidate, evidence: Evidence, high: bool = False) -> li
     locked = fit.problem.rows.locked
     estimates = estimates_by_profile(fit, evidence.inflation) if locked else profiled_estimates(fit)
     confidence = {} if high else confidences(evidence)
+    apart = {} if high else evidence_apart(evidence)
     base_power = evidence.base_held_out.variance
     found = []
     for index, (term, estimate) in enumerate(zip(fit.terms, estimates, strict=True)):
@@ -101,6 +119,7 @@ def describe(candidate: Candidate, evidence: Evidence, high: bool = False) -> li
                 parameters,
                 effect.sentence(term.shape, parameters, rms),
                 effect.categories(term.shape),
+                apart.get(term.effect),
             )
         )
     return found
