@@ -6,13 +6,12 @@ and what is added where it acts on the inertia from outside is the answer to -2 
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
 from numba import njit
 
-from hdopt.arrays import Array
+from hdopt.arrays import Array, Index
 from hdopt.drive.geometry import ARCMIN
 from hdopt.effects.conditions import TURN, Conditions
 
@@ -21,8 +20,8 @@ PER_PERIOD = 40
 wave's height and put as much into damping and gain.
 """
 MOST_STEPS = 400_000
-ROWS_OF_THE_START = 5
-"""Rows from which the speed is taken with which a piece begins."""
+FEWEST_ROWS = 8
+"""Rows of a piece from which it is integrated."""
 FASTEST = 2.5
 """Circular frequency times step beyond which the clock cannot follow."""
 
@@ -36,45 +35,21 @@ def relative_responses(
     Integrated on an even clock in each contiguous piece by Tustin's rule, prewarped at the resonance (`frequency`, Hz;
     `damping` zeta). Zero in pieces of fewer than 8 rows.
     """
-    motions = np.ascontiguousarray(excitations.T)
-    result = np.zeros((len(motions), weights.shape[1], len(conditions)))
-    w = TURN * frequency
-    bounds = np.r_[0, np.flatnonzero(np.diff(conditions.piece)) + 1, len(conditions)]
-    for start, end in itertools.pairwise(bounds):
-        time = conditions.known_time[start:end]
-        if end - start < 8:
-            continue
-        span = float(time[-1] - time[0])
-        count = min(max(end - start, int(span * PER_PERIOD * frequency) + 1), MOST_STEPS)
-        step = span / (count - 1)
-        if w * step > FASTEST:
-            continue
-        k = w / math.tan(w * step / 2)
-        poles = np.array(
-            [k * k + 2 * damping * w * k + w * w, 2 * w * w - 2 * k * k, k * k - 2 * damping * w * k + w * w]
-        )
-        forces = np.array([k * k * np.array([1.0, -2.0, 1.0]), 2 * damping * w * k * np.array([1.0, 0.0, -1.0])])
-        zeros = -(weights.T @ forces) / poles[0]
-        _swing(time, motions[:, start:end], zeros, poles / poles[0], step, count, result[:, :, start:end])
-    return np.moveaxis(result, 2, 0)
+    kinds = weights.shape[1]
+    lanes = np.repeat(excitations, kinds, axis=1)  # every excitation beside itself, once for each pair of weights
+    each = np.tile(weights, excitations.shape[1])
+    result = np.zeros(lanes.shape)
+    _swing(conditions.known_time, conditions.pieces, lanes, each, TURN * frequency, damping, result)
+    return result.reshape(len(conditions), excitations.shape[1], kinds)
 
 
 def changes_of_speed(conditions: Conditions) -> tuple[Array, Array]:
     """The input's part theta/N of the foot's motion along the `conditions`, arcmin, (n,), as it enters the error (with
     a minus), without the steady motion that each contiguous piece begins with; and that motion's rate, arcmin/s, (n,).
     """
-    angle = -conditions.theta / (conditions.ratio * ARCMIN)
-    time = conditions.known_time
-    left, rate = np.zeros(len(conditions)), np.zeros(len(conditions))
-    bounds = np.r_[0, np.flatnonzero(np.diff(conditions.piece)) + 1, len(conditions)]
-    for start, end in itertools.pairwise(bounds):
-        first = slice(start, min(start + ROWS_OF_THE_START, end))
-        span = np.ptp(time[first])
-        slope = float(np.polyfit(time[first] - time[start], angle[first], 1)[0]) if span > 0 else 0.0
-        rows = slice(start, end)
-        rate[rows] = slope
-        left[rows] = angle[rows] - angle[start] - slope * (time[rows] - time[start])
-    return left, rate
+    speed, beyond = conditions.starting_motion
+    to_error = -1 / (conditions.ratio * ARCMIN)
+    return to_error * beyond, to_error * speed
 
 
 def settled_drag(rate: Array, frequency: float, damping: float) -> Array:
@@ -85,36 +60,59 @@ def settled_drag(rate: Array, frequency: float, damping: float) -> Array:
 
 
 @njit(cache=True, nogil=True)
-def _swing(time: Array, excitations: Array, zeros: Array, poles: Array, step: float, count: int, result: Array) -> None:
-    """The filter of `zeros` (m, 3) and `poles` (3,) along `count` even steps, straight lines between clock and rows;
-    `excitations` (k, n), `result` (k, m, n).
+def _swing(
+    time: Array, pieces: Index, excitations: Array, weights: Array, w: float, damping: float, result: Array
+) -> None:
+    """What the `excitations` (n, k), each at its column of `weights` (2, k), make of an oscillator of circular
+    frequency `w` (rad/s) in each of the `pieces` (q, 2) of the rows; into `result` (n, k).
     """
-    columns, rows = excitations.shape
-    kinds = len(zeros)
-    row, part = np.empty(count, np.int64), np.empty(count)
-    at = 0
+    for start, end in pieces:
+        rows = end - start
+        if rows < FEWEST_ROWS:
+            continue
+        span = time[end - 1] - time[start]
+        count = min(max(rows, int(span * PER_PERIOD * (w / TURN)) + 1), MOST_STEPS)
+        step = span / (count - 1)
+        if w * step > FASTEST:
+            continue
+        k = w / math.tan(w * step / 2)
+        first = k * k + 2 * damping * w * k + w * w
+        poles = ((2 * w * w - 2 * k * k) / first, (k * k - 2 * damping * w * k + w * w) / first)
+        across, outside = k * k / first, 2 * damping * w * k / first
+        zeros = np.empty((3, excitations.shape[1]))
+        zeros[0] = -across * weights[0] - outside * weights[1]
+        zeros[1] = 2 * across * weights[0]
+        zeros[2] = -across * weights[0] + outside * weights[1]
+        _filtered(time[start:end], excitations[start:end], zeros, poles, step, count, result[start:end])
+
+
+@njit(cache=True, nogil=True)
+def _filtered(
+    time: Array, excitations: Array, zeros: Array, poles: tuple[float, float], step: float, count: int, result: Array
+) -> None:
+    """Filters of `zeros` (3, k) and the same `poles`, one for each of the `excitations` (n, k), all at once along
+    `count` even steps, straight lines between clock and rows; into `result` (n, k).
+    """
+    rows, lanes = excitations.shape
+    newer, older, before, now = np.zeros(lanes), np.zeros(lanes), np.zeros(lanes), np.zeros(lanes)
+    at, told = 0, 0
     for i in range(count):
-        now = time[0] + i * step
-        while at < rows - 2 and time[at + 1] <= now:
+        moment = time[0] + i * step
+        while at < rows - 2 and time[at + 1] <= moment:
             at += 1
-        row[i], part[i] = at, min((now - time[at]) / max(time[at + 1] - time[at], 1e-300), 1.0)
-    tick, rest = np.empty(rows, np.int64), np.empty(rows)
-    for j in range(rows):
-        tick[j] = min(int((time[j] - time[0]) / step), count - 2)
-        rest[j] = (time[j] - time[0]) / step - tick[j]
-    y, e = np.empty(count), np.empty(count)
-    for c in range(columns):
-        for i in range(count):
-            low = excitations[c, row[i]]
-            y[i] = low + part[i] * (excitations[c, row[i] + 1] - low) - excitations[c, 0]
-        for m in range(kinds):
-            newer, older = 0.0, 0.0
-            for i in range(count):
-                e[i] = zeros[m, 0] * y[i] + newer
-                newer = zeros[m, 1] * y[i] - poles[1] * e[i] + older
-                older = zeros[m, 2] * y[i] - poles[2] * e[i]
-            for j in range(rows):
-                result[c, m, j] = e[tick[j]] + rest[j] * (e[tick[j] + 1] - e[tick[j]])
+        part = min((moment - time[at]) / max(time[at + 1] - time[at], 1e-300), 1.0)
+        for c in range(lanes):
+            low = excitations[at, c]
+            y = low + part * (excitations[at + 1, c] - low) - excitations[0, c]
+            e = zeros[0, c] * y + newer[c]
+            newer[c] = zeros[1, c] * y - poles[0] * e + older[c]
+            older[c] = zeros[2, c] * y - poles[1] * e
+            before[c], now[c] = now[c], e
+        while i > 0 and told < rows and min(int((time[told] - time[0]) / step), count - 2) < i:
+            rest = (time[told] - time[0]) / step - (i - 1)
+            for c in range(lanes):
+                result[told, c] = before[c] + rest * (now[c] - before[c])
+            told += 1
 
 
 def settled_responses(time: Array, excitation: Array, frequency: float, damping: float) -> Array:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 TURN = 2 * math.pi
 """rad in a turn."""
+ROWS_OF_THE_START = 5
+"""Rows from which the speed is taken with which a piece begins."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +57,26 @@ class Conditions:
     def remembered(self) -> dict[Hashable, Term]:
         """Terms made for these rows at shapes that every search looks at."""
         return {}
+
+    @property
+    def pieces(self) -> Index:
+        """First row of each contiguous piece, and the row after its last, (q, 2)."""
+        bounds = np.r_[0, np.flatnonzero(np.diff(self.piece)) + 1, len(self)]
+        return np.column_stack([bounds[:-1], bounds[1:]])
+
+    @cached_property
+    def starting_motion(self) -> tuple[Array, Array]:
+        """Input speed with which each contiguous piece begins, rad/s, (n,), and the input angle less what that speed
+        alone would make of it, rad, (n,).
+        """
+        speed, beyond = np.zeros(len(self)), np.zeros(len(self))
+        for start, end in self.pieces:
+            time = self.known_time[start:end] - self.known_time[start]
+            first = slice(start, min(start + ROWS_OF_THE_START, end))
+            if np.ptp(self.known_time[first]) > 0:
+                speed[start:end] = np.polyfit(time[:ROWS_OF_THE_START], self.theta[first], 1)[0]
+            beyond[start:end] = self.theta[start:end] - self.theta[start] - speed[start] * time
+        return speed, beyond
 
     @property
     def records(self) -> int:

@@ -33,13 +33,14 @@ def motion_of(base_value: Array, terms: Sequence[Term], coefficients: Sequence[A
 
 
 def driven_by(motion: Array, rows: Rows, terms: Sequence[Term]) -> tuple[Term, ...]:
-    """`terms` with the columns of the driven ones as `motion` excites them. `rows` are those of the recordings."""
-    return tuple(
-        replace(term, columns=properties_of(term.effect).term(rows, term.shape, motion).columns)
-        if is_driven(term)
-        else term
-        for term in terms
-    )
+    """`terms`, the driven ones at their shapes as `motion` excites them. `rows` are those of the recordings."""
+    return tuple(_driven(term, rows, motion) if is_driven(term) else term for term in terms)
+
+
+def _driven(term: Term, rows: Rows, motion: Array) -> Term:
+    made = properties_of(term.effect).term(rows, term.shape, motion)
+    free = {name: made.steps[name] for name in term.steps}  # a parameter that is held stays so
+    return replace(term, shape=made.shape, columns=made.columns, steps=free)
 
 
 def transmitted(columns: Array, rows: Rows, terms: Sequence[Term], coefficients: Sequence[Array]) -> Array:

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from hdopt.arrays import Array, Index, Mask
-from hdopt.diagnosis.inference.base_excitation import driven_by, excites, motion_of, transmitted
+from hdopt.diagnosis.inference.base_excitation import driven_by, excites, is_driven, motion_of, transmitted
 from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.newey_west import newey_west
 from hdopt.diagnosis.inference.noise import Noise
@@ -22,7 +22,7 @@ from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
 from hdopt.effects.base import Explanation
 from hdopt.effects.estimate import FitEstimate
-from hdopt.effects.term import Term
+from hdopt.effects.term import Shape, Term
 from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel
 from hdopt.recordings.rows import Rows
 
@@ -138,14 +138,23 @@ class Fit:
         """Columns: base errors, offsets, then for each term of `keep` (all by default) its coefficients and, with
         `move_shapes`, its free shape parameters; (n, q).
         """
-        blocks = [self.seen(self.base_jacobian, keep), self.problem.nuisance]
+        blocks, excite = [self.base_jacobian, self.problem.nuisance], [True, False]
         for i in range(len(self.terms)) if keep is None else keep:
             term = self.terms[i]
-            blocks.append(self.columns_of(term, keep))
+            blocks.append(term_columns(term, self.zone, self.problem.base))
             if move_shapes and term.steps:
-                columns = shape_columns(self, i)
-                blocks.append(self.seen(columns, keep) if excites(term) else columns)
+                blocks.append(shape_columns(self, i))
+            excite += [excites(term)] * (len(blocks) - len(excite))
+        if any(is_driven(term) for term in self.terms):
+            blocks = self._all_seen(blocks, excite, keep)
         return np.column_stack(blocks)
+
+    def _all_seen(self, blocks: list[Array], excite: list[bool], keep: Sequence[int] | None) -> list[Array]:
+        """`blocks` of columns as the output shows them: those that `excite` what swings behind it, all at once."""
+        exciting = [block for block, does in zip(blocks, excite, strict=True) if does]
+        seen = self.seen(np.column_stack(exciting), keep)
+        parts = iter(np.split(seen, np.cumsum([block.shape[1] for block in exciting])[:-1], axis=1))
+        return [next(parts) if does else block for block, does in zip(blocks, excite, strict=True)]
 
     def prior_precision(self, width: int) -> Array:
         precision = np.zeros(width)
@@ -328,14 +337,20 @@ def _moved(fit: Fit, step: Array, move_shapes: bool) -> Fit:
                 limit = settings.shape_share * abs(shape[name]) + settings.shape_steps * term.steps[name]
                 shape[name] += float(np.clip(step[position], -limit, limit))
                 position += 1
-            shifted = problem.explanations[term.effect].term(problem.rows, shape, fit.motion)
-            free = {name: shifted.steps[name] for name in term.steps}  # a parameter that is held stays so
-            term = replace(shifted, trials=term.trials, odds=term.odds, steps=free)
+            # What the motion drives waits for `evaluate`, which knows the motion.
+            term = replace(term, shape=shape) if is_driven(term) else _at_shape(fit, term, shape)
         terms.append(term)
         coefficients.append(c + delta)
     errors = np.clip(fit.errors + step[:wb], -problem.box[:wb], problem.box[:wb])
     offsets = fit.offsets + step[wb : wb + problem.nuisance.shape[1]]
     return evaluate(problem, errors, offsets, terms, coefficients)
+
+
+def _at_shape(fit: Fit, term: Term, shape: Shape) -> Term:
+    """`term` at another `shape`, beside what is in `fit`."""
+    shifted = fit.problem.explanations[term.effect].term(fit.problem.rows, shape, fit.motion)
+    free = {name: shifted.steps[name] for name in term.steps}  # a parameter that is held stays so
+    return replace(shifted, trials=term.trials, odds=term.odds, steps=free)
 
 
 def extend(fit: Fit, terms: Sequence[Term]) -> Fit:
