@@ -40,7 +40,7 @@ print(json.dumps({"cpu_s": used.ru_utime + used.ru_stime, "peak_kib": int(status
 """
 
 
-HIDDEN = ("nothing", "encoder_input_eccentricity", "hysteresis", "tooth_mesh", "cs_tooth_harmonics")
+HIDDEN = ("nothing", "hysteresis", "tooth_mesh", "cs_tooth_harmonics")
 
 
 @pytest.fixture(scope="module", params=HIDDEN)
@@ -52,7 +52,6 @@ def recorded(request, tmp_path_factory):
     direction = np.r_[np.ones(there.size), -np.ones(there.size)]
     hidden = {
         "nothing": 0.0,
-        "encoder_input_eccentricity": 0.15 * np.sin(theta + 0.5),
         "tooth_mesh": 0.1 * np.sin(162 * theta),
         # Even waves, which both zones meet alike; many of them are what takes longest.
         "cs_tooth_harmonics": sum(0.1 / k * np.sin(k * theta + k * k) for k in range(2, 30, 2)),
