@@ -44,7 +44,8 @@ def with_sections(page: str, written: dict[str, str]) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.mutants.faults", description=__doc__)
     parser.add_argument("rooms", nargs="*", metavar="ROOM", help=f"of {', '.join(rooms())}; all where omitted")
-    parser.add_argument("--only", default="", help="only faults whose name holds this text; the page stays as it is")
+    parser.add_argument("--only", default="", help="only faults whose name holds this text")
+    parser.add_argument("--tests", default="", help="only faults whose first test file matches this pattern")
     parser.add_argument("--afresh", action="store_true", help="ask again for those that were noticed too")
     parser.add_argument("--new", action="store_true", help="ask only for those that never were asked for")
     parser.add_argument("--folder", type=Path, default=ROOT / "build" / "mutants", help="what was run is kept here")
@@ -53,12 +54,14 @@ def main() -> int:
     load_libraries()
     tree, kept = refreshed_tree(folder), folder / "faults.json"
     found: dict[str, str] = json.loads(kept.read_text()) if kept.exists() else {}
-    listed = {room: [one for one in faults_of(room) if options.only in one.name] for room in options.rooms or rooms()}
+    listed = {room: faults_of(room) for room in options.rooms or rooms()}
     pending = [
         fault
         for faults in listed.values()
         for fault in faults
         if not fault.equivalent
+        and options.only in fault.name
+        and re.search(options.tests, fault.tests[0])
         and (options.afresh or found.get(fault.key) != "killed")
         and not (options.new and fault.key in found)
     ]
@@ -66,9 +69,13 @@ def main() -> int:
         found[fault.key] = said
         kept.write_text(json.dumps(found, indent=1))
         print(f"{number}/{len(pending)} {said}: {fault.room}: {fault.name}", flush=True)
-    written = {room: section(room, faults, found) for room, faults in listed.items()}
+    written = {
+        room: section(room, faults, found)
+        for room, faults in listed.items()
+        if all(fault.key in found for fault in faults if not fault.equivalent)
+    }
     print("\n".join(written.values()))
-    if not options.only and PAGE.exists():
+    if PAGE.exists():
         PAGE.write_text(with_sections(PAGE.read_text(encoding="utf-8"), written), encoding="utf-8")
     return 0
 

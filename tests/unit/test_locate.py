@@ -2,6 +2,8 @@
 
 import numpy as np
 import pandas as pd
+import pytest
+from test_cross_validation import RATE, noisy, rows_of, without_base
 
 from hdopt.diagnosis.checks.localization import locate
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
@@ -30,3 +32,19 @@ def test_half_a_turn_holds_no_more_than_its_residual():
     fit = refine(start)
     for location in locate(FitProbe(fit), rng):
         assert location.rms_arcmin < np.std(fit.residual)
+
+
+def test_noise_lives_nowhere():
+    """By sign flips of whole turns the chance of noise is as often above a half as below it."""
+    chances = [found.p for found in locate(FitProbe(without_base(noisy(30))), np.random.default_rng(0))]
+    assert len(chances) > 2
+    assert np.mean(chances) > 0.15
+
+
+def test_a_wave_lives_in_its_domain():
+    theta = np.arange(30 * RATE) * 2 * np.pi / RATE
+    rows = rows_of(0.2 * np.sin(3 * theta) + np.random.default_rng(1).normal(0, 0.02, len(theta)))
+    first = locate(FitProbe(without_base(rows)), np.random.default_rng(0))[0]
+    assert first.domain == "integer order"
+    assert first.rms_arcmin == pytest.approx(0.2 / np.sqrt(2), rel=0.05)
+    assert first.p <= 0.005

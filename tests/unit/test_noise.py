@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy import linalg, signal
-from test_cross_validation import RATE, noisy, without_base
+from test_cross_validation import RATE, noisy, rows_of, without_base
 
 from hdopt.diagnosis.inference import residual_noise
 from hdopt.diagnosis.inference.noise import Noise, autoregression, estimate, weights_with_a_past
@@ -88,3 +88,12 @@ def test_noise_is_rougher_by_what_its_scores_show(monkeypatch, power, inflation)
     """Never smoother than its model, and no rougher than noise can be."""
     monkeypatch.setattr(residual_noise, "roughness", lambda *_: power)
     assert measure_noise(without_base(noisy(12))).inflation == inflation
+
+
+def test_a_line_is_no_noise():
+    """A sine of five times the noise at an order of nothing else, on the spectrum's own grid."""
+    theta = np.arange(40 * RATE) * 2 * np.pi / RATE
+    rows = rows_of(0.1 * np.sin(7.375 * theta) + np.random.default_rng(7).normal(0, 0.02, len(theta)))
+    noise = measure_noise(without_base(rows)).noise
+    # The sine alone has 0.07 rms; what is left of it lies a part of a resolution step beside the lines taken out.
+    assert noise.sigma == pytest.approx(0.02, rel=0.25)

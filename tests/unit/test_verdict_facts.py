@@ -15,7 +15,7 @@ from hdopt.diagnosis.verdict.facts import own_gain, stands_out, too_little
 from hdopt.diagnosis.verdict.named_effect import confidences
 from hdopt.diagnosis.verdict.residual_structure import clearly_unexplained, outside_share
 from hdopt.diagnosis.verdict.rivals import placebo_as_good, rivals, scale_is_as_good
-from hdopt.diagnosis.verdict.rules import RULES, rule_for
+from hdopt.diagnosis.verdict.rules import rule_for
 from hdopt.effects.term import Term
 
 SWING = np.array([1.0, -1.0] * 50)
@@ -56,13 +56,16 @@ def changes_of(facts):
     return {name: value for name, value in vars(facts).items() if value != getattr(CLEAN, name)}
 
 
-@pytest.mark.parametrize("first", range(len(RULES)))
+ORDER = list(dict.fromkeys(name for name, _, _ in FIRED))
+
+
+@pytest.mark.parametrize("first", range(len(ORDER)))
 def test_an_earlier_rule_is_asked_before_every_later_one(first):
     """Facts that fire two rules are judged by the earlier: any two that are exchanged would be seen."""
     fires = {name: changes_of(facts) for name, facts, _ in reversed(FIRED)}
-    for later in RULES[first:]:
-        both = replace(CLEAN, **(fires[later.name] | fires[RULES[first].name]))
-        assert rule_for(both).name == RULES[first].name
+    for later in ORDER[first:]:
+        both = replace(CLEAN, **(fires[later] | fires[ORDER[first]]))
+        assert rule_for(both).name == ORDER[first]
 
 
 def test_effects_gain_what_they_carry_themselves():
