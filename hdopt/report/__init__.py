@@ -36,13 +36,15 @@ class Figure:
 
 @dataclass(frozen=True)
 class Table:
-    """A table, also written as `key`.csv beside the report. `formats` maps a column to a format spec such as '.3f'."""
+    """A table, also written as `key`.csv beside the report unless `in_file` is False. `formats` maps a column to a
+    format spec such as '.3f'."""
 
     key: str
     title: str
     frame: pd.DataFrame
     caption: str = ""
     formats: Mapping[str, str] = field(default_factory=dict)
+    in_file: bool = True
 
 
 @dataclass(frozen=True)
@@ -63,13 +65,39 @@ class Text:
 
 
 @dataclass(frozen=True)
+class Points:
+    """Sentences that follow each other, a line each."""
+
+    sentences: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Ruling:
+    """Whether a requirement is `met`, and the sentence that says by what."""
+
+    met: bool
+    text: str
+
+
+@dataclass(frozen=True)
 class KeyFigures:
     """The few numbers to see first: label -> value with its unit, already written out."""
 
     values: Mapping[str, str]
 
 
-Item = Figure | Table | Picture | Text | KeyFigures
+@dataclass(frozen=True)
+class Download:
+    """A file inside the page: its `name`, its `content`, and what it is. One that `opens` is a page of its own, which a
+    button shows in a new tab."""
+
+    name: str
+    content: str | bytes
+    what: str = ""
+    opens: bool = False
+
+
+Item = Figure | Table | Picture | Text | Points | Ruling | KeyFigures | Download
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,14 @@
 """Write a report as one page that opens from disk, anywhere, with its numbers beside it.
 
 The page holds everything it needs (Plotly's library once, styles, data, pictures) and forbids itself any other source,
-so it looks the same offline, in an archive and in ten years. Nothing is computed here.
+so it looks the same offline, in an archive and in ten years. The numbers of each figure and table are files inside it,
+to be saved from it: nothing is lost where the page travels alone. Nothing is computed here.
 """
 
 from __future__ import annotations
 
 import base64
+import gzip
 import json
 import os
 import re
@@ -22,7 +24,20 @@ from markupsafe import Markup, escape
 
 from hdopt.errors import HdoptError
 from hdopt.files import make_folder, to_csv, to_json, write_text
-from hdopt.report import REPORT_FILE, RESULTS_FILE, Figure, Item, KeyFigures, Picture, Report, Table, Text
+from hdopt.report import (
+    REPORT_FILE,
+    RESULTS_FILE,
+    Download,
+    Figure,
+    Item,
+    KeyFigures,
+    Picture,
+    Points,
+    Report,
+    Ruling,
+    Table,
+    Text,
+)
 from hdopt.report.cells import columns, index_has_meaning, minus
 from hdopt.report.numbers import figure_frame
 from hdopt.report.theme import HEIGHT, template
@@ -50,25 +65,27 @@ def write_report(report: Report, folder: Path) -> Path:
     folder = Path(folder)
     _check_keys(report)
     make_folder(folder)
-    tables = dict(_csv_tables(report))
-    for name, frame in tables.items():
-        write_text(folder / name, to_csv(frame, index=index_has_meaning(frame)))
+    for name, text in _csv_texts(report).items():
+        write_text(folder / name, text)
     if report.results:
         write_text(folder / RESULTS_FILE, to_json(report.results) + "\n")
     page = folder / REPORT_FILE
-    write_text(page, render(report, set(tables)))
+    write_text(page, render(report))
     return page
 
 
-def render(report: Report, csv_files: Collection[str] = ()) -> str:
-    """The HTML of the page of a `report`; `csv_files` are the names of the files beside it that it may link to. Raises
-    `HdoptError` where a text refers to a figure or table that the report does not have."""
+def render(report: Report) -> str:
+    """The HTML of the page of a `report`, with the numbers behind it as files inside. Raises `HdoptError` where a text
+    refers to a figure or table that the report does not have."""
     import jinja2
 
     templates = files("hdopt.report") / "templates"
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     page = environment.from_string((templates / "report.html.j2").read_text(encoding="utf-8"))
-    prepare = _Preparation(report, csv_files)
+    inside: dict[str, str | bytes] = {**_csv_texts(report)}
+    if report.results:
+        inside[RESULTS_FILE] = to_json(report.results) + "\n"
+    prepare = _Preparation(report, inside)
     figures = [item for section in report.sections for item in section.items if isinstance(item, Figure)]
     html: str = page.render(
         report=report,
@@ -82,6 +99,7 @@ def render(report: Report, csv_files: Collection[str] = ()) -> str:
             for section in report.sections
         ],
         figures=[(figure.key, _figure_json(figure)) for figure in figures],
+        files=[(name, _packed(content)) for name, content in {**inside, **_downloads(report)}.items()],
         template_json=script_safe(json.dumps(template().to_plotly_json())),
         plotly_js=_plotly_js() if figures else "",
         css=(templates / "report.css").read_text(encoding="utf-8"),
@@ -134,6 +152,18 @@ class _Preparation:
         return {"kind": "key-figures", "entries": [(label, *_split_unit(v)) for label, v in item.values.items()]}
 
     @item.register
+    def _(self, item: Points) -> dict[str, Any]:
+        return {"kind": "points", "sentences": [self.prose(sentence) for sentence in item.sentences]}
+
+    @item.register
+    def _(self, item: Ruling) -> dict[str, Any]:
+        return {"kind": "ruling", "met": item.met, "text": self.prose(item.text)}
+
+    @item.register
+    def _(self, item: Download) -> dict[str, Any]:
+        return {"kind": "download", "name": item.name, "what": self.prose(item.what), "opens": item.opens}
+
+    @item.register
     def _(self, item: Figure) -> dict[str, Any]:
         height = item.figure.layout.height or HEIGHT
         return self._numbered(item) | {"kind": "figure", "height": f"{height:g}"}
@@ -181,10 +211,26 @@ def _check_keys(report: Report) -> None:
             seen.add(key)
 
 
+def _csv_texts(report: Report) -> dict[str, str]:
+    """The numbers of every table and figure, by the name of their file."""
+    return {name: to_csv(frame, index=index_has_meaning(frame)) for name, frame in _csv_tables(report)}
+
+
+def _downloads(report: Report) -> dict[str, str | bytes]:
+    items = (item for section in report.sections for item in section.items)
+    return {item.name: item.content for item in items if isinstance(item, Download)}
+
+
+def _packed(content: str | bytes) -> str:
+    """A file as it lies in the page: gzip, the same bytes each time, in base64."""
+    raw = content.encode() if isinstance(content, str) else content
+    return base64.b64encode(gzip.compress(raw, mtime=0)).decode()
+
+
 def _csv_tables(report: Report) -> Iterator[tuple[str, Any]]:
     for section in report.sections:
         for item in section.items:
-            if isinstance(item, Table):
+            if isinstance(item, Table) and item.in_file:
                 yield f"{item.key}.csv", item.frame
             elif isinstance(item, Figure) and not (frame := figure_frame(item.figure)).empty:
                 yield f"{item.key}.csv", frame

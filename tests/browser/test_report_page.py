@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from chromium import NARROW, Chromium, check_report
 
-from hdopt.report import Figure, KeyFigures, Picture, Report, Section, Table, Text, theme
+from hdopt.report import Download, Figure, KeyFigures, Picture, Report, Section, Table, Text, theme
 from hdopt.report.html import write_report
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 40 20"><circle cx="20" cy="10" r="9"/></svg>'
@@ -48,6 +48,24 @@ def test_everything_is_drawn_and_nothing_is_fetched(look_at, tmp_path, whole_rep
     assert findings.figures == ("waveform", "heat")
     assert all(findings.labels.values())
     assert findings.pdf_pages >= 2
+
+
+def test_a_file_in_the_page_is_the_one_beside_it(browser: Chromium, tmp_path, whole_report):
+    page_file = write_report(whole_report, tmp_path)
+    with browser.open(page_file) as page:
+        for name in ("numbers.csv", "waveform.csv"):
+            text = page.evaluate(f"hdoptReport.file('{name}').then((blob) => blob.text())")
+            assert text == (tmp_path / name).read_text()
+
+
+def test_a_page_inside_the_page_opens(browser: Chromium, tmp_path):
+    inner = Download("inner.html", "<!DOCTYPE html><p>inside</p>", opens=True)
+    with browser.open(write_report(report_of(inner), tmp_path)) as page:
+        page.evaluate("window.open = (url) => { window.opened = url; }")
+        page.evaluate("document.querySelector('[data-open]').click()")
+        page.wait(0.3)
+        assert page.evaluate("hdoptReport.file('inner.html').then((blob) => blob.text())") == inner.content
+        assert page.evaluate("window.opened").startswith("blob:")
 
 
 def test_a_figure_follows_the_width_of_the_window(browser: Chromium, tmp_path, whole_report):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 import re
 
@@ -11,7 +13,7 @@ import plotly.graph_objects as go
 import pytest
 
 from hdopt.errors import HdoptError
-from hdopt.report import Figure, KeyFigures, Report, Section, Table, Text, theme
+from hdopt.report import Download, Figure, KeyFigures, Points, Report, Ruling, Section, Table, Text, theme
 from hdopt.report.cells import columns, heading
 from hdopt.report.html import ROWS_SHOWN, render, write_report
 from hdopt.report.numbers import figure_frame
@@ -45,6 +47,41 @@ def test_page_numbers_and_results_are_written_side_by_side(tmp_path):
     assert (page.parent / "table.csv").read_text() == "case,ke_arcmin\na,1.5\n"
     assert (page.parent / "line.csv").read_text() == "trace,Angle [deg],KE [arcmin]\na,0.0,2.0\na,1.0,3.0\n"
     assert json.loads((page.parent / "results.json").read_text()) == {"ke": 1.5, "bad": None}
+
+
+def files_in(page: str) -> dict[str, bytes]:
+    """The files that lie in a page, as its buttons save them."""
+    found = re.findall(r'<script type="application/octet-stream" data-name="([^"]+)">([^<]*)</script>', page)
+    return {name: gzip.decompress(base64.b64decode(content)) for name, content in found}
+
+
+def test_the_numbers_travel_inside_the_page(tmp_path):
+    """Every file beside the page is in it as well, byte for byte, with a button that saves it."""
+    frame = pd.DataFrame({"case": ["a", "b"], "ke_arcmin": [1.5, 1 / 3]})
+    page = write_report(report_of(line(), table(frame), results={"ke": 1.5}), tmp_path)
+    inside = files_in(page.read_text())
+    beside = {file.name: file.read_bytes() for file in tmp_path.iterdir() if file != page}
+    assert inside == beside
+    assert all(f'data-file="{name}"' in page.read_text() for name in inside)
+
+
+def test_a_download_is_in_the_page_and_not_beside_it(tmp_path):
+    page = write_report(report_of(Download("own.toml", "a = 1\n", "The study."), Download("x.bin", b"\0\1")), tmp_path)
+    assert files_in(page.read_text()) == {"own.toml": b"a = 1\n", "x.bin": b"\0\1"}
+    assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_a_table_that_is_no_data_has_no_file(tmp_path):
+    page = write_report(report_of(table(pd.DataFrame({"a": [1]}), in_file=False)), tmp_path)
+    assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
+    assert "data-file" not in re.sub(r"<script.*?</script>", "", page.read_text(), flags=re.S)
+
+
+def test_a_ruling_says_met_or_missed_before_its_sentence():
+    page = render(report_of(Ruling(True, "Enough."), Ruling(False, "Too little."), Points(("One, [[line]].",)), line()))
+    assert '<p class="ruling met"><b>Met.</b> Enough.</p>' in page
+    assert '<p class="ruling missed"><b>Missed.</b> Too little.</p>' in page
+    assert '<li>One, <a href="#line">Figure&nbsp;1</a>.</li>' in page
 
 
 def test_plotly_is_in_the_page_once_and_only_where_there_are_figures():

@@ -51,7 +51,26 @@
     Plotly.relayout(plot, size);
   });
 
-  window.hdoptReport = { drawn: Promise.all(plots.map(draw)).then(() => plots.length) };
+  // A file that lies in the page, compressed.
+  const file = (name, type = "application/octet-stream") => {
+    const holder = [...document.querySelectorAll("script[data-name]")].find((node) => node.dataset.name === name);
+    const bytes = Uint8Array.from(atob(holder.textContent), (letter) => letter.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return new Response(stream, { headers: { "Content-Type": type } }).blob();
+  };
+  const save = async (name) => {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(await file(name));
+    link.download = name;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+  };
+  for (const button of document.querySelectorAll("[data-file]")) button.addEventListener("click", () => save(button.dataset.file));
+  for (const button of document.querySelectorAll("[data-open]")) {
+    button.addEventListener("click", async () => open(URL.createObjectURL(await file(button.dataset.open, "text/html"))));
+  }
+
+  window.hdoptReport = { drawn: Promise.all(plots.map(draw)).then(() => plots.length), file };
   window.hdoptReport.drawn.catch((error) => console.error(error));
 
   // Paper does not scroll: a table wider than the page is set smaller.
