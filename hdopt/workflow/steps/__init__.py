@@ -69,6 +69,7 @@ STEPS: dict[str, StepPlace] = {
     "allocate": StepPlace("hdopt.workflow.steps.tolerances:allocate", ("allocate",)),
     "geometry": StepPlace("hdopt.workflow.steps.geometry:geometry", ("drive", "export")),
     "search": StepPlace("hdopt.workflow.steps.search:search", ("search",)),
+    "explorer": StepPlace("hdopt.workflow.steps.explorer:explorer", ONE_DRIVE),
     "concealed_physics": StepPlace("hdopt.studies.concealed_physics:concealed_physics"),
     "real_residuals": StepPlace("hdopt.studies.real_residuals:real_residuals"),
     "paper_reproduction": StepPlace("hdopt.studies.paper_reproduction:paper_reproduction"),
