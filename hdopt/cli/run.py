@@ -36,7 +36,7 @@ def command(
     loaded = asked.load()
     place = Path(folder) if folder else Path("out") / loaded.name
     result = run_study(loaded, place, seed, lambda names: progress(names, loaded.name), resume)
-    verdict = of_run(loaded, result)
+    verdict = of_run(loaded, result.found)
     emit(result.to_dict(), json_file, _lines(result), verdict)
     return status(result.answer, verdict)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
@@ -11,7 +12,6 @@ if TYPE_CHECKING:
     from hdopt.study.tolerances import RequirementSection
     from hdopt.tolerance.results import StackResult
     from hdopt.workflow.kinematic_error import KinematicErrorResult
-    from hdopt.workflow.run import RunResult
 
 
 @dataclass(frozen=True)
@@ -110,10 +110,10 @@ def of_allocation(result: AllocateResult) -> Verdict:
     return Verdict("verified yield", result.verified_yield.value, result.required_yield, at_least=True)
 
 
-def of_run(study: Study, run: RunResult) -> Verdict | None:
-    """The requirement of `study` against what `run` found: the yield of its stack, else its drive's peak-to-peak."""
+def of_run(study: Study, found: Mapping[str, Mapping[str, Any]]) -> Verdict | None:
+    """The requirement of `study` against what the steps of a run `found`, their results by name: the yield of its
+    stack, else its drive's peak-to-peak."""
     section = _requirement(study)
-    found: Any = {name: step.results for name, step in run.steps.items()}
     if "yield" in found.get("stack", {}):
         needed = found["stack"]["required_yield"]
         return Verdict("yield", found["stack"]["yield"]["value"], needed, at_least=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import platform
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -16,10 +17,15 @@ from hdopt.files import make_folder, to_json, write_bytes, write_text
 from hdopt.parallel.engine import engine_from, engine_in_force
 from hdopt.parallel.kept import Kept
 from hdopt.report import REPORT_FILE, RESULTS_FILE, Report, Section, Text
+from hdopt.report.sections.inputs import inputs_section
 from hdopt.study import AnyStudy, Study, as_study
+from hdopt.study.defaults import defaults_taken
 from hdopt.study.drive import StudySection
+from hdopt.study.write import study_toml
 from hdopt.workflow.provenance import provenance
+from hdopt.workflow.requirement import of_run
 from hdopt.workflow.run_folder import RunFolder, finish, run_folder
+from hdopt.workflow.run_verdict import section_of_run
 from hdopt.workflow.steps import STEPS, Context, Step, StepResult, find_step
 
 Progress = Callable[[Iterable[str]], Iterable[str]]
@@ -37,6 +43,11 @@ class RunResult:
     def answer(self) -> bool:
         """False where the answer of a step was "no"."""
         return all(step.answer for step in self.steps.values())
+
+    @property
+    def found(self) -> dict[str, Mapping[str, Any]]:
+        """The results of each step."""
+        return {name: step.results for name, step in self.steps.items()}
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -70,7 +81,7 @@ def run_study(
         for name in progress(names):
             found[name] = _done_before(run, name) or _do(run, name, todo[name], study, seed, listed)
         found = {name: _relocated(step, run.new, folder) for name, step in found.items()}
-        _write(study, found, run, seed)
+        _write(study, found, run, seed, folder)
         finish(run, files_of_run(run.target))
     return RunResult(study.name, folder / REPORT_FILE, found)
 
@@ -106,12 +117,25 @@ def _done_before(run: RunFolder, name: str) -> StepResult | None:
     return cast(StepResult, result)
 
 
-def _write(study: Study, found: Mapping[str, StepResult], run: RunFolder, seed: int) -> None:
+def _write(study: Study, found: Mapping[str, StepResult], run: RunFolder, seed: int, folder: Path) -> None:
     """The page, the tables and the numbers, the latter with their provenance and the hash of every file beside them."""
     from hdopt.report.html import date_of_page, write_report
 
-    sections = tuple(section for step in found.values() for section in step.sections)
-    write_report(Report(study.title, description_of(study), sections, {"study": study.name}), run.new)
+    by_step = {name: step.results for name, step in found.items()}
+    first = section_of_run(of_run(study, by_step), by_step)
+    sections = (
+        *((first,) if first else ()),
+        *(section for step in found.values() for section in step.sections),
+        inputs_section(
+            study.data,
+            study_toml(study.data, (study.title,)),
+            study.name,
+            defaults_taken(study.sections, tuple(study.sections)),
+        ),
+    )
+    # The page travels: what it says of files is their names, not the folder they were written to.
+    results = {"study": study.name, "steps": _without_folder(by_step, folder)}
+    write_report(Report(study.title, description_of(study), sections, results), run.new)
     files = sorted(path for path in run.new.rglob("*") if path.is_file() and path.name != RESULTS_FILE)
     hashes = {str(path.relative_to(run.new)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
     known = {"source": dict(study.recipe), "date": date_of_page(), "files": hashes}
@@ -121,6 +145,17 @@ def _write(study: Study, found: Mapping[str, StepResult], run: RunFolder, seed: 
         "provenance": provenance(study, seed, "run") | known,
     }
     write_text(run.new / RESULTS_FILE, to_json(results) + "\n")
+
+
+def _without_folder(value: Any, folder: Path) -> Any:
+    """`value` of JSON, its texts without the path of the `folder` that they name files in."""
+    if isinstance(value, str):
+        return value.replace(f"{folder}{os.sep}", "")
+    if isinstance(value, Mapping):
+        return {key: _without_folder(item, folder) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_folder(item, folder) for item in value]
+    return value
 
 
 def files_of_run(folder: Path) -> tuple[str, ...]:

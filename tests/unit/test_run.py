@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from cases import drive
+from test_report import files_in
 
 from hdopt.drive.geometry import Structure
 from hdopt.errors import HdoptError, MissingLibrary
 from hdopt.kinematics import peak_to_peak_arcmin
 from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin
 from hdopt.study import load_study
+from hdopt.workflow.requirement import of_run
 from hdopt.workflow.run import run_study, steps_of
+from hdopt.workflow.run_verdict import section_of_run
 from hdopt.workflow.steps import Context, find_step
 from hdopt.workflow.steps.design import map_arcmin, sensitivities, with_width
 from hdopt.workflow.steps.profiles import alternatives, profiles
@@ -58,6 +62,56 @@ def test_a_run_leaves_a_page_its_numbers_and_the_results_of_each_step(study, tmp
     )
     assert (tmp_path / "orders-table.csv").is_file()
     assert study.title in result.report.read_text()
+
+
+def headings(page: str) -> list[str]:
+    return re.findall(r'<h2[^>]*><span class="number">\d+</span>([^<]+)</h2>', page)
+
+
+def test_the_page_begins_with_the_verdict_and_ends_with_the_inputs(tmp_path):
+    """And tells nothing of the folder that it was written to: it is handed round."""
+    steps = 'steps = ["waveform", "structures", "explorer"]'
+    (tmp_path / "mine.toml").write_text(f'drive = "csf-25-80"\n[study]\n{steps}\n')
+    study = load_study(tmp_path / "mine.toml")
+    page = run_study(study, tmp_path / "out").report.read_text()
+    shown = headings(page)
+    assert shown[0] == "Verdict"
+    assert shown[-2:] == ["Explorer", "Inputs"]
+    said = "The drive in [errors] has 1.369 arcmin peak-to-peak, 1 arcmin is allowed: 0.369 arcmin too much."
+    assert f'<p class="ruling missed"><b>Missed.</b> {said}</p>' in page
+    assert "one-way, major axis, 1.062 arcmin" in page
+    inside = files_in(page)
+    (tmp_path / "again.toml").write_bytes(inside["mine.toml"])
+    assert load_study(tmp_path / "again.toml").data == study.data
+    assert inside["explorer.html"] == (tmp_path / "out" / "explorer.html").read_bytes()
+    assert not any(str(tmp_path).encode() in content for content in inside.values())
+    assert str(tmp_path) not in page
+
+
+def test_a_verdict_on_many_drives_says_what_the_one_drive_is():
+    """A single drive above the limit beside a yield that is met looks like a contradiction; the page explains it."""
+    found = {
+        "stack": {
+            "yield": {"value": 0.99871},
+            "required_yield": 0.9973,
+            "limit_arcmin": 1.0,
+            "quantiles": {"0.9973": {"value": 0.98765}},
+            "contributions": {"wg_tilt_major_deg": 0.2, "cs_tooth_amplitude_mm": 0.7, "axis_tilt_x_deg": 0.001},
+        },
+        "waveform": {"peak_to_peak_arcmin": 1.369, "required_arcmin": 1.0},
+    }
+    section = section_of_run(of_run(load_study("csf-25-80"), found), found)
+    ruling, points = section.items
+    assert ruling.met
+    assert (
+        ruling.text.replace("\u00a0", " ")
+        == "99.87 % of drives to these tolerances stay within 1 arcmin; 99.73 % must."
+    )
+    said = " ".join(points.sentences)
+    assert "stay below 0.9877 arcmin, 0.0123 arcmin below the limit" in said
+    assert "CS tooth amplitude (70 %) and WG tilt major (20 %)" in said
+    assert "It is one example" in said
+    assert section_of_run(None, found) is None
 
 
 def test_a_study_lists_its_steps(tmp_path, study):

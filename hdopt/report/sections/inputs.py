@@ -1,0 +1,105 @@
+"""The last section of a run's page: what went in, so that the page can be handed round without its study file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any  # Any: values of TOML
+
+import pandas as pd
+
+from hdopt.report import Download, Item, Section, Table, Text
+from hdopt.report.cells import heading, minus
+
+SHOWN = {
+    "drive": "Drive",
+    "wave_generator": "Wave generator",
+    "errors": "Errors of the one drive",
+    "requirement": "Requirement",
+    "clearances": "Clearances",
+    "material": "Material of the flexspline",
+    "load": "Load",
+    "effects": "Effects beyond the base model",
+    "operation": "Operating condition",
+    "linear_stack": "Linear stack",
+}
+"""Sections of a study whose keys are shown as they are, with their headings."""
+SPREAD = {"tolerances": "Tolerances", "contributors": "Callouts"}
+"""Sections with a distribution a key."""
+
+
+def inputs_section(
+    data: Mapping[str, Any], toml: str, name: str, assumptions: Sequence[str] = (), key: str = "inputs"
+) -> Section:
+    """The inputs of a study: its merged `data` by section, and its whole text `toml`, to be saved as `name`.toml.
+
+    `assumptions` are sentences about what was taken where the study says nothing. `key` begins the keys of the tables.
+    """
+    items: list[Item] = []
+    for section, title in SHOWN.items():
+        rows = list(_leaves(data.get(section, {})))
+        if rows:
+            frame = pd.DataFrame(rows, columns=["what", "value", "unit", "key in the study file"])
+            items.append(Table(f"{key}-{section.replace('_', '-')}", title, frame, in_file=False))
+    for section, title in SPREAD.items():
+        spread = [_spread(name, row) for name, row in data.get(section, {}).items() if isinstance(row, Mapping)]
+        if spread:
+            frame = pd.DataFrame(spread).dropna(axis="columns", how="all")
+            items.append(Table(f"{key}-{section}", title, frame, in_file=False))
+    items += [Text(f"{sentence[:1].upper()}{sentence[1:]}.") for sentence in assumptions]
+    items.append(Download(f"{name}.toml", toml, "The whole study file, everything that ships merged in."))
+    return Section(key, "Inputs", tuple(items), "Everything that this page was computed from.")
+
+
+def _leaves(content: object, path: tuple[str, ...] = ()) -> Any:  # rows of text, a leaf each
+    """Each value of a section in words: its name, itself, its unit, and its key."""
+    if isinstance(content, Mapping):
+        for name, inner in content.items():
+            yield from _leaves(inner, (*path, str(name)))
+    elif path and content is not None:
+        title, unit = heading(path[-1])
+        inside = [heading(part)[0] for part in path[:-1]]
+        words = _words(": ".join([*inside, title]))
+        yield words, _shown(content), unit, ".".join(path)
+
+
+def _words(text: str) -> str:
+    words = [word.upper() if word in ("wg", "cs", "fs") else word for word in text.split(" ")]
+    joined = " ".join(words)
+    return joined[:1].upper() + joined[1:]
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | float):
+        return minus(f"{value:.6g}")
+    if isinstance(value, list | tuple):
+        return ", ".join(_shown(one) for one in value)
+    return str(value).replace("_", " ")
+
+
+ENDS = ("lower", "upper")
+
+
+def _spread(name: str, row: Mapping[str, Any]) -> dict[str, str | None]:
+    """One tolerance: what it is of, its distribution with its parameters, its ends, and what it costs."""
+    title, unit = heading(name)
+    kind = str(row.get("distribution") or row.get("kind") or "").replace("_", " ")
+    skipped = {"distribution", "kind", "cost", *ENDS}
+    given = [f"{key.replace('_', ' ')} {_shown(value)}" for key, value in row.items() if key not in skipped]
+    cost = row.get("cost")
+    return {
+        "what": _words(title),
+        "unit": unit or None,
+        "distribution": ", ".join([part for part in (kind, *given) if part]),
+        "from": _shown(row["lower"]) if "lower" in row else None,
+        "to": _shown(row["upper"]) if "upper" in row else None,
+        "cost": _cost(cost) if isinstance(cost, Mapping) else None,
+    }
+
+
+def _cost(cost: Mapping[str, Any]) -> str:
+    """A cost model in a few words; its grades are in the study file."""
+    given = [f"{key} {_shown(value)}" for key, value in cost.items() if isinstance(value, int | float)]
+    words = [str(cost.get("model", "")), str(cost.get("system", "")), *given]
+    return ", ".join(word for word in words if word)
