@@ -40,6 +40,10 @@ mutants: $(VENV)/ready-to-test
 faults: $(VENV)/ready-to-test
 	$(VENV)/bin/python -m tests.mutants.faults $(FAULTS)
 
+# The site in build/site; a warning is an error. HDOPT_DOCS_PICTURES=0: without the pictures of the gallery.
+docs: $(VENV)/ready-to-test
+	$(VENV)/bin/python -m sphinx -W --keep-going -b html docs build/site
+
 benchmark: $(VENV)/ready-to-test
 	$(VENV)/bin/python -m pytest tests/benchmarks --benchmark-only
 

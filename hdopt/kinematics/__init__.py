@@ -1,6 +1,6 @@
 """Kinematic error of a drive after Jia et al. 2021: geometry of the deepest points, waveform, peak-to-peak, lag.
 
-Symbols, signs and zeros are those of the README's conventions page. Input angles theta are in rad, clockwise.
+Symbols, signs and zeros are those of docs/conventions.md. Input angles theta are in rad, clockwise.
 """
 
 from hdopt.kinematics.peak_to_peak import peak_to_peak_arcmin

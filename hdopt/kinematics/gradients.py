@@ -5,8 +5,10 @@ are smooth in the design: an envelope that lies above the converged peak-to-peak
 phases leave out (up to a few thousandths of an arcmin, `tests/unit/test_kinematics_gradients.py`).
 
 The supremum is the largest of four smooth maxima (zone x rim). The infimum is the least of a few local minima of
+
     l(theta) = (A_1 + A_2)/2 - a |sin h| sqrt(1 - r^2), r = (A_1 - A_2)/(2 a cos h)    where both zones can drive,
     l(theta) = max(A_1, A_2) - a                                                         where one drives alone,
+
 with A_i the zone's deviation without its FS term, a its amplitude and h half the sum of the offsets o'. By the envelope
 theorem an extreme's slope over the design is the partial one at its own angle. At a kink it is the mix of both sides'
 that has no slope over theta; where the deepest rim changes, the angle itself moves with the design.

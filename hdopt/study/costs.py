@@ -51,11 +51,11 @@ class PowerRow(CostRow):
 
 class ExponentialRow(CostRow):
     model: Literal["exponential"]
-    """fixed + a exp(-b t) at tolerance t."""
+    """fixed + a exp(-t/b) at tolerance t."""
     a: Positive
     """Cost at tolerance 0 beyond the fixed one."""
     b: Positive
-    """Decay per unit of tolerance."""
+    """Tolerance over which the cost beyond the fixed one falls to 1/e."""
     fixed: float = 0.0
     """Cost that does not depend on the tolerance."""
 

@@ -16,7 +16,7 @@ TEN_DEG = np.radians(10)
 )
 def test_published_value_belongs_to_a_10_deg_grid_and_converges_higher(structure, published, converged):
     design = drive(structure=structure)
-    # The paper prints 4 digits of a re-derivation whose misprints are resolved; see physics in the README.
+    # The paper prints 4 digits of a re-derivation whose misprints are resolved; see docs/theory.md.
     assert walked_peak_to_peak_arcmin(design, BASE_ERRORS, TEN_DEG, 80) == pytest.approx(published, abs=0.003)
     assert peak_to_peak_arcmin(design, BASE_ERRORS) == pytest.approx(converged, abs=0.001)
     assert np.ptp(extremes_arcmin(design, BASE_ERRORS, "exact")) == pytest.approx(converged, abs=0.001)

@@ -1,0 +1,150 @@
+"""Pages of the site that derive from the program: the study file from its schema, the options from the commands, the
+API from what is public. Written anew at every build, so that none can lag."""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from pathlib import Path
+
+ROOMS = {
+    "Drive": ("hdopt.drive.geometry", "hdopt.drive.errors", "hdopt.drive.profiles", "hdopt.drive.teeth"),
+    "Kinematics": (
+        "hdopt.kinematics.exact",
+        "hdopt.kinematics.closed_form",
+        "hdopt.kinematics.waveform",
+        "hdopt.kinematics.extremes",
+        "hdopt.kinematics.peak_to_peak",
+        "hdopt.kinematics.gradients",
+    ),
+    "Mechanics": (
+        "hdopt.mechanics.contact",
+        "hdopt.mechanics.bending",
+        "hdopt.mechanics.lag",
+        "hdopt.mechanics.tooth_path",
+        "hdopt.mechanics.bearing_life",
+    ),
+    "Tolerances": (
+        "hdopt.tolerance.distributions",
+        "hdopt.tolerance.space",
+        "hdopt.tolerance.stack",
+        "hdopt.tolerance.tail",
+        "hdopt.tolerance.worst_case",
+        "hdopt.tolerance.sensitivity",
+        "hdopt.tolerance.contributors",
+    ),
+    "Allocation": ("hdopt.allocation.cost", "hdopt.allocation.grades", "hdopt.allocation.results"),
+    "Simulation": ("hdopt.simulation.model", "hdopt.simulation.operation", "hdopt.simulation.effect_values"),
+    "Recordings": ("hdopt.recordings.recording", "hdopt.recordings.read", "hdopt.recordings.sheet"),
+}
+"""Heading -> the modules whose public functions and classes stand under it."""
+
+
+def write_pages(folder: Path) -> None:
+    """Write every derived page into `folder`; a page that did not change keeps its time."""
+    folder.mkdir(exist_ok=True)
+    pages = {"study-file.md": study_file(), "commands.md": commands(), "api.rst": api()}
+    for name, text in pages.items():
+        path = folder / name
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+def study_file() -> str:
+    """The page on the study file, section by section, from the schema."""
+    from hdopt.workflow.study_reference import study_reference
+
+    lines = [
+        "# The study file, section by section",
+        "",
+        "A study is one TOML file. This page is written from the schema that checks it. `hdopt new NAME` writes a file",
+        "with all of these keys, `hdopt check FILE` says what can be computed from one. A key without a default may be",
+        "left out unless it is marked as required; what needs it then says so.",
+        "",
+    ]
+    told = set()
+    for name, tables in study_reference().items():
+        lines += [f"## [{name}]", ""]
+        for place, table in enumerate(tables):
+            if place and table.keys in told:
+                continue
+            told.add(table.keys)
+            if place:
+                lines += [f"### `{table.name}`" if "=" in table.name else f"### [{table.name}]", ""]
+            lines += [_sentence(table.says), ""]
+            lines += _key_table(table.keys)
+    lines += ["## [effects.ID]", "", "What the base model leaves out, a table for each effect:"]
+    lines += ["[the effects and their keys](../conventions.md#effects-in-a-study-file).", ""]
+    return "\n".join(lines)
+
+
+def _sentence(says: str) -> str:
+    text = re.sub(r"^`?\[[\w.]+\]`?( and \[\w+\])?:? ?", "", says)
+    return _safe(text[:1].upper() + text[1:])
+
+
+def _key_table(keys) -> list[str]:
+    if not keys:
+        return []
+    rows = ["| key | what may stand there | unit | if left out | meaning |", "|---|---|---|---|---|"]
+    for key in keys:
+        default = "**required**" if key.required else f"`{key.default}`" if key.default else ""
+        rows.append(f"| `{key.key}` | {_safe(key.allowed)} | {key.unit} | {default} | {_safe(key.meaning)} |")
+    return [*rows, ""]
+
+
+def _safe(text: str) -> str:
+    """Text for a Markdown cell: brackets and bars that are no markup."""
+    return (
+        text.replace("|", "\\|").replace("[", "\\[").replace("]", "\\]").replace("_", "\\_")
+        if "`" not in text
+        else (text.replace("|", "\\|").replace("[", "\\[").replace("]", "\\]"))
+    )
+
+
+def commands() -> str:
+    """Every command with its arguments and options, from the command line itself."""
+    import click
+
+    from hdopt.cli.app import COMMANDS
+
+    lines = [
+        "# Options of every command",
+        "",
+        "Written from the command line; `hdopt COMMAND --help` says the same.",
+        "",
+    ]
+    for name, says in COMMANDS.items():
+        command = import_module(f"hdopt.cli.{name}").command
+        usage = command.collect_usage_pieces(click.Context(command))
+        lines += [f"## hdopt {name}", "", says, "", "```text", f"hdopt {name} {' '.join(usage)}", "```", ""]
+        lines += ["| option | what it does | if left out |", "|---|---|---|"]
+        for param in command.params:
+            if isinstance(param, click.Option):
+                names = ", ".join(f"`{part}`" for part in (*param.opts, *param.secondary_opts))
+                metavar = "" if param.is_flag else f" {_safe(param.metavar or param.type.name.upper())}"
+                default = "" if param.is_flag or param.default in (None, (), "") else f"`{param.default}`"
+                default = default if param.show_default else ""
+                lines.append(f"| {names}{metavar} | {_safe(param.help or '')} | {default} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def api() -> str:
+    """What `import hdopt` offers, and the rooms' modules."""
+    import inspect
+
+    import hdopt
+
+    lines = ["API reference", "=============", ""]
+    lines += ["What ``import hdopt`` offers", "-" * 30, ""]
+    for name in sorted(hdopt.__all__, key=str.lower):
+        kind = "autoclass" if inspect.isclass(getattr(hdopt, name)) else "autofunction"
+        lines += [f".. {kind}:: hdopt.{name}", ""]
+        if kind == "autoclass":
+            lines[-1:] = ["   :members:", ""]
+    for room, modules in ROOMS.items():
+        lines += [room, "-" * len(room), ""]
+        for module in modules:
+            lines += [module, "~" * len(module), "", f".. automodule:: {module}", "   :members:", ""]
+    return "\n".join(lines)

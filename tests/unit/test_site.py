@@ -1,0 +1,144 @@
+"""The documentation site builds without a warning, and what it says is true: commands, equations, figures, links."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from hdopt.cli import main
+from hdopt.cli.app import COMMANDS
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted([*DOCS.glob("*.md"), *(DOCS / "development").glob("*.md")])
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(tmp_path):
+    """Broken links between pages, pages in no list, docstrings that are no text; the gallery's code runs elsewhere."""
+    arguments = ["-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", "-d", tmp_path / "trees"]
+    built = subprocess.run(
+        [sys.executable, *arguments, DOCS, tmp_path / "site"],
+        env={**os.environ, "HDOPT_DOCS_PICTURES": "0"},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert built.returncode == 0, built.stderr[-3000:]
+    for page in ("index", "tutorial", "generated/study-file", "generated/api", "examples/index", "verification"):
+        assert (tmp_path / "site" / f"{page}.html").exists()
+    assert broken_links(tmp_path / "site") == []
+
+
+def broken_links(site: Path) -> list[str]:
+    """Links from page to page of a built site that lead nowhere."""
+    broken = []
+    for page in site.rglob("*.html"):
+        for link in re.findall(r'href="([^"#?:]+)(?:#[^"]*)?"', page.read_text(encoding="utf-8")):
+            if not (page.parent / link).exists():
+                broken.append(f"{page.relative_to(site)}: {link}")
+    return broken
+
+
+def consoles(page: Path) -> list[tuple[list[str], list[str]]]:
+    """The (command, lines of output) of every console block of a page."""
+    found = []
+    for block in re.findall(r"```console\n(.*?)```", page.read_text(encoding="utf-8"), re.S):
+        command, *lines = block.rstrip("\n").split("\n")
+        assert command.startswith("$ hdopt "), command
+        found.append((shlex.split(command.removeprefix("$ hdopt ")), lines))
+    return found
+
+
+@pytest.mark.slow
+def test_every_command_of_the_tutorial_says_what_the_page_says(tmp_path, monkeypatch, capsys):
+    """Would catch an answer that changed and a line of output in other words; '...' stands for what is left out."""
+    monkeypatch.chdir(tmp_path)
+    blocks = consoles(DOCS / "tutorial.md")
+    assert len(blocks) >= 7
+    for arguments, lines in blocks:
+        with pytest.raises(SystemExit) as end:
+            main(arguments)
+        out = capsys.readouterr().out
+        assert end.value.code == 0
+        place = 0
+        for line in filter(None, (line.strip() for line in lines)):
+            for part in filter(None, (part.strip() for part in line.split("..."))):
+                assert part in out[place:], f"hdopt {' '.join(arguments)}: {part!r} is not, or not there, in\n{out}"
+                place = out.index(part, place) + len(part)
+
+
+@pytest.mark.parametrize("page", [DOCS / "tutorial.md", ROOT / "README.md"], ids=lambda page: page.name)
+def test_python_on_the_pages_runs(page):
+    for block in re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.S):
+        exec(compile(block, page.name, "exec"), {})
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_its_paragraph(command):
+    text = (DOCS / "how-to.md").read_text(encoding="utf-8")
+    assert f"\n## hdopt {command}\n" in text
+
+
+def equations() -> list[tuple[str, str]]:
+    """(function, test) of every equation on the page on theory."""
+    text = (DOCS / "theory.md").read_text(encoding="utf-8")
+    return re.findall(r"\| `(hdopt\.[\w.]+)` \| `(tests/[\w/.]+)` \|", text)
+
+
+def test_every_equation_has_its_function_and_its_test():
+    """Would catch a function that was renamed and a test file that moved."""
+    found = equations()
+    rows = (DOCS / "theory.md").read_text(encoding="utf-8").count("\n| ") - 1
+    assert len(found) == rows >= 20
+    for function, test in found:
+        assert (ROOT / test).exists(), test
+        module, _, name = function.rpartition(".")
+        try:
+            import_module(function)
+        except ModuleNotFoundError:
+            assert hasattr(import_module(module), name), function
+        said = (ROOT / test).read_text(encoding="utf-8")
+        assert name in said or module.rpartition(".")[2] in said, f"{test} does not name {name}"
+
+
+@pytest.mark.slow
+def test_the_figures_of_the_verification_page_still_come_out():
+    """Would catch a published figure that no longer comes out, in every digit shown."""
+    from hdopt.studies.verification import comparisons, renewed
+
+    page = (DOCS / "verification.md").read_text(encoding="utf-8")
+    assert renewed(page) == page, "renew with: python -m hdopt.studies.verification docs/verification.md"
+    assert len(comparisons()) >= 30
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "README.md"], ids=lambda page: page.name)
+def test_links_between_pages_lead_somewhere(page):
+    for link in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+        if not link.startswith(("generated/", "examples/")):
+            assert (page.parent / link).exists(), link
+
+
+def test_the_citation_is_of_this_version():
+    import hdopt
+
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {hdopt.__version__}\n" in text
+    assert f"## {hdopt.__version__}\n" in (DOCS / "changelog.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_is_what_the_page_says(shell, tmp_path):
+    text = (DOCS / "how-to.md").read_text(encoding="utf-8")
+    assert f"_HDOPT_COMPLETE={shell}_source" in text
+    script = "from hdopt.cli import main; main()"
+    env = {**os.environ, "_HDOPT_COMPLETE": f"{shell}_source"}
+    made = subprocess.run([sys.executable, "-c", script], env=env, capture_output=True, text=True, timeout=60)
+    assert made.returncode == 0 and "hdopt" in made.stdout and not made.stderr
