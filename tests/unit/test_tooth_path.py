@@ -10,7 +10,8 @@ import pytest
 from cases import CSF_25_80, PROFILES, drive
 
 from hdopt.drive.geometry import Load
-from hdopt.mechanics.bending import max_curvature_change
+from hdopt.drive.profiles import TwoDisk
+from hdopt.mechanics.bending import curvature_change, max_curvature_change
 from hdopt.mechanics.contact import contact_angle, mean_flank_pressure
 from hdopt.mechanics.tooth_path import Mesh
 
@@ -97,3 +98,11 @@ def test_bending_agrees_with_the_physics(profile):
     mesh = Mesh(CSF_25_80, PROFILES[profile])
     # The physics takes the largest of 0.025 deg steps, the mesh of 1 deg steps with a parabola between.
     assert mesh.largest_curvature_change == pytest.approx(max_curvature_change(CSF_25_80, PROFILES[profile]), rel=1e-5)
+
+
+def test_the_end_of_the_wrap_is_looked_at_itself():
+    """The third derivative jumps there, between places of the grid: the largest change of a small wrap lies on it."""
+    wrap = math.radians(9.95)
+    profile = TwoDisk(30.65, 0.396, wrap)
+    at_its_end = abs(float(curvature_change(CSF_25_80, profile, wrap)))
+    assert Mesh(CSF_25_80, profile).largest_curvature_change == pytest.approx(at_its_end, rel=1e-5)

@@ -41,6 +41,14 @@ def test_life_follows_torque_and_speed_as_the_makers_say(torque, speed, hours):
     assert 5 * life == pytest.approx(hours)
 
 
+def test_friction_makes_a_wedge_press_harder():
+    """A tooth pushed into its space: (2 T/d) tan(alpha + rho), rho = arctan(mu), and the ring's force beside it."""
+    tangential = 2 * 63_000.0 / (CSF_25_80.module * CSF_25_80.flexspline_teeth)
+    expected = tangential * math.tan(CSF_25_80.pressure_angle + math.atan(0.07)) + 40.0
+    assert bearing_load(CSF_25_80, 63_000.0, 0.07, 40.0) == pytest.approx(expected)
+    assert bearing_load(CSF_25_80, 63_000.0, 0.0, 0.0) == pytest.approx(radial_force(CSF_25_80, 63_000.0))
+
+
 def test_width_and_pressure_angle_as_assumed():
     """ISO 281's Z^(2/3) Dw^1.8 with Z ~ 1/Dw: twice the width, 2^(3 * 17/15) the life."""
     rated = bearing_load(CSF_25_80, 63_000.0, 0.07, 0.0)
