@@ -1,12 +1,15 @@
-"""How far from the major axis the flanks can carry: what a small pressure angle costs.
+"""How far from the major axis the flanks can carry, and whether they jam: what a small pressure angle costs.
 
 A flexspline tooth leaves its space along a path that the deflection prescribes, not the flank: it withdraws by
 d = w(0) - w(psi) while it shifts sideways by t = m psi - integral of w. (With w = kappa m cos 2 psi and
 theta = 2 psi this is the rack approximation that strain-wave tooth forms are designed with, x = m (theta - kappa sin
-theta)/2, y = kappa m cos theta: Musser, US patent 2,906,143, 1959; Ishikawa, US patent 4,823,638, 1989.) A straight
-flank of pressure angle alpha follows only while t <= d tan(alpha) + half the backlash. Beyond that angle the tip must
-be relieved, and a relieved tooth carries nothing. Where w0 exceeds m, the tooth first moves back, t < 0, and the
-trailing flank needs room: that limits the deflection, the more the smaller the pressure angle.
+theta)/2, y = kappa m cos theta: Musser, US patent 2,906,143, 1959; Ishikawa, US patent 4,823,638, 1989.) A flank of
+pressure angle alpha follows only while t <= d tan(alpha) + half the backlash. Beyond that angle the tip must be
+relieved, and a relieved tooth carries nothing.
+
+The rack leaves the tooth's lean out (`tooth_gap`). A straight flank would touch with its tip long before; tooth forms
+are corrected for it, by what `tip_relief` says. The trailing flank is not relieved: its room is that of the exact
+motion, gap by gap. Where w0 exceeds m, the tooth first moves back, and that room shrinks.
 """
 
 from __future__ import annotations
@@ -24,11 +27,24 @@ from hdopt.drive.profiles import WaveGeneratorProfile, polar_curvature
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.mechanics.bending import ring_wall
 from hdopt.mechanics.contact import contact_angle
+from hdopt.mechanics.tooth_gap import (
+    CELL,
+    LEADING,
+    NODES,
+    TRAILING,
+    Flanks,
+    Ring,
+    deflection_at,
+    gap_at,
+    largest_overlap,
+    least_trailing_gap,
+    ring_of,
+    straight_flanks,
+)
 
-GRID = np.linspace(0.0, math.pi / 2, 91)
+GRID = np.linspace(0.0, math.pi / 2, NODES)
 """Where a profile is sampled with two derivatives: quintics between 1 deg steps keep 1e-13 mm of smooth profiles, and
 3e-9 mm where the two-disk profile's third derivative jumps."""
-CELL = float(GRID[1])
 NEWTON_STEPS = 12
 
 
@@ -51,8 +67,39 @@ class Mesh:
 
     def path(self, psi: float) -> tuple[float, float]:
         """Withdrawal d and sideways shift t of a flexspline tooth at `psi` rad from the major axis, mm."""
-        w, _, integral = _at(self._sampled, psi)
+        w, _, integral = deflection_at(self._sampled, psi)
         return self._sampled[0, 0] - w, self.geometry.module * psi - integral
+
+    @cached_property
+    def ring(self) -> Ring:
+        """The deformed ring, half a wall outside the profile. Raises `MissingValue` where the geometry has no wall."""
+        gear = self.geometry
+        neutral = gear.flexspline_inner_radius + ring_wall(gear) / 2
+        return ring_of(self._sampled, neutral, gear.flexspline_teeth / gear.circular_spline_teeth)
+
+    def flanks(self, pressure_angle: float, backlash: float) -> Flanks:
+        """Straight flanks of `pressure_angle` (rad) with half of the `backlash` (mm) on either side of a tooth on the
+        major axis; tooth and space are half a pitch wide at the pitch line."""
+        gear = self.geometry
+        if gear.flexspline_addendum is None or gear.circular_spline_addendum is None:
+            raise MissingValue("the flanks", "drive.flexspline_addendum_mm", "drive.circular_spline_addendum_mm")
+        pitch_radius = gear.module * gear.flexspline_teeth / 2
+        heights = (
+            pitch_radius - self.ring.neutral,
+            gear.flexspline_addendum,
+            pitch_radius + self._sampled[0, 0],
+            gear.module * gear.circular_spline_teeth / 2 - gear.circular_spline_addendum,
+        )
+        half = math.pi * gear.module / 4
+        return straight_flanks(heights, (half, half + backlash / 2), math.tan(pressure_angle))
+
+    def gaps(self, phi: Array, pressure_angle: float, backlash: float) -> tuple[Array, Array]:
+        """Gaps (mm) of the leading and of the trailing flanks of teeth at `phi` (rad from the major axis, up to pi/2),
+        same shape each; infinite where tooth and space share no height. `pressure_angle` and `backlash` as in
+        `flanks`."""
+        ring, flanks = self.ring, self.flanks(pressure_angle, backlash)
+        leading, trailing = (np.array([gap_at(ring, flanks, at, side) for at in phi]) for side in (LEADING, TRAILING))
+        return leading, trailing
 
     @cached_property
     def _clearance(self) -> float:
@@ -72,19 +119,22 @@ class Mesh:
     def free_flank_angle(self, pressure_angle: float, backlash: float) -> float:
         """Largest angle psi (rad) up to which the leading straight flank runs free: t <= d tan(alpha) + backlash/2.
 
-        pi/2 where it always does. Rack approximation: the tooth's own rotation and the curvature of the pitch lines
-        are left out, which is right to the order of the module over the radius.
+        pi/2 where it always does. Rack approximation: a flank that is corrected for the tooth's lean, see `tip_relief`.
         """
         if backlash < 0:
             raise HdoptError(f"the backlash is {backlash:g} mm; it must not be negative")
         return _free_angle(self._sampled, self.geometry.module, math.tan(pressure_angle), backlash / 2)
 
-    def trailing_flank_room(self, pressure_angle: float, backlash: float) -> float:
-        """Least room of the trailing flank on a tooth's way out, mm: the least of backlash/2 + d tan(alpha) + t.
+    def tip_relief(self, pressure_angle: float, backlash: float) -> float:
+        """By how much (mm) a straight flank of `pressure_angle` (rad) overlaps its space at most on the way to the
+        carrying angle, by the exact motion: what the tooth form must be corrected by. `backlash` in mm."""
+        to = self.carrying_angle(pressure_angle, backlash)
+        return float(largest_overlap(self.ring, self.flanks(pressure_angle, backlash), to))
 
-        Below zero the flanks jam near the major axis. It is half the backlash where w0 does not exceed the module.
-        """
-        return backlash / 2 + _least_trailing(self._sampled, self.geometry.module, math.tan(pressure_angle))
+    def trailing_flank_room(self, pressure_angle: float, backlash: float) -> float:
+        """Least gap (mm) of the trailing straight flank of `pressure_angle` (rad) on a tooth's way out, with the
+        `backlash` in mm. Below zero the flanks jam near the major axis. It is at most half the backlash."""
+        return float(least_trailing_gap(self.ring, self.flanks(pressure_angle, backlash)))
 
     def carrying_angle(self, pressure_angle: float, backlash: float) -> float:
         """Half angle over which flanks can carry, rad: overlapped tips whose flanks run free."""
@@ -92,7 +142,7 @@ class Mesh:
 
     def summed_depth(self, angle: float) -> float:
         """Depth of engagement summed over the teeth up to `angle` on the approaching flank of both zones, mm."""
-        overlap = _at(self._sampled, angle)[2] - angle * self._clearance
+        overlap = deflection_at(self._sampled, angle)[2] - angle * self._clearance
         return 2 * self.geometry.circular_spline_teeth / (2 * math.pi) * overlap
 
     def flank_pressure(self, torque: float, face_width: float, angle: float) -> float:
@@ -133,23 +183,6 @@ def _integrate(rows: Array) -> None:
 
 
 @njit(cache=True)
-def _at(rows: Array, psi: float) -> tuple[float, float, float]:
-    """w, w' and the integral of w at an angle: the quintic that takes w, w', w'' at both ends of the cell."""
-    h = CELL
-    i = min(max(int(psi / h), 0), rows.shape[1] - 2)
-    x = psi / h - i
-    a0, a1, a2 = rows[0, i], rows[1, i] * h, rows[2, i] * h * h / 2
-    value = rows[0, i + 1] - (a0 + a1 + a2)
-    slope = rows[1, i + 1] * h - (a1 + 2 * a2)
-    bend = rows[2, i + 1] * h * h / 2 - a2
-    a3, a4, a5 = 10 * value - 4 * slope + bend, -15 * value + 7 * slope - 2 * bend, 6 * value - 3 * slope + bend
-    w = a0 + x * (a1 + x * (a2 + x * (a3 + x * (a4 + x * a5))))
-    w1 = (a1 + x * (2 * a2 + x * (3 * a3 + x * (4 * a4 + x * 5 * a5)))) / h
-    integral = x * (a0 + x * (a1 / 2 + x * (a2 / 3 + x * (a3 / 4 + x * (a4 / 5 + x * a5 / 6)))))
-    return w, w1, rows[3, i] + h * integral
-
-
-@njit(cache=True)
 def _falls_to(rows: Array, level: float) -> float:
     """Angle at which w first falls to `level`; NaN where it starts below, or never gets there."""
     if rows[0, 0] <= level:
@@ -159,7 +192,7 @@ def _falls_to(rows: Array, level: float) -> float:
             low, high = (i - 1) * CELL, i * CELL
             psi = (low + high) / 2
             for _ in range(NEWTON_STEPS):
-                w, slope, _integral = _at(rows, psi)
+                w, slope, _integral = deflection_at(rows, psi)
                 if slope == 0.0:
                     break
                 psi = min(max(psi - (w - level) / slope, low), high)
@@ -176,7 +209,7 @@ def _free_angle(rows: Array, module: float, tan_alpha: float, play: float) -> fl
             low, high = (i - 1) * CELL, i * CELL
             psi = (low + high) / 2
             for _ in range(NEWTON_STEPS):
-                w, slope, integral = _at(rows, psi)
+                w, slope, integral = deflection_at(rows, psi)
                 room = play + (rows[0, 0] - w) * tan_alpha - (module * psi - integral)
                 change = -slope * tan_alpha - (module - w)
                 if change == 0.0:
@@ -184,30 +217,6 @@ def _free_angle(rows: Array, module: float, tan_alpha: float, play: float) -> fl
                 psi = min(max(psi - room / change, low), high)
             return psi
     return math.pi / 2
-
-
-@njit(cache=True)
-def _least_trailing(rows: Array, module: float, tan_alpha: float) -> float:
-    """Least of d tan(alpha) + t; 0 at the major axis itself."""
-    least, at = 0.0, 0
-    for i in range(1, rows.shape[1]):
-        room = (rows[0, 0] - rows[0, i]) * tan_alpha + module * i * CELL - rows[3, i]
-        if room < least:
-            least, at = room, i
-    low, high = max(at - 1, 0) * CELL, (at + 1) * CELL
-    if at == 0:
-        # The least may still lie within the first cell, where the tooth moves back before its depth opens.
-        high = CELL
-    for _ in range(50):
-        psi = (low + high) / 2
-        w, slope, _integral = _at(rows, psi)
-        if -slope * tan_alpha + module - w < 0:
-            low = psi
-        else:
-            high = psi
-    w, slope, integral = _at(rows, high)
-    last: float = (rows[0, 0] - w) * tan_alpha + module * high - integral
-    return min(least, last)
 
 
 @njit(cache=True)

@@ -345,6 +345,13 @@ def trailing_flank_room(trade: DesignConditions, design: Design) -> float:
     return design.mesh.trailing_flank_room(design.drive.geometry.pressure_angle, backlash)
 
 
+def tip_relief(trade: DesignConditions, design: Design) -> float:
+    """What the straight flanks of `design` must be relieved by for the tooth's lean under the backlash of `trade`, um
+    (`Mesh.tip_relief`)."""
+    backlash = trade.needed("backlash", "the relief of the tips")
+    return 1000 * design.mesh.tip_relief(design.drive.geometry.pressure_angle, backlash)
+
+
 def largest_radial_force(trade: DesignConditions, design: Design) -> float:
     """`radial_force` on the wave generator of `design` under the torque of `trade`, N."""
     return radial_force(design.drive.geometry, trade.needed("torque", "the radial force"))
@@ -410,6 +417,7 @@ QUANTITIES: dict[str, Quantity] = {
     "carrying_angle_deg": Scalar("Carrying angle", "deg", lambda t, d: math.degrees(carrying_angle(t, d)), False),
     "carrying_teeth": Scalar("Carrying teeth of one zone", "", carrying_teeth, False),
     "trailing_flank_room_mm": Scalar("Room of the trailing flank", "mm", trailing_flank_room, False),
+    "tip_relief_um": Scalar("Tip relief for the tooth's lean", "um", tip_relief),
     "radial_force_n": Scalar("Radial force", "N", largest_radial_force),
     "axial_force_n": Scalar("Axial force", "N", largest_axial_force),
     "bearing_life_h": Scalar("WG bearing life L10", "h", life, False),

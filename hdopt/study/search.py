@@ -165,6 +165,6 @@ DEFAULT_LIMITS = {
     "bearing_life_h": LimitSection(min_of_baseline=1.0),
     "bending_safety": LimitSection(min=1.5),
     "carrying_teeth": LimitSection(min_of_baseline=1.0),
-    "trailing_flank_room_mm": LimitSection(min_of_baseline=0.5),
+    "trailing_flank_room_mm": LimitSection(min=0.0),
 }
 """Carries no less than the study's own drive, bends safely and does not jam; where a study does not say."""

@@ -80,9 +80,9 @@ def test_every_constant_has_a_source_and_is_perturbed(result):
 
 
 def test_more_of_what_limits_never_helps(result):
-    """Half a trailing-flank room more costs error; an easier limit cannot."""
+    """A fifth more of the bearing's life costs error; an easier limit cannot."""
     made = {item.constant: item for item in perturb(result.setup, result, (1.2,), 1)}
-    assert made["Limit: Room of the trailing flank"].objective > result.chosen.objective
+    assert made["Limit: WG bearing life L10"].objective > result.chosen.objective
     assert made["Endurance limit"].objective <= result.chosen.objective * (1 + 1e-4)
 
 
