@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from hdopt.workflow.kinematic_error import profile as profile
     from hdopt.workflow.new_study import NewStudy as NewStudy
     from hdopt.workflow.new_study import new_study as new_study
+    from hdopt.workflow.peak_to_peak import peak_to_peak as peak_to_peak
     from hdopt.workflow.recorded_drive import RecordedDrive as RecordedDrive
     from hdopt.workflow.recorded_drive import recorded_drive as recorded_drive
     from hdopt.workflow.run import RunResult as RunResult
@@ -113,6 +114,7 @@ _EXPORTS: dict[str, str] = {
     "profile": "hdopt.workflow.kinematic_error",
     "NewStudy": "hdopt.workflow.new_study",
     "new_study": "hdopt.workflow.new_study",
+    "peak_to_peak": "hdopt.workflow.peak_to_peak",
     "RecordedDrive": "hdopt.workflow.recorded_drive",
     "recorded_drive": "hdopt.workflow.recorded_drive",
     "RunResult": "hdopt.workflow.run",

@@ -9,13 +9,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import hdopt
-from hdopt.kinematics.peak_to_peak import peak_to_peak_arcmin
 
 study = hdopt.load_study("csf-25-80")
 rng = np.random.default_rng(0)
 drives = study.errors.with_(
     axis_eccentricity=rng.rayleigh(0.005, 1000), axis_eccentricity_direction=rng.uniform(0, 2 * np.pi, 1000)
 )
-plt.hist(peak_to_peak_arcmin(study.drive, drives), bins=40)
+plt.hist(hdopt.peak_to_peak(study, drives), bins=40)
 plt.xlabel("peak-to-peak, arcmin")
 plt.ylabel("drives")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
@@ -14,6 +15,7 @@ from hdopt.tolerance.intervals import IntervalEstimate
 
 if TYPE_CHECKING:
     import pandas as pd
+    import plotly.graph_objects as go
 
 
 @dataclass(frozen=True)
@@ -131,6 +133,16 @@ class AllocateResult:
         ]
         columns = ["error", "unit", "present tolerance", "tolerance", "grade", "present cost", "cost"]
         return pd.DataFrame(rows, columns=columns).set_index("error")
+
+    def plot(self) -> go.Figure:
+        """Each tolerance as a share of the present one."""
+        import plotly.graph_objects as go
+
+        shares = [row.tolerance / row.present if row.present else math.nan for row in self.errors.values()]
+        bars = go.Bar(y=list(self.errors), x=shares, orientation="h")
+        title = f"{self.study}: cost {self.total_cost:.4g}, now {self.present_cost:.4g}"
+        layout = {"title": title, "xaxis_title": "tolerance over the present one", "yaxis_title": "error"}
+        return go.Figure(bars, layout).add_vline(1.0, line_dash="dash")
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet: tolerances, the rules side by side, cost over the limit."""

@@ -11,6 +11,7 @@ from hdopt.optimize.solve import Solution
 
 if TYPE_CHECKING:
     import pandas as pd
+    import plotly.graph_objects as go
 
 
 @dataclass(frozen=True)
@@ -115,6 +116,20 @@ class SearchResult:
     def to_frame(self) -> pd.DataFrame:
         """The front as a table; the best design of each combination where no front was traced."""
         return _designs(self.front or self.combinations)
+
+    def plot(self) -> go.Figure:
+        """The front between the two objectives, or the best of each combination where none was traced."""
+        import plotly.graph_objects as go
+
+        designs = [d for d in self.front or self.combinations if self.objective in d.quantities]
+        second = self.second or self.objective
+        points = go.Scatter(
+            x=[d.quantities[self.objective] for d in designs],
+            y=[d.quantities.get(second) for d in designs],
+            text=[d.name for d in designs],
+            mode="markers",
+        )
+        return go.Figure(points, {"title": self.study, "xaxis_title": self.objective, "yaxis_title": second})
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet: the front if any, the best design and the present one, the best of each

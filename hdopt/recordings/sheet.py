@@ -14,6 +14,7 @@ from hdopt.recordings.stiffness import Torsion
 
 if TYPE_CHECKING:
     import pandas as pd
+    import plotly.graph_objects as go
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,14 @@ class Inspection:
         rows += [(f"order_{line.symbol}", line.amplitude_arcmin, "arcmin") for line in self.orders]
         return pd.DataFrame(rows, columns=["figure", "value", "unit"])
 
+    def plot(self) -> go.Figure:
+        """The amplitude of every order."""
+        import plotly.graph_objects as go
+
+        bars = go.Bar(x=[line.symbol for line in self.orders], y=[line.amplitude_arcmin for line in self.orders])
+        title = ", ".join(self.names)
+        return go.Figure(bars, {"title": title, "xaxis_title": "order", "yaxis_title": "amplitude, arcmin"})
+
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet: figures, orders, limits, checks."""
         import pandas as pd
@@ -206,6 +215,15 @@ class Batch:
         import pandas as pd
 
         return pd.DataFrame([vars(drive) for drive in self.drives])
+
+    def plot(self) -> go.Figure:
+        """The peak-to-peak of every drive, with the limit."""
+        import plotly.graph_objects as go
+
+        read = [drive for drive in self.drives if not drive.error]
+        points = go.Scatter(x=[d.name for d in read], y=[d.peak_to_peak for d in read], mode="markers")
+        figure = go.Figure(points, {"xaxis_title": "drive", "yaxis_title": "peak-to-peak, arcmin"})
+        return figure if self.limit is None else figure.add_hline(self.limit, line_dash="dash")
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet: the drives, and Ppk where there is one."""

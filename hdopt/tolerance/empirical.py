@@ -59,7 +59,7 @@ class SortedValues:
 
     def histogram(self, bins: int) -> tuple[Array, Array]:
         edges = np.linspace(self.values[0], self.values[-1], bins + 1)
-        return edges, np.diff(np.searchsorted(self.values, edges), append=0)[:bins]
+        return edges, np.histogram(self.values, edges)[0]
 
     def joined(self, others: Sequence[SortedValues]) -> SortedValues:
         return SortedValues(np.sort(np.concatenate([self.values, *(part.values for part in others)]), kind="stable"))

@@ -14,6 +14,7 @@ from hdopt.tolerance.worst_case import WorstCase
 
 if TYPE_CHECKING:
     import pandas as pd
+    import plotly.graph_objects as go
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,17 @@ class StackResult:
     def to_frame(self) -> pd.DataFrame:
         """One row a figure, with its interval."""
         return self.stack.to_frame()
+
+    def plot(self) -> go.Figure:
+        """The distribution of the drives, with the limit."""
+        import plotly.graph_objects as go
+
+        stack = self.stack
+        edges, counts = stack.histogram
+        bars = go.Bar(x=(edges[1:] + edges[:-1]) / 2, y=counts, width=edges[1:] - edges[:-1], name="drives")
+        title = f"{self.study}: {100 * stack.conforming.value:.4g} % within {stack.limit:g} {stack.unit}"
+        figure = go.Figure(bars, {"title": title, "xaxis_title": f"response, {stack.unit}", "yaxis_title": "drives"})
+        return figure.add_vline(stack.limit, line_dash="dash", annotation_text="limit")
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet: figures with intervals, contributions; tail and worst case where asked for."""
@@ -90,6 +102,22 @@ class SobolResult:
         table = self.sobol or self.shapley
         assert table is not None, "a result holds indices, effects, or both"
         return table.to_frame()
+
+    def plot(self) -> go.Figure:
+        """First-order and total index of every input, or its Shapley effect, with intervals."""
+        import plotly.graph_objects as go
+
+        table = self.to_frame()
+        measures = {"Shapley effect": ("low", "high")}
+        if self.sobol is not None:
+            table = table[table["kind"] == "input"]
+            measures = {"S1": ("S1 low", "S1 high"), "ST": ("ST low", "ST high")}
+        bars = []
+        for name, (low, high) in measures.items():
+            value = table[name]
+            ends = {"type": "data", "array": table[high] - value, "arrayminus": value - table[low]}
+            bars.append(go.Bar(y=table.index, x=value, error_x=ends, orientation="h", name=name))
+        return go.Figure(bars, {"title": self.study, "xaxis_title": "share of the variance", "yaxis_title": "input"})
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet: indices, those of pairs, Shapley effects, as far as there are any."""

@@ -24,6 +24,7 @@ from hdopt.tolerance.space import InputSpace
 
 if TYPE_CHECKING:
     import pandas as pd
+    import plotly.graph_objects as go
 
 
 EDGE = 1e-3
@@ -85,6 +86,16 @@ class Screening:
         import pandas as pd
 
         return pd.DataFrame.from_dict(self.inputs, orient="index").rename_axis("name")
+
+    def plot(self) -> go.Figure:
+        """The method's first measure of every input."""
+        import plotly.graph_objects as go
+
+        table = self.to_frame()
+        measure = str(table.columns[0])
+        bars = go.Bar(y=table.index, x=table[measure], orientation="h")
+        title = f"{self.study}: {self.method}"
+        return go.Figure(bars, {"title": title, "xaxis_title": measure, "yaxis_title": "input"})
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet."""

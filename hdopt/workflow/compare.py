@@ -22,6 +22,7 @@ from hdopt.workflow.output_files import Files, checked_files, write_table_files
 
 if TYPE_CHECKING:
     import pandas as pd
+    import plotly.graph_objects as go
 
 Surface = Literal["cam", "bearing"]
 FILES = ("csv", "xlsx", "plot", "study")
@@ -79,6 +80,16 @@ class CompareResult:
         import pandas as pd
 
         return pd.DataFrame(table_of(self.fit))
+
+    def plot(self) -> go.Figure:
+        """The deviation of every point over the angle, with the profile's zone."""
+        import plotly.graph_objects as go
+
+        table = self.to_frame()
+        points = go.Scatter(x=table["angle_deg"], y=table["deviation_um"], mode="lines")
+        layout = {"title": self.study, "xaxis_title": "angle, deg", "yaxis_title": "deviation, um"}
+        figure = go.Figure(points, layout)
+        return figure.add_hline(500 * self.zone, line_dash="dash").add_hline(-500 * self.zone, line_dash="dash")
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet."""

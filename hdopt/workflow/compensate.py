@@ -25,6 +25,7 @@ from hdopt.workflow.waveform_fit import WaveformFit, fit_rows
 
 if TYPE_CHECKING:
     import pandas as pd
+    import plotly.graph_objects as go
 
 Found = Harmonics | Surface
 
@@ -119,6 +120,14 @@ class Compensated:
         rows = [(part.name, part.speed_rpm, part.before, part.after) for part in self.recordings]
         columns = ["recording", "speed_rpm", "before_arcmin", "after_arcmin"]
         return pd.DataFrame(rows, columns=columns)
+
+    def plot(self) -> go.Figure:
+        """Held-out peak-to-peak of every recording, without and with the compensation."""
+        import plotly.graph_objects as go
+
+        table = self.to_frame()
+        bars = [go.Bar(x=table["recording"], y=table[f"{when}_arcmin"], name=when) for when in ("before", "after")]
+        return go.Figure(bars, {"xaxis_title": "recording", "yaxis_title": "held-out peak-to-peak, arcmin"})
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet: recordings, directions, the methods that were tried."""

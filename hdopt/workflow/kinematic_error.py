@@ -7,6 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar  # Any: values of JSON
 
+import numpy as np
+
+from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.drive.profiles import perimeter_error, tip_radius_of_curvature
@@ -27,6 +30,7 @@ from hdopt.workflow.waveform import WaveformResult, converged_extremes_arcmin, h
 
 if TYPE_CHECKING:
     import pandas as pd
+    import plotly.graph_objects as go
 
 T = TypeVar("T")
 
@@ -65,9 +69,24 @@ class KinematicErrorResult:
     """By spline, what is known of teeth measured one by one; their deviation is the mean over the teeth in contact."""
     measured_roundness: Mapping[str, object] | None = None
     """What is known of a circular spline whose roundness was measured."""
+    theta: Array = field(default_factory=lambda: np.empty(0), compare=False, repr=False)
+    """Input angles of one relative turn, rad, shape (n,)."""
+    waveform_arcmin: Array = field(default_factory=lambda: np.empty(0), compare=False, repr=False)
+    """The error there, arcmin, shape (n,): of a single tooth pair, in the first direction of the motion."""
 
     def to_dict(self) -> dict[str, Any]:
-        return asdict(self)
+        """JSON-ready: every field but the waveform."""
+        values = asdict(self)
+        return {key: value for key, value in values.items() if key not in ("theta", "waveform_arcmin")}
+
+    def plot(self) -> go.Figure:
+        """The waveform over one relative turn."""
+        import plotly.graph_objects as go
+
+        turns = self.theta / (2 * math.pi)
+        line = go.Scattergl(x=turns, y=self.waveform_arcmin, mode="lines", line={"width": 1}, name=self.study)
+        layout = {"xaxis_title": "input turns", "yaxis_title": "kinematic error, arcmin"}
+        return go.Figure(line, {"title": f"{self.study}: {self.peak_to_peak_arcmin:.4g} arcmin peak to peak", **layout})
 
     def to_frame(self) -> pd.DataFrame:
         """The order table."""
@@ -80,7 +99,7 @@ class KinematicErrorResult:
         import pandas as pd
 
         lag = {f"lag_{key}_arcmin": self.lag_arcmin[key] for key in ("mean", "min", "max")} if self.lag_arcmin else {}
-        tables = {"orders": self.to_frame(), "figures": figures({**asdict(self), **lag})}
+        tables = {"orders": self.to_frame(), "figures": figures({**self.to_dict(), **lag})}
         return tables | ({"effects": pd.DataFrame(self.effects)} if self.effects else {})
 
 
@@ -196,6 +215,8 @@ def kinematic_error(
         base_peak_to_peak_arcmin=base,
         effects=effects,
         measured_teeth=_measured(drive),
+        theta=shown.theta,
+        waveform_arcmin=shown.waveform,
         measured_roundness=_roundness(drive),
     )
 
