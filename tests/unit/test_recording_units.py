@@ -41,3 +41,10 @@ def test_twenty_degrees_in_every_unit_of_temperature(name, reading):
     assert name in CHANNEL_UNITS["temperature"] and len(CHANNEL_UNITS["temperature"]) == 3
     unit = parse_unit("temperature", name)
     assert reading * unit.factor + unit.offset == pytest.approx(20.0, abs=1e-9)
+
+
+def test_counts_and_a_gear_before_the_encoder():
+    """16384 counts are a turn of the encoder, which turns three times as fast as the shaft."""
+    assert parse_unit("input", "counts/16384").factor * 16384 == pytest.approx(2 * pi)
+    assert parse_unit("output", "counts/16384/gear3").factor * 16384 == pytest.approx(2 * pi / 3)
+    assert parse_unit("input", "deg/gear0.5").factor == pytest.approx(pi / 90)

@@ -1,0 +1,329 @@
+"""What is computed of a recording, number by number, against hand computation or another library."""
+
+from dataclasses import replace
+from math import exp, log, pi, radians, sqrt
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from hdopt.errors import HdoptError
+from hdopt.recordings import figures
+from hdopt.recordings.capability import gauge, outliers, performance
+from hdopt.recordings.channels import mapped_channels, sensor_uncertainty_arcmin
+from hdopt.recordings.clocks import on_one_clock, seconds_of
+from hdopt.recordings.columns import Column
+from hdopt.recordings.decision import decide, parse_limits
+from hdopt.recordings.orders import model_orders, order_spectrum
+from hdopt.recordings.passes import find_passes, synchronous_average
+from hdopt.recordings.ratio import measured_scale
+from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.recording import Recording
+from hdopt.recordings.repairs import Checks, unwrap_counter
+from hdopt.recordings.rows import gather
+from hdopt.recordings.stiffness import torsion_of
+from hdopt.recordings.table import Channel, Table
+
+TURN, ARCMIN, RATIO, RATE = 2 * pi, pi / 10800, 80.0, 360
+
+
+def there_and_back(turns=4, passes=2, rate=RATE):
+    there = np.arange(turns * rate) * TURN / rate
+    return np.concatenate([there if k % 2 == 0 else there[::-1] for k in range(passes)])
+
+
+def recording(error, theta=None, **more):
+    theta = there_and_back() if theta is None else theta
+    return Recording("record", RATIO, theta, np.asarray(error, float), **{"time": 0.01 * np.arange(len(theta)), **more})
+
+
+# reading
+
+
+def read(column, values):
+    table = Table({"out": Channel(np.asarray(values, float)), "in": Channel(np.zeros(len(values)))}, ())
+    columns = {"input": Column("in", "rad"), "output": column}
+    return mapped_channels(table, columns, False, "record").values["output"]
+
+
+def test_sign_unit_and_calibration():
+    """deg to rad, turned round; a reading is freed of its deviation, 36 arcsec at 90 deg and none at 0 and 180."""
+    assert read(Column("out", "deg", -1.0), [10.0, 20.0]) == pytest.approx([-radians(10), -radians(20)])
+    calibrated = Column("out", "deg", 1.0, ((0.0, 0.0), (90.0, 36.0), (180.0, 0.0)))
+    off = np.array([0.0, 36.0, 18.0, 0.0]) / 3600
+    assert read(calibrated, [0.0, 90.0, 135.0, 270.0]) == pytest.approx(np.radians([0.0, 90.0, 135.0, 270.0] - off))
+
+
+def test_encoders_add_as_independent_at_the_output():
+    """240 arcsec at the input are 3 at the output of N = 80; with 4 there, 5 arcsec."""
+    columns = {"input": Column("a", "deg", uncertainty_arcsec=240.0), "output": Column("b", uncertainty_arcsec=4.0)}
+    assert sensor_uncertainty_arcmin(columns, RATIO) == pytest.approx(5 / 60)
+
+
+def test_times_of_day_pass_midnight():
+    found, _ = seconds_of(np.array(["23:59:58.5", "23:59:59.5", "00:00:00.5", "00:00:01.5"], object), "time")
+    assert np.diff(found) == pytest.approx(1.0)
+
+
+def clocked(step_in, step_out, span=10.0):
+    t_in, t_out = np.arange(0, span, step_in), np.arange(0, span, step_out)
+    channels = {"input": Channel(t_in, time_s=t_in), "output": Channel(t_out, time_s=t_out)}
+    return channels, {"input": 3.0 * t_in, "output": 2.0 * t_out}
+
+
+def test_channels_meet_on_the_clock_of_the_slower_angle():
+    for steps in ((0.01, 0.03), (0.03, 0.01)):
+        values, said = on_one_clock(*clocked(*steps))
+        assert np.diff(values["time"]) == pytest.approx(0.03)
+        assert values["input"] / 3.0 == pytest.approx(values["time"])
+        assert values["output"] / 2.0 == pytest.approx(values["time"])
+        assert "interpolated" in said[0]
+
+
+def test_a_pause_is_not_bridged():
+    """The faster channel rests from 4 to 6 s: no row of the slower clock lies between."""
+    channels, values = clocked(0.01, 0.03)
+    moving = (channels["input"].time_s < 4) | (channels["input"].time_s > 6)
+    time = channels["input"].time_s[moving]
+    channels["input"] = Channel(time, time_s=time)
+    found, _ = on_one_clock(channels, {**values, "input": 3.0 * time})
+    assert not np.any((found["time"] > 4.01) & (found["time"] < 5.99))
+
+
+@pytest.mark.parametrize("off", [1.02, 0.97])
+def test_the_ratio_that_the_angles_show(off):
+    theta = np.linspace(0, 20 * TURN, 4000)
+    output = theta / (RATIO * off) + 2 * ARCMIN * np.sin(2 * theta)
+    found = measured_scale(Checks({"input": theta, "output": output}, RATIO, "record"))
+    assert found.ratio == pytest.approx(RATIO * off, rel=1e-3)
+    assert found.slope == pytest.approx(1 / off, rel=1e-3)
+    # The drive's own wave, 2 arcmin to either side, bends the line by 4 arcmin times N over 20 turns at most.
+    assert found.uncertainty == pytest.approx(4 * ARCMIN * RATIO / (20 * TURN), rel=0.05)
+
+
+def test_a_ratio_two_per_cent_off_is_refused():
+    theta = np.degrees(np.linspace(0, 20 * TURN, 4000))
+    table = pd.DataFrame({"input_angle_deg": theta, "output_angle_deg": theta / (RATIO * 1.02)})
+    with pytest.raises(HdoptError, match=r"moves as for a ratio of 81\.6"):
+        recording_from_table(table, RATIO)
+
+
+def test_the_input_encoders_step_counts_at_the_output():
+    """1 deg steps of the input: 60/80 = 0.75 arcmin at the output, more than the output encoder's 0.1."""
+    theta = np.linspace(0, 3 * 360, 12_000)
+    table = pd.DataFrame({"input_angle_deg": np.floor(theta), "output_angle_deg": np.round(theta / RATIO * 600) / 600})
+    assert recording_from_table(table, RATIO).quantum_arcmin == pytest.approx(0.75, rel=1e-6)
+
+
+def test_a_counter_of_four_turns_is_counted_on():
+    """Both ways over its end."""
+    theta = np.concatenate([np.linspace(0, 18 * TURN, 4000), np.linspace(18 * TURN, 3 * TURN, 3000)])
+    checks = Checks({"input": np.mod(theta, 4 * TURN)}, RATIO, "record")
+    unwrap_counter(checks, "input", checks.channels["input"])
+    assert checks.channels["input"] == pytest.approx(theta)
+    assert "runs over after 4 turns" in checks.warnings[0]
+
+
+# passes and rows
+
+
+def test_travel_counts_from_each_reversal():
+    theta = there_and_back(3, 4)
+    found = find_passes(theta + np.random.default_rng(0).normal(0, 1e-3, len(theta)))
+    assert found.count == 4
+    turns = np.array_split(np.arange(len(theta)), 4)
+    for number, rows in enumerate(turns):
+        inner = rows[5:-5]
+        assert set(found.direction[inner]) == {1.0 if number % 2 == 0 else -1.0}
+        assert found.since_reversal[inner] == pytest.approx(np.abs(theta[inner] - theta[rows[0]]), abs=0.05)
+        assert set(found.first[inner]) == {number == 0}
+
+
+def test_rows_are_means_with_their_conditions():
+    theta = there_and_back(10, 2, rate=300)
+    error = 0.5 * np.sin(theta)
+    made = recording(error, theta)
+    rows = gather([made], 4)
+    for row in (10, 700, 800, 1400):
+        members = np.flatnonzero(np.abs(np.arange(len(theta)) // 4 - row) < 1)
+        assert rows.theta[row] == pytest.approx(theta[members].mean())
+        assert rows.error[row] == pytest.approx(error[members].mean())
+        assert rows.output[row] == pytest.approx((theta / RATIO - error * ARCMIN)[members].mean())
+        speed = (1.0 if row < 750 else -1.0) * TURN / 300 / 0.01
+        assert rows.speed[row] == pytest.approx(speed, rel=1e-6)
+        assert rows.direction[row] == np.sign(speed)
+    ends = theta[len(theta) // 2 - 1]
+    assert rows.travel[800] == pytest.approx(np.degrees(abs(rows.theta[800] - ends)) / RATIO, abs=0.02)
+
+
+def test_rows_end_at_a_reversal_and_weigh_by_their_samples():
+    """1001 samples there: the last row of the pass has one of four, and a quarter of the weight."""
+    there = np.arange(1001) * TURN / 100
+    theta = np.r_[there, there[-2::-1]]
+    rows = gather([recording(np.zeros(len(theta)), theta)], 4)
+    last = np.flatnonzero(np.diff(rows.direction))[0]
+    assert rows.weight[last] == pytest.approx(0.25)
+    assert np.median(rows.weight) == 1.0
+
+
+def test_speed_does_not_reach_over_a_gap():
+    theta = np.arange(800) * TURN / 100
+    time = 0.01 * np.arange(800) + np.where(np.arange(800) >= 400, 50.0, 0.0)
+    segment = (np.arange(800) >= 400).astype(np.int64)
+    rows = gather([recording(np.zeros(800), theta, time=time, segment=segment)])
+    assert rows.speed == pytest.approx(TURN)
+
+
+def test_synchronous_average_has_the_error_of_its_means():
+    rng = np.random.default_rng(0)
+    angle = rng.uniform(0, 200, 40_000)
+    values = np.cos(angle) + rng.normal(0, 0.5, 40_000)
+    centre, mean, error = synchronous_average(angle, values, TURN, 36)
+    count = np.bincount((np.mod(angle, TURN) / TURN * 36).astype(int))
+    # A cell of 10 deg flattens a cosine by 0.1 %, and adds its own slope to the scatter.
+    assert np.abs(mean - np.cos(centre)).max() < 5 * 0.5 / sqrt(count.min())
+    assert error == pytest.approx(0.5 / np.sqrt(count), rel=0.1)
+
+
+# orders
+
+
+def test_amplitude_and_phase_of_a_cosine():
+    theta = np.linspace(0, 300, 5000)
+    signal = 0.7 + 0.3 * np.cos(2.0 * theta - 0.6) + 0.1 * np.cos(3.1 * theta + 1.0)
+    found = order_spectrum(theta, signal, [2.0, 3.1])
+    assert found.amplitudes == pytest.approx([0.3, 0.1], abs=1e-9)
+    assert found.phases == pytest.approx([0.6, -1.0], abs=1e-9)
+    assert found.mean == pytest.approx(0.7)
+
+
+def test_model_orders_are_what_their_symbols_say():
+    n = 80.0
+    values = {one.symbol: one.order for one in model_orders(n)}
+    assert values["1/N"] == 1 / n and values["2(1+1/N)"] == 2 * (1 + 1 / n) and values["2/N"] == 2 / n
+    assert values["2(1+1/2N)"] == pytest.approx(2 * (1 + 1 / (2 * n)))
+    assert values["4(1+1/4N)"] == pytest.approx(4 * (1 + 1 / (4 * n)))
+    assert values["4(1+1/2N)"] == pytest.approx(4 * (1 + 1 / (2 * n)))
+    assert values["1-1/N"] == 1 - 1 / n and values["3+1/N"] == 3 + 1 / n
+
+
+# figures and decisions
+
+
+@pytest.mark.parametrize(
+    ("value", "verdict"), [(0.83, "met"), (0.84, "not decidable"), (1.16, "not decidable"), (1.17, "missed")]
+)
+def test_a_guard_band_on_both_sides_of_the_limit(value, verdict):
+    """ISO 14253-1: 1.645 standard uncertainties of 0.1 about a limit of 1."""
+    assert decide("rms", value, 0.1, 1.0).verdict == verdict
+    assert decide("rms", -value, 0.1, 1.0).verdict == verdict
+
+
+def test_limits_in_their_units():
+    assert parse_limits("rms=30arcsec,slope=2,one_turn=0.01deg") == pytest.approx(
+        {"rms": 0.5, "slope": 2.0, "one_turn": 0.6}
+    )
+
+
+NOISE = np.random.default_rng(3).normal(0, 0.02, 8 * RATE)
+
+
+def cells(error, theta=None):
+    return figures.cells_of(recording(error, theta))
+
+
+def test_noise_of_one_sample():
+    error = 0.3 * np.sin(2 * there_and_back()) + NOISE
+    assert figures.neighbour_noise(error) == pytest.approx(0.02, rel=0.05)
+
+
+WAY = np.r_[np.ones(4 * RATE), -np.ones(4 * RATE)]
+
+
+def test_play_is_return_error_and_no_part_of_the_rest():
+    """Half an arcmin forward above backward, on 0.6 arcmin peak to peak of the drive's own."""
+    own = 0.3 * np.sin(2 * there_and_back())
+    found = cells(own + 0.25 * WAY)
+    back = figures.return_error(found)
+    assert back.median == pytest.approx(0.5, abs=0.01)
+    assert figures.directional_peak_to_peak(found) == pytest.approx(0.6, abs=0.01)
+    assert figures.rms(found) == pytest.approx(0.3 / sqrt(2), rel=0.01)
+
+
+def test_steepest_slope_by_degree():
+    """0.3 sin(2 theta) rises by 0.6 arcmin a radian; a line over 10 deg is 0.5 % less steep."""
+    slope, _ = figures.steepest_slope(cells(0.3 * np.sin(2 * there_and_back())))
+    assert slope == pytest.approx(0.6 * pi / 180, rel=0.02)
+
+
+def test_repeatability_is_that_of_one_pass():
+    """Two passes there, of independent noise: their difference has twice its variance."""
+    theta = there_and_back(4, 4)
+    noise = np.random.default_rng(5).normal(0, 0.05, len(theta))
+    found = cells(0.3 * np.sin(2 * theta) + noise, theta)
+    per_cell = RATE / round(TURN / found.width)
+    assert figures.repeatability([found]) == pytest.approx(0.05 / sqrt(per_cell), rel=0.08)
+
+
+def test_drift_is_the_slope_beside_the_play():
+    """The record ends in the direction in which it did not begin: play must not be taken for drift."""
+    along = np.linspace(0, 1, 8 * RATE)
+    assert figures.drift(cells(0.8 * along + 0.25 * WAY)) == pytest.approx(0.8, rel=0.02)
+
+
+def test_skew_is_told_from_play_by_two_speeds():
+    theta = np.concatenate([there_and_back(2, 2, 400), there_and_back(2, 2, 200)])
+    time = np.arange(len(theta)) * 0.005
+    speed = np.gradient(theta, time)
+    way = np.sign(speed)
+    made = recording(0.003 * speed / RATIO / ARCMIN + 0.3 * way, theta, time=time)
+    delay, _ = figures.skew_s(made)
+    assert delay == pytest.approx(0.003, rel=0.02)
+
+
+def sweep(friction=0.2):
+    """Three lines of 20, 40 and 60 kNm/rad with knees at 8 and 20 Nm, 0.4 arcmin apart in both directions."""
+    torque = 30 * np.sin(np.linspace(0, 6 * pi, 6000))
+    size = np.abs(torque)
+    windup = np.minimum(size, 8) / 20e3 + np.clip(size - 8, 0, 12) / 40e3 + np.maximum(size - 20, 0) / 60e3
+    way = np.sign(np.gradient(torque))
+    error = np.sign(torque) * windup / ARCMIN + friction * way * (1 + size / 30)
+    return recording(error, np.zeros(6000), torque=torque)
+
+
+def test_stiffness_knees_and_loss_of_a_known_sweep():
+    found = torsion_of(sweep())
+    assert found.stiffness == pytest.approx((20e3, 40e3, 60e3), rel=0.03)
+    assert found.knees == pytest.approx((8.0, 20.0), rel=0.05)
+    assert found.hysteresis_loss_arcmin == pytest.approx(0.4, rel=0.05)
+
+
+def test_performance_is_that_of_the_fitted_log_normal():
+    """(U - X50)/(X99.865 - X50) of scipy's distribution; the same interval from the same seed."""
+    values = np.exp(np.random.default_rng(1).normal(log(0.8), 0.2, 30))
+    fitted = stats.lognorm(np.std(np.log(values), ddof=1), scale=exp(np.mean(np.log(values))))
+    expected = (2.0 - fitted.median()) / (fitted.ppf(stats.norm.cdf(3)) - fitted.median())
+    found = performance(values, 2.0)
+    assert found.ppk == pytest.approx(expected, rel=1e-9)
+    assert found == performance(values, 2.0) != performance(values, 2.0, seed=2)
+    assert found.low < found.ppk < found.high
+
+
+def test_outliers_are_far_from_the_median():
+    """A modified z-score of 3.5 is 5.2 median deviations of the logarithm."""
+    values = np.exp(np.array([-2.0, -1.0, -1.0, -1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 5.1, 5.3]) * 0.1)
+    assert outliers(values) == [10]
+
+
+def test_mountings_scatter_beyond_their_repeats():
+    """Random effects of a one-way analysis of variance, by hand for three mountings of four."""
+    groups = np.array([[1.0, 1.2, 0.9, 1.1], [2.0, 2.1, 1.9, 2.2], [1.5, 1.4, 1.6, 1.3]])
+    within = groups.var(axis=1, ddof=1).mean()
+    between = 4 * groups.mean(axis=1).var(ddof=1)
+    found = gauge(groups.ravel(), np.repeat(["a", "b", "c"], 4))
+    assert found.repeatability == pytest.approx(sqrt(within))
+    assert found.reproducibility == pytest.approx(sqrt((between - within) / 4))
+    alike = gauge(np.tile([1.0, 1.2, 0.9, 1.1], 3), np.repeat(["a", "b", "c"], 4))
+    assert alike.reproducibility == 0.0
+    assert replace(found, repeats=3).total == found.total
