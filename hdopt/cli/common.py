@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar  # Any: values of JSON; what the command's other options give
 
 import click
+from click.shell_completion import CompletionItem
 
 from hdopt.files import HasTables, claim_output, to_csv, to_json, write_tables, write_text
 
@@ -89,7 +90,17 @@ set_option = click.option(
     "--set", "overrides", metavar="KEY=VALUE", multiple=True, help="Change a key of the study; may be repeated."
 )
 drive_option = click.option("--drive", metavar="NAME", help="A shipped drive, by name.")
-study_argument = click.argument("study", required=False, metavar="[STUDY]")
+
+
+def _studies(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """What the shell offers for STUDY: shipped names, else files."""
+    from hdopt.study import shipped_studies
+
+    names = [CompletionItem(name) for name in shipped_studies() if name.startswith(incomplete)]
+    return names or [CompletionItem(incomplete, type="file")]
+
+
+study_argument = click.argument("study", required=False, metavar="[STUDY]", shell_complete=_studies)
 check_option = click.option(
     "--check",
     is_flag=True,

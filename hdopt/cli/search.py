@@ -3,32 +3,55 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import StudyOptions, answer_options, emit, engine_option, study_options, table_options
+from hdopt.cli.common import OutputFile, StudyOptions, emit, status, study_options, table_options, work_options
+
+if TYPE_CHECKING:
+    from hdopt.optimize.records import SearchResult
 
 
 @click.command()
 @table_options
 @study_options
 @click.option("--fronts/--no-fronts", default=True, help="Also trace the fronts between the two objectives.")
-@engine_option
-@answer_options
-def command(asked: StudyOptions, fronts: bool, json_file: Path | None, seed: int) -> int:
+@click.option(
+    "--write-study", "study_file", metavar="FILE", type=OutputFile(), help="Write the best design as a study (TOML)."
+)
+@work_options
+def command(asked: StudyOptions, fronts: bool, study_file: Path | None, json_file: Path | None, seed: int) -> int:
     """Which design: profile, structure, pressure angle, width, module and deflection; and what they cost.
 
     STUDY is a study file or a shipped study; its [search] section says what may vary. Ctrl-C ends with the best so far.
     Exit status 1 where no design meets all limits.
     """
-    from hdopt.optimize.summary import result_lines
-    from hdopt.workflow.search import search
+    from hdopt.workflow.requirement import of_search
+    from hdopt.workflow.search import search, write_search
 
-    result = search(asked.load(), seed, _stages() if sys.stderr.isatty() else lambda stage: None, fronts)
-    emit(result.to_dict(), json_file, result_lines(result), tables=result)
-    return 0 if result.feasible else 1
+    loaded = asked.load()
+    result = search(loaded, seed, _stages() if sys.stderr.isatty() else lambda stage: None, fronts)
+    verdict = of_search(loaded, result)
+    try:
+        write_search(result, {"study": study_file} if study_file else {}, loaded)
+    finally:
+        emit(result.to_dict(), json_file, _lines(result, study_file), verdict, tables=result)
+    return status(result.feasible, verdict)
+
+
+def _lines(result: SearchResult, study_file: Path | None) -> Iterator[str]:
+    from hdopt.optimize.summary import result_lines
+
+    yield from result_lines(result)
+    if study_file is not None:
+        yield (
+            f"  wrote {study_file}"
+            if result.feasible
+            else f"  not written, as no design keeps the limits: {study_file}"
+        )
 
 
 def _stages() -> Callable[[str], None]:

@@ -49,7 +49,7 @@ def result_lines(result: SearchResult) -> Iterator[str]:
             yield f"    {price_line(price)}"
     yield "  combinations"
     for design in sorted(result.combinations, key=lambda d: (not d.feasible, d.quantities[result.objective])):
-        state = "" if design.feasible else "  breaks a limit"
+        state = "" if design.feasible else f"  breaks {'; '.join(design.broken_limits) or 'a limit'}"
         yield f"    {design.name:28s} {design.quantities[result.objective]:9.4f}{state}"
     for front in result.fronts:
         yield (

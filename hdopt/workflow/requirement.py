@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 if TYPE_CHECKING:
     from hdopt.allocation.results import AllocateResult
+    from hdopt.optimize.records import SearchResult
     from hdopt.study import Study
     from hdopt.study.tolerances import RequirementSection
     from hdopt.tolerance.results import StackResult
@@ -108,6 +109,23 @@ def of_stack(result: StackResult) -> Verdict:
 def of_allocation(result: AllocateResult) -> Verdict:
     """The verified yield in the `result` of an allocation against the one required."""
     return Verdict("verified yield", result.verified_yield.value, result.required_yield, at_least=True)
+
+
+def of_search(study: Study, result: SearchResult) -> Verdict | None:
+    """The best design in the `result` of a search of `study` against [requirement], in the quantity that was searched
+    for; None where the study has none, where that is no peak-to-peak, or is of another share of drives."""
+    section = _requirement(study)
+    if section is None or section.homogenization == "contact":
+        return None
+    quantile = "quantile" in result.objective
+    if quantile and result.setup.settings.quantile != section.required_yield:
+        return None
+    key = result.objective if quantile else "peak_to_peak_arcmin"
+    if key not in result.best.quantities:
+        return None
+    what = f"peak-to-peak of {100 * section.required_yield:g} % of drives" if quantile else "peak-to-peak"
+    value = result.best.quantities[key]
+    return Verdict(f"{what}, best design", value, section.peak_to_peak_arcmin, "arcmin")
 
 
 def of_run(study: Study, found: Mapping[str, Mapping[str, Any]]) -> Verdict | None:

@@ -2,24 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
+
+from hdopt.files import write_text
 from hdopt.optimize.fronts import Progress
 from hdopt.optimize.records import SearchResult
 from hdopt.optimize.search import search_designs
 from hdopt.study import AnyStudy, Study, as_study
+from hdopt.workflow.output_files import Files, checked_files, write_table_files
 from hdopt.workflow.search_setup import setup_of
+from hdopt.workflow.write_design import chosen_study_toml
+
+FILES = ("csv", "xlsx", "study")
 
 
 def search(
-    study: AnyStudy = None, seed: int = 1, progress: Progress = lambda stage: None, fronts: bool = True
+    study: AnyStudy = None,
+    seed: int = 1,
+    progress: Progress = lambda stage: None,
+    fronts: bool = True,
+    files: Files | None = None,
 ) -> SearchResult:
     """Search a study's designs for the best, and for fronts between its two objectives.
 
     `study` is a study, its name or its path; `seed` that of what is done at random; `progress` is told what comes
     next; without `fronts` only the best design is looked for. An interrupt (Ctrl-C) ends it with the best so far.
+    `files` to write: {"study": PATH} the chosen design as a study, {"csv": PATH} or {"xlsx": PATH} the tables. Raises
+    `HdoptError` before any work where a file cannot be written.
     """
-    study = as_study(study)
+    study, wanted = as_study(study), checked_files(files, FILES)
     setup = setup_of(study, seed)
-    return search_designs(setup, seed, progress, fronts=fronts, study=study.name, notes=_notes(study))
+    result = search_designs(setup, seed, progress, fronts=fronts, study=study.name, notes=_notes(study))
+    write_search(result, wanted, study)
+    return result
+
+
+def write_search(result: SearchResult, files: Mapping[str, Path], study: Study) -> None:
+    """Write of the `result` of a search of `study` what `files` asks for ("csv", "xlsx", "study" -> path).
+
+    The study of the chosen design stays out where no design keeps the limits. Raises `HdoptError` where a file cannot
+    be written.
+    """
+    write_table_files(result, files)
+    if "study" in files and result.feasible:
+        write_text(files["study"], chosen_study_toml(study, result, files["study"].parent))
 
 
 def _notes(study: Study) -> tuple[str, ...]:

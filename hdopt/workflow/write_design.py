@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
 from hdopt.drive.profiles import TwoDisk
@@ -30,9 +31,9 @@ DECIMALS = 6
 """Of lengths in mm and angles in deg: a nanometre."""
 
 
-def chosen_study_toml(study: Study, result: SearchResult) -> str:
+def chosen_study_toml(study: Study, result: SearchResult, folder: Path | None = None) -> str:
     """Text of a study file with the drive and wave generator that `result` chose; all else as in the searched
-    `study`."""
+    `study`. Files that it names are relative to the `folder` it will lie in; absolute where None."""
     drive = result.setup.space.design(result.chosen.combination, result.chosen.values).drive
     gear, generator = drive.geometry, drive.wave_generator
     if not isinstance(gear.flexspline_teeth, int):
@@ -57,10 +58,10 @@ def chosen_study_toml(study: Study, result: SearchResult) -> str:
     sections = {name: _rounded(content) for name, content in sections.items()}
     kept = {name: study.data[name] for name in KEPT if name in study.data}
     head = (
-        f"Chosen by `hdopt run {study.name}` from {len(result.solutions)} combinations of profile and structure.",
+        f"Chosen by a search of {study.name} from {len(result.solutions)} combinations of profile and structure.",
         f"{result.best.name}: {result.best.quantities[result.objective]:.4f} arcmin ({result.objective}).",
     )
-    return study_toml(sections | with_moved_paths(kept, study.folder), head)
+    return study_toml(sections | with_moved_paths(kept, study.folder, folder), head)
 
 
 def _rounded(content: Mapping[str, Any]) -> dict[str, Any]:

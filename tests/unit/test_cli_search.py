@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+import hdopt
 from hdopt.cli import main
 
 SMALL = ("--set", 'search.profiles=["ellipse"]', "--set", 'search.structures=["automatic"]')
@@ -52,3 +53,32 @@ def test_unusable_input_is_status_2_with_the_place(capsys):
     assert out == ""
     assert "search.profiles" in err
     assert "Traceback" not in err
+
+
+def test_the_best_design_is_judged_and_written(capsys, tmp_path):
+    """Would catch a verdict on another number than the best design's, and a study that is not the one chosen."""
+    file = tmp_path / "chosen.toml"
+    status, out, _ = run(capsys, "csf-25-80", *SMALL, "--no-fronts", "--write-study", str(file), "--json",
+                         str(tmp_path / "found.json"))  # fmt: skip
+    found = json.loads((tmp_path / "found.json").read_text())
+    assert status == 0
+    assert out.splitlines()[-1].startswith("requirement met: peak-to-peak, best design 0.")
+    value = found["requirement"]["value"]
+    assert value == found["best"]["quantities"]["peak_to_peak_arcmin"]
+    # written to a nanometre and read back; the kernel's closed form against the exact geometry
+    assert hdopt.kinematic_error(file).peak_to_peak_arcmin == pytest.approx(value, abs=1e-3)
+    missed = "requirement.peak_to_peak_arcmin=0.1"
+    status, out, _ = run(capsys, "csf-25-80", *SMALL, "--no-fronts", "--set", missed, "--check")
+    assert status == 1 and "requirement missed" in out
+
+
+def test_the_broken_limits_of_every_combination_are_named(capsys, tmp_path):
+    limits = "search.limits={peak_to_peak_arcmin={max=0.05}}"
+    file = tmp_path / "chosen.toml"
+    objective = ("--set", 'search.objective="width_mm"')
+    status, out, _ = run(
+        capsys, "csf-25-80", *SMALL, "--no-fronts", "--set", limits, *objective, "--write-study", str(file)
+    )
+    assert status == 1 and not file.exists()
+    assert "breaks Peak-to-peak at most 0.05 arcmin" in out
+    assert "not written, as no design keeps the limits" in out

@@ -50,7 +50,7 @@ OTHERWISE = {
     | {"each": "inspect_many", "serial": "label", "conditions": "label", "check": "result.missed"},
     "compensate": OF_RECORDINGS | {"output": "files", "form": "files"},
     "diagnose": OF_RECORDINGS | dict.fromkeys(("report_file", "study_file"), "files"),
-    "search": OF_A_STUDY,
+    "search": OF_A_STUDY | {"study_file": "files"},
     "export": OF_A_STUDY
     | {f"file_{kind}": "files" for kind in FORMATS}
     | {"context": "study.with_(context=...)", "allocation": "tolerances", "seed": "nothing is random"},
