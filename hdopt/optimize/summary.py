@@ -19,8 +19,9 @@ NOT_MODELLED = (
 
 
 def number(value: float, unit: str = "") -> str:
-    """A `value` to four digits with its `unit`."""
-    return f"{value:.4g} {unit}".strip()
+    """A `value` to four digits with its `unit`; a large one written out: '35000 h'."""
+    digits = f"{value:.4g}" if abs(value) < 10_000 else f"{value:.0f}"
+    return f"{digits} {unit}".strip()
 
 
 def price_line(price: Mapping[str, Any]) -> str:

@@ -55,7 +55,7 @@ def _map(result: SearchResult) -> DesignMap:
     both = [(chosen.values.get(name, baseline[name]), baseline[name]) for name in ("pressure_angle_deg", "width_mm")]
     angles, widths = (np.linspace(0.75 * min(pair), 1.15 * max(pair), MAP_POINTS) for pair in both)
     quantity = find_quantity(ROBUST if result.objective == ROBUST else NOMINAL)
-    shown = [limit for key in MAPPED for limit in setup.limits() if limit.quantity == key][:3]
+    shown = [limit for key in MAPPED for limit in setup.limits() if limit.quantity == key]
     values = np.empty((len(angles), len(widths)))
     limited = [np.empty_like(values) for _ in shown]
     for i, angle in enumerate(angles):

@@ -37,7 +37,7 @@ class Figure:
 @dataclass(frozen=True)
 class Table:
     """A table, also written as `key`.csv beside the report unless `in_file` is False. `formats` maps a column to a
-    format spec such as '.3f'."""
+    format spec such as '.3f', or to one of those that `hdopt.report.cells` names."""
 
     key: str
     title: str

@@ -49,14 +49,38 @@ class Column:
         """Whether its words are better kept on one line."""
         return max((len(cell) for cell in (self.name, *self.cells)), default=0) <= 22
 
+    @property
+    def long(self) -> bool:
+        """Whether it holds sentences, which need some width to be read."""
+        return max((len(cell) for cell in self.cells), default=0) > 60
+
+
+EACH = "each"
+"""Instead of a format spec: four significant digits for each number by itself, where a column mixes quantities."""
+NAMES = "names"
+"""Instead of a format spec: the column holds study keys, which are written in words."""
+
 
 def columns(frame: pd.DataFrame, formats: Mapping[str, str] | None = None) -> list[Column]:
     """The columns of `frame` as they are read, its index first where that has a meaning; `formats` maps a column's name
-    to a format spec such as '.3f', the others show four significant digits."""
+    to a format spec such as '.3f', `EACH` or `NAMES`; the others show four significant digits, aligned."""
     if index_has_meaning(frame):
         frame = frame.reset_index()
     formats = formats or {}
     return [_column(str(name), frame.iloc[:, i].tolist(), formats.get(name)) for i, name in enumerate(frame.columns)]
+
+
+def in_words(name: str) -> str:
+    """The study key or callout `name` in words: 'wg_tilt_major_deg' reads 'WG tilt major'."""
+    words = name.removesuffix("_mm").removesuffix("_deg").split("_")
+    words = [word.upper() if word in ("wg", "cs", "fs") else word for word in words]
+    text = " ".join(words)
+    return text[:1].upper() + text[1:]
+
+
+def significant(value: float) -> str:
+    """`value` in four significant digits, and a large number written out: '0.6437', '11871'."""
+    return f"{value:.{SIGNIFICANT_DIGITS}g}" if abs(value) < 10**SIGNIFICANT_DIGITS - 0.5 else f"{value:.0f}"
 
 
 def index_has_meaning(frame: pd.DataFrame) -> bool:
@@ -97,7 +121,7 @@ def _cell(value: Any, write: Callable[[Any], str]) -> str:
         return "yes" if value else "no"
     if _is_number(value):
         return minus(_without_sign_of_zero(write(value)))
-    return str(value)
+    return in_words(str(value)) if write is in_words else str(value)
 
 
 def _is_number(value: Any) -> bool:
@@ -119,6 +143,10 @@ def _without_sign_of_zero(text: str) -> str:
 
 
 def _formatter(spec: str) -> Callable[[Any], str]:
+    if spec == EACH:
+        return significant
+    if spec == NAMES:
+        return in_words
     return lambda value: format(value, spec)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any  # Any: results of steps, JSON-ready
 
 from hdopt.report import Ruling, Section
-from hdopt.report.sections.tolerances import readable
+from hdopt.report.cells import in_words
 from hdopt.report.sections.verdict import verdict_section
 from hdopt.report.sections.words import in_sentence, label, listed
 from hdopt.workflow.requirement import Verdict
@@ -65,7 +65,7 @@ def _of_stack(found: Found) -> list[str]:
         "the limit: [[stack-distribution]]."
     ]
     shares = sorted(stack.get("contributions", {}).items(), key=lambda item: -item[1])
-    most = [f"{in_sentence(readable(name))} ({100 * share:.0f} %)" for name, share in shares[:3] if share > 0.01]
+    most = [f"{in_sentence(in_words(name))} ({100 * share:.0f} %)" for name, share in shares[:3] if share > 0.01]
     if most:
         says.append(f"Most of the spread comes from {listed(most)}: [[stack-contributions]].")
     return says

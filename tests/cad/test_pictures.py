@@ -120,12 +120,14 @@ def test_machine_without_opengl_is_told_what_to_install(monkeypatch, tmp_path):
 
 
 def test_report_section_shows_drawing_parts_and_tolerances(tmp_path):
-    from hdopt.report import Picture, Table
+    from hdopt.report import Download, Picture, Table
 
     target = tmp_path / "wave.svg"
     result = export_drive(drive(), {"svg": target}, bounds=BOUNDS)
-    section = geometry_section(result, target.read_text(encoding="utf-8"))
+    section = geometry_section(result, {"svg": target.read_text(encoding="utf-8")})
     pictures = [item for item in section.items if isinstance(item, Picture)]
+    (whole,) = (item for item in section.items if isinstance(item, Download))
+    assert (whole.content, whole.opens) == (target.read_text(encoding="utf-8"), True)
     tables = {item.key: item.frame for item in section.items if isinstance(item, Table)}
     # The page has tables of its own; the drawing in it keeps the views.
     views = ElementTree.fromstring(pictures[0].content)

@@ -14,7 +14,7 @@ import pytest
 
 from hdopt.errors import HdoptError
 from hdopt.report import Download, Figure, KeyFigures, Points, Report, Ruling, Section, Table, Text, theme
-from hdopt.report.cells import columns, heading
+from hdopt.report.cells import EACH, columns, heading
 from hdopt.report.html import ROWS_SHOWN, render, write_report
 from hdopt.report.numbers import figure_frame
 
@@ -179,6 +179,17 @@ def test_a_format_given_is_used_and_an_index_with_a_name_is_shown():
     error, value = columns(frame, {"value_mm": ".4f"})
     assert (error.name, error.cells) == ("error", ("e1",))
     assert (value.name, value.unit, value.cells) == ("value", "mm", ("0.0012",))
+
+
+def test_a_column_of_several_quantities_shows_four_digits_of_each():
+    frame = pd.DataFrame({"value": [0.643658, 11871.34, -2.5, 9999.96, 1e-5]})
+    (column,) = columns(frame, {"value": EACH})
+    assert column.cells == ("0.6437", "11871", "−2.5", "10000", "1e-05")
+
+
+def test_sentences_in_a_table_get_some_width():
+    long, short = columns(pd.DataFrame({"source": ["word " * 20], "kind": ["at most"]}))
+    assert long.long and not short.long
 
 
 def test_a_grid_gives_one_row_a_cell():

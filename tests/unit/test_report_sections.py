@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
 
-from hdopt.report import Figure, KeyFigures, Section, Table
+from hdopt.optimize.objectives import NOMINAL
+from hdopt.optimize.problem import Limit as optimize_limit
+from hdopt.report import Figure, KeyFigures, Section, Table, theme
 from hdopt.report.numbers import figure_frame
-from hdopt.report.sections.design_map import Design, pressure_angle_width_section
+from hdopt.report.sections import search
+from hdopt.report.sections.design_map import Design, Limit, pressure_angle_width_section
 from hdopt.report.sections.lag import lag_section
 from hdopt.report.sections.orders import spectrum_section
 from hdopt.report.sections.profiles import profiles_section
@@ -83,6 +88,27 @@ def test_the_map_marks_the_design_and_the_requirement_only_where_it_lies_on_it()
         assert figure.data[-1].x == (9.0,)
         assert figure.data[-1].y == (12.0,)
         assert np.array_equal(figure.data[0].z, values)
+
+
+@pytest.mark.parametrize("at_least", [False, True])
+def test_a_map_shades_the_broken_side_of_every_limit_and_names_those_without_a_line(at_least):
+    angle, width = np.array([8.0, 12.0, 16.0]), np.array([5.0, 9.0])
+    values = angle[:, None] * width / 100
+    crossing = [Limit(f"crossing {i}", values, 0.5 + 0.1 * i, at_least) for i in range(5)]
+    kept = Limit("kept", values, 0.1 if at_least else 9.0, at_least)
+    lost = Limit("lost", values, 9.0 if at_least else 0.1, at_least)
+    limits = [*crossing, kept, lost]
+    section = pressure_angle_width_section(angle, width, values, Design("mine", 9.0, 12.0), limits=limits)
+    shown = item(section, "design-map-figure")
+    drawn = [trace for trace in shown.figure.data if trace.showlegend and trace.type == "contour"]
+    assert [trace.name for trace in drawn] == [*(limit.name for limit in crossing), "lost"]
+    # Plotly shades where the constraint does not hold.
+    assert {trace.contours.operation for trace in drawn} == {">=" if at_least else "<="}
+    assert [trace.contours.value for trace in drawn[:5]] == [limit.limit for limit in crossing]
+    assert len({trace.line.color for trace in drawn}) == 6
+    assert "The shaded side of a line breaks its limit." in shown.caption
+    assert "Kept all over this map, so without a line: kept." in shown.caption
+    assert "Broken all over this map: lost." in shown.caption
 
 
 def test_the_tornado_puts_the_strongest_on_top_and_bars_end_at_the_values():
@@ -171,3 +197,44 @@ def test_a_full_turn_whose_end_is_left_out_counts_whole():
     carpet = np.asarray(item(section, "waveform-carpet").figure.data[0].z)
     assert carpet.shape == (80, 181)
     assert np.allclose(carpet[-1], carpet[0], atol=1e-3)  # linear interpolation between points 4 deg apart
+
+
+def some_designs(count: int, first: float = 0.0) -> list[SimpleNamespace]:
+    return [SimpleNamespace(quantities={NOMINAL: first + i, "flank_pressure_mpa": 9.0 - i}) for i in range(count)]
+
+
+def test_a_front_draws_the_combinations_nearest_to_it_and_says_how_many_are_left_out():
+    curves = {f"combination {i}": some_designs(3, first=float(9 - i)) for i in range(9)}
+    front = SimpleNamespace(objective=NOMINAL, second="flank_pressure_mpa", by_combination=curves)
+    drawn = search._nearest(front)
+    assert [designs[0].quantities[NOMINAL] for designs in drawn] == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    assert "Of 9 combinations the 6 with the least error have a curve" in search._left_out(front)
+    few = SimpleNamespace(objective=NOMINAL, second="flank_pressure_mpa", by_combination={"one": some_designs(3)})
+    assert search._left_out(few) == ""
+
+
+@pytest.mark.parametrize("count", [3, 60, 61, 500])
+def test_parallel_coordinates_are_thinned_evenly_and_keep_both_ends(count):
+    designs = some_designs(count)
+    kept = [design.quantities[NOMINAL] for design in search._thinned(designs[::-1], NOMINAL)]
+    assert len(kept) == min(count, search.LINES)
+    assert (kept[0], kept[-1]) == (0, count - 1)
+    assert len(set(kept)) == len(kept)
+    steps = np.diff(kept)
+    assert steps.max() - steps.min() <= 1
+
+
+@pytest.mark.parametrize("at_least", [False, True])
+def test_a_front_shades_the_side_on_which_its_limit_is_broken(at_least):
+    """A limit drawn on the wrong side would send a designer into the forbidden half."""
+    designs = some_designs(5)
+    front = SimpleNamespace(
+        objective=NOMINAL, second="flank_pressure_mpa", designs=designs, by_combination={"one": designs}
+    )
+    limit = optimize_limit("flank_pressure_mpa", 7.5, at_least)
+    result = SimpleNamespace(setup=SimpleNamespace(limits=lambda: (limit,)), baseline=designs[0], best=designs[1])
+    made = theme.figure("x", "y")
+    assert search._shade_limits(made, result, front) == " Shaded is where it is broken."
+    shade = next(shape for shape in made.layout.shapes if shape.type == "rect")
+    assert (shade.x0 < 7.5, shade.x1 > 7.5) == (at_least, not at_least)
+    assert 7.5 in (shade.x0, shade.x1)

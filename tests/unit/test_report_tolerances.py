@@ -3,8 +3,9 @@
 import pytest
 
 from hdopt.report import Figure, KeyFigures, Report, Table
+from hdopt.report.cells import columns, in_words
 from hdopt.report.html import write_report
-from hdopt.report.sections.tolerances import allocate_section, readable, sobol_section, stack_section
+from hdopt.report.sections.tolerances import allocate_section, sobol_section, stack_section
 from hdopt.workflow.allocate import allocate
 from hdopt.workflow.stack import sobol, stack
 
@@ -23,8 +24,8 @@ def sections():
 
 
 def test_names_in_words():
-    assert readable("wg_tilt_major_deg") == "WG tilt major"
-    assert readable("bore") == "Bore"
+    assert in_words("wg_tilt_major_deg") == "WG tilt major"
+    assert in_words("bore") == "Bore"
 
 
 def test_stack_shows_its_yield_and_every_contribution(sections):
@@ -37,6 +38,33 @@ def test_stack_shows_its_yield_and_every_contribution(sections):
     assert "do not keep" in sections["stack"].summary
     bars = of_kind(sections["stack"], Figure)["stack-distribution"].figure.data[0]
     assert sum(bars.y * bars.width) == pytest.approx(1)
+
+
+def test_the_page_says_names_in_words_and_the_file_the_keys(sections):
+    """And no more than four digits on the page, all of them in the file."""
+    table = of_kind(sections["stack"], Table)["stack-contributions-table"]
+    assert "wg_tilt_major_deg" in set(table.frame["input"])
+    (names, *_) = columns(table.frame, table.formats)
+    assert "WG tilt major" in names.cells and not any("_" in cell for cell in names.cells)
+    assert "little or no share of its own" in table.caption
+    figures = of_kind(sections["stack"], Table)["stack-figures"]
+    shown = next(column for column in columns(figures.frame, figures.formats) if column.name == "value")
+    assert all(len(cell.replace(".", "").lstrip("0")) <= 5 for cell in shown.cells)
+    assert not any("e" in cell for cell in shown.cells)
+
+
+def test_a_stack_without_directions_says_nothing_of_them():
+    section = stack_section(stack("chase-shaft-housing", n=2**12))
+    assert of_kind(section, Table)["stack-contributions-table"].caption == ""
+
+
+def test_the_log_axis_has_the_points_that_were_computed(sections):
+    axis = of_kind(sections["sobol"], Figure)["sobol-convergence"].figure.layout.xaxis
+    points = of_kind(sections["sobol"], Figure)["sobol-convergence"].figure.data[1].x
+    assert axis.type == "log"
+    assert set(axis.tickvals) <= set(points)
+    assert list(axis.ticktext) == [f"{value:.0f}" for value in axis.tickvals]
+    assert len(axis.tickvals) >= 2
 
 
 def test_sobol_shows_indices_pairs_and_shapley(sections):

@@ -2,29 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any  # Any: Plotly's dictionaries and traces, which have no types
 
 import numpy as np
 
-from hdopt.arrays import Array
+from hdopt.arrays import Array, Mask
 from hdopt.report import Figure, Section
-from hdopt.report.theme import GREEN, INK, PAPER, PURPLE, SEQUENTIAL, VERMILLION, figure
+from hdopt.report.sections.words import listed
+from hdopt.report.theme import GREEN, GREY, INK, ORANGE, PAPER, PURPLE, SEQUENTIAL, SKY, VERMILLION, faded, figure
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-LIMIT_COLOURS = (VERMILLION, GREEN, PURPLE)
+LIMIT_COLOURS = (VERMILLION, GREEN, PURPLE, ORANGE, GREY, SKY)
+BROKEN_OPACITY = 0.22
+"""Of the shade over the side of a limit on which it is broken."""
 
 
 @dataclass(frozen=True)
 class Limit:
-    """A line on the map: where `values`, on the map's grid, equal `limit`. `name` stands in the legend."""
+    """A line on the map: where `values`, on the map's grid, equal `limit`, which they may not exceed, or where
+    `at_least`, not fall below. `name` stands in the legend."""
 
     name: str
     values: Array
     limit: float
+    at_least: bool = False
+
+    @property
+    def broken(self) -> Mask:
+        """Where on the grid the limit is broken."""
+        return np.asarray(self.values < self.limit if self.at_least else self.values > self.limit)
 
 
 @dataclass(frozen=True)
@@ -50,10 +60,10 @@ def pressure_angle_width_section(
     shape (m, n).
 
     `design` is the drive in hand: x its width in mm, y its pressure angle in deg. `requirement_arcmin` becomes one
-    more line among `limits`, where it lies within the map's values. `key` names the section.
+    more line among `limits`. `key` names the section.
     """
     values = np.asarray(peak_to_peak_arcmin, float)
-    if requirement_arcmin is not None and values.min() < requirement_arcmin < values.max():
+    if requirement_arcmin is not None:
         limits = (Limit(f"required, {requirement_arcmin:g} arcmin", values, requirement_arcmin), *limits)
     made = design_map(
         width_mm, pressure_angle_deg, values, ("WG width [mm]", "Pressure angle [deg]", "arcmin"), [design], limits
@@ -66,7 +76,7 @@ def pressure_angle_width_section(
                 f"{key}-figure",
                 "Peak-to-peak error over pressure angle and width of the wave generator",
                 made,
-                "Dark is large. The point is the design; hover for values.",
+                f"Dark is large. The point is the design; hover for values. {words_on_limits(limits)}".strip(),
             ),
         ),
         f"Over the map the error runs from {values.min():.2f} to {values.max():.2f} arcmin: a smaller pressure angle "
@@ -120,19 +130,41 @@ def design_map(
         },
         line={"width": 0.8, "color": INK, "smoothing": 1},
     )
-    for colour, limit in zip(LIMIT_COLOURS, limits, strict=False):
+    _draw_limits(made, limits, silent)
+    _mark(made, designs)
+    made.update_xaxes(showgrid=False, range=[float(np.min(x)), float(np.max(x))])
+    made.update_yaxes(showgrid=False, range=[float(np.min(y)), float(np.max(y))])
+    return made
+
+
+def _draw_limits(made: go.Figure, limits: Sequence[Limit], silent: Mapping[str, Any]) -> None:
+    """Each of `limits` that is broken somewhere, as a line with the broken side shaded; `silent` has the grid."""
+    drawn = [limit for limit in limits if limit.broken.any()]
+    if len(drawn) > len(LIMIT_COLOURS):
+        raise ValueError(f"{len(drawn)} limits on a map that has colours for {len(LIMIT_COLOURS)}; show fewer")
+    for colour, limit in zip(LIMIT_COLOURS, drawn, strict=False):
+        # Plotly shades the side on which a constraint does not hold.
         made.add_contour(
             **silent,
             z=limit.values,
             showlegend=True,
             name=limit.name,
-            contours={"coloring": "none", "start": limit.limit, "end": limit.limit, "size": 1},
+            contours={"type": "constraint", "operation": ">=" if limit.at_least else "<=", "value": limit.limit},
+            fillcolor=faded(colour, BROKEN_OPACITY),
             line={"width": 3, "color": colour},
         )
-    _mark(made, designs)
-    made.update_xaxes(showgrid=False, range=[float(np.min(x)), float(np.max(x))])
-    made.update_yaxes(showgrid=False, range=[float(np.min(y)), float(np.max(y))])
-    return made
+
+
+def words_on_limits(limits: Sequence[Limit]) -> str:
+    """What a caption says of `limits`: which side is shaded, and which are kept, or broken, all over the map."""
+    says = ["The shaded side of a line breaks its limit."] if any(limit.broken.any() for limit in limits) else []
+    kept = [limit.name for limit in limits if not limit.broken.any()]
+    lost = [limit.name for limit in limits if limit.broken.all()]
+    if kept:
+        says.append(f"Kept all over this map, so without a line: {listed(kept)}.")
+    if lost:
+        says.append(f"Broken all over this map: {listed(lost)}.")
+    return " ".join(says)
 
 
 def _mark(made: go.Figure, designs: Sequence[Design]) -> None:

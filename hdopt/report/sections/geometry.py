@@ -7,17 +7,26 @@ from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 import pandas as pd
 
-from hdopt.report import Item, KeyFigures, Picture, Section, Table, Text
+from hdopt.report import Download, Item, KeyFigures, Picture, Section, Table, Text
 
 if TYPE_CHECKING:
     from hdopt.geometry.export import ExportResult
 
 
+FILES = {
+    "step": "The parts as solids (STEP).",
+    "dxf": "The profile for wire cutting (DXF).",
+    "svg": "The drawing at its own size, with every dimension: opens in a new tab.",
+}
+"""Files of an export that travel in the page, and what they are."""
+
+
 def geometry_section(
-    result: ExportResult, drawing_svg: str, picture_png: bytes | None = None, *, key: str = "geometry"
+    result: ExportResult, files: Mapping[str, str], picture_png: bytes | None = None, *, key: str = "geometry"
 ) -> Section:
-    """The section of an export that gave `result`: `drawing_svg` (text) and `picture_png` (bytes; None for no picture)
-    as the export wrote them. `key` begins the keys of its figures and tables."""
+    """The section of an export that gave `result`: the text of its `files` by format, "svg" the drawing, and
+    `picture_png` (bytes; None for no picture) as the export wrote them. `key` begins the keys of its figures and
+    tables."""
     from hdopt.geometry.drawing import views_alone
 
     values = result.to_dict()
@@ -30,10 +39,15 @@ def geometry_section(
         Picture(
             f"{key}-drawing",
             "Wave generator",
-            views_alone(drawing_svg),
+            views_alone(files["svg"]),
             "Front view, section through the major axis, parts pulled apart. Lengths in mm.",
         )
     )
+    items += [
+        Download(f"wave-generator.{kind}", files[kind], what, opens=kind == "svg")
+        for kind, what in FILES.items()
+        if kind in files
+    ]
     if picture_png is not None:
         items.append(Picture(f"{key}-picture", "Parts, pulled apart along the axis", picture_png))
     items += [_parts(key, made), _dimensions(key, result), *_assumptions(key, result)]
@@ -54,8 +68,7 @@ def _summary(values: Mapping[str, Any]) -> str:
 def _parts(key: str, made: Sequence[Mapping[str, Any]]) -> Table:
     rows = [(_words(part["name"]), part["volume_mm3"], *part["bounding_box_mm"]) for part in made]
     frame = pd.DataFrame(rows, columns=["part", "volume [mm³]", "x [mm]", "y [mm]", "z [mm]"])
-    formats = {"volume [mm³]": ".3f", "x [mm]": ".4f", "y [mm]": ".4f", "z [mm]": ".4f"}
-    return Table(f"{key}-parts", "Parts", frame, "Volume and extents as measured in the file.", formats)
+    return Table(f"{key}-parts", "Parts", frame, "Volume and extents as measured in the file.")
 
 
 def _dimensions(key: str, result: ExportResult) -> Table:

@@ -13,7 +13,7 @@ from hdopt.optimize.records import DesignRecord, Front, Perturbation, SearchResu
 from hdopt.optimize.summary import NOT_MODELLED, number
 from hdopt.optimize.views import DesignMap, Rings, TradeViews
 from hdopt.report import Figure, KeyFigures, Section, Table, Text
-from hdopt.report.sections.design_map import Design, design_map
+from hdopt.report.sections.design_map import Design, design_map, words_on_limits
 from hdopt.report.sections.design_map import Limit as MapLimit
 from hdopt.report.sections.profiles import profiles_section
 from hdopt.report.sections.words import in_sentence, label, listed
@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 
-DASHES = {"integral": "solid", "automatic": "solid", "one_way_major": "dash", "one_way_minor": "dot"}
-SYMBOLS = {"integral": "square", "automatic": "circle", "one_way_major": "triangle-up", "one_way_minor": "diamond"}
+DASHES = {"integral": "dash", "automatic": "solid", "one_way_major": "dashdot", "one_way_minor": "dot"}
 AXES = ("pressure_angle_deg", "width_mm", "module_mm", "deflection_ratio", "wrap_angle_deg")
 PARALLEL = (
     NOMINAL,
@@ -38,6 +37,10 @@ PARALLEL = (
 Axis = tuple[str, str, str, Callable[[DesignRecord], float | None]]
 """Of parallel coordinates: key, title, unit, and how to read it from a design."""
 
+CURVES = 6
+"""Combinations with a curve of their own in the figure of a front."""
+LINES = 60
+"""Designs with a line of their own in parallel coordinates."""
 CHANGED = 5e-4
 """A quantity that differs by less than this share is called unchanged."""
 
@@ -176,16 +179,15 @@ def front_section(result: SearchResult, front: Front) -> Section:
     x_quantity, y_quantity = find_quantity(front.second), find_quantity(front.objective)
     made = figure(_axis(x_quantity), _axis(y_quantity), height=520)
     profiles = list(dict.fromkeys(d.profile for designs in front.by_combination.values() for d in designs))
-    for designs in front.by_combination.values():
+    for designs in _nearest(front):
         first = designs[0]
         colour = PALETTE[profiles.index(first.profile)]
         made.add_scatter(
             x=[d.quantities[front.second] for d in designs],
             y=[d.quantities[front.objective] for d in designs],
-            mode="lines+markers",
+            mode="lines",
             name=name_of(first),
-            line={"color": colour, "width": 1, "dash": DASHES[first.structure]},
-            marker={"color": colour, "size": 6, "symbol": SYMBOLS[first.structure], "opacity": 0.75},
+            line={"color": colour, "width": 1.5, "dash": DASHES[first.structure]},
             text=[hover(d) for d in designs],
             hovertemplate="%{text}<extra></extra>",
         )
@@ -208,6 +210,7 @@ def front_section(result: SearchResult, front: Front) -> Section:
             text=[hover(design)],
             hovertemplate=f"{name}<br>%{{text}}<extra></extra>",
         )
+    bounds = _shade_limits(made, result, front)
     how = "under the tolerances" if front.objective == ROBUST else "for the errors of the study"
     return Section(
         key,
@@ -218,12 +221,56 @@ def front_section(result: SearchResult, front: Front) -> Section:
                 f"{y_quantity.title} against {in_sentence(x_quantity.title)}",
                 made,
                 "Down and to the left is better. Ringed designs are beaten by no other; hover for the whole design. "
-                f"The limit on {in_sentence(x_quantity.title)} is left out here, all others hold.",
+                f"{_left_out(front)}The limit on {in_sentence(x_quantity.title)} is left out here, all others hold."
+                f"{bounds}",
             ),
         ),
         f"{len(front.designs)} designs that no other beats; hypervolume {front.hypervolume:.4g} "
         f"(arcmin {x_quantity.unit}) below ({front.reference[0]:.3g}, {front.reference[1]:.3g}).",
     )
+
+
+def _nearest(front: Front) -> list[list[DesignRecord]]:
+    """The combinations of a `front` that come nearest to it, at most `CURVES` of them: more curves cannot be told
+    apart. Ranked by the least objective that each reaches."""
+    curves = [list(designs) for designs in front.by_combination.values() if designs]
+    return sorted(curves, key=lambda designs: min(d.quantities[front.objective] for d in designs))[:CURVES]
+
+
+def _left_out(front: Front) -> str:
+    curves = sum(1 for designs in front.by_combination.values() if designs)
+    if curves <= CURVES:
+        return ""
+    drawn = f"Of {curves} combinations the {CURVES} with the least error have a curve"
+    return f"{drawn}; all are in [[trade-chosen-combinations]]. "
+
+
+def _shade_limits(made: go.Figure, result: SearchResult, front: Front) -> str:
+    """Draw the limits on both axes of a `front` and shade where they are broken; the sentence that says so."""
+    limits = {limit.quantity: limit for limit in result.setup.limits()}
+    found = False
+    for quantity, axis in ((front.second, "x"), (front.objective, "y")):
+        limit = limits.get(quantity)
+        if limit is None:
+            continue
+        found = True
+        shown = [d.quantities[quantity] for designs in _nearest(front) for d in designs]
+        shown += [d.quantities[quantity] for d in (*front.designs, result.baseline, result.best)]
+        room = 0.06 * (max(shown) - min(shown) or 1.0)
+        low, high = min(shown) - room, max(shown) + room
+        ends = (low, limit.bound) if limit.at_least else (limit.bound, high)
+        if ends[0] >= ends[1]:
+            continue
+        shade: dict[str, Any] = {"fillcolor": faded(VERMILLION, 0.1), "line_width": 0, "layer": "below"}
+        line: dict[str, Any] = {"line": {"color": VERMILLION, "width": 1.5, "dash": "dash"}}
+        if axis == "x":
+            made.add_vrect(*ends, **shade)
+            made.add_vline(limit.bound, **line)
+        else:
+            made.add_hrect(*ends, **shade)
+            made.add_hline(limit.bound, **line)
+        made.update_layout({f"{axis}axis": {"range": [low, high]}})
+    return " Shaded is where it is broken." if found else ""
 
 
 def _axis(quantity: Quantity) -> str:
@@ -242,7 +289,13 @@ def designs_section(result: SearchResult, key: str = "trade-designs") -> Section
         for k in PARALLEL
         if all(k in d.quantities for d in every)
     ]
-    made = _parallel(axes, shown, result)
+    drawn = _thinned(shown, result.objective)
+    made = _parallel(axes, drawn, result)
+    fewer = (
+        f"Drawn are {len(drawn)} of {len(shown)}, evenly from the least error to the largest. "
+        if len(drawn) < len(shown)
+        else ""
+    )
     return Section(
         key,
         "All designs",
@@ -251,12 +304,20 @@ def designs_section(result: SearchResult, key: str = "trade-designs") -> Section
                 f"{key}-parallel",
                 "Every design of the fronts over its variables and what comes of them",
                 made,
-                "Each line is a design, each axis runs from its least to its largest value. A line without a wrap "
-                "angle passes below that axis. Hover for the whole design.",
+                f"{fewer}Each line is a design, each axis runs from its least to its largest value. A line without a "
+                "wrap angle passes below that axis. Hover for the whole design.",
             ),
         ),
         f"{len(shown)} designs, the baseline and the chosen one.",
     )
+
+
+def _thinned(designs: list[DesignRecord], objective: str) -> list[DesignRecord]:
+    """At most `LINES` of the `designs`, evenly over their rank by the `objective`, both ends among them."""
+    ranked = sorted(designs, key=lambda design: design.quantities.get(objective, design.quantities[NOMINAL]))
+    if len(ranked) <= LINES:
+        return ranked
+    return [ranked[round(i * (len(ranked) - 1) / (LINES - 1))] for i in range(LINES)]
 
 
 def _parallel(axes: Sequence[Axis], shown: list[DesignRecord], result: SearchResult) -> go.Figure:
@@ -320,7 +381,7 @@ def _parallel(axes: Sequence[Axis], shown: list[DesignRecord], result: SearchRes
 def map_section(result: SearchResult, seen: DesignMap, key: str = "trade-map") -> Section:
     """Peak-to-peak over pressure angle and width about the chosen design of a `result`, as `seen` on a grid, with the
     lines of its limits; `key` names the section."""
-    limits = [MapLimit(str(limit), grid, limit.bound) for limit, grid in seen.limits]
+    limits = [MapLimit(str(limit), grid, limit.bound, limit.at_least) for limit, grid in seen.limits]
     chosen, baseline = result.best.variables, result.baseline.variables
     made = design_map(
         seen.width_mm,
@@ -342,7 +403,7 @@ def map_section(result: SearchResult, seen: DesignMap, key: str = "trade-map") -
                 f"{seen.title} over pressure angle and width, all else as chosen",
                 made,
                 "The error falls toward the lower left; the lines are where a limit is just kept. The baseline stands "
-                "at its own pressure angle and width, but the map is of the chosen design.",
+                f"at its own pressure angle and width, but the map is of the chosen design. {words_on_limits(limits)}",
             ),
         ),
         "Fewer degrees and less width always lower the error; the lines show what stops them.",

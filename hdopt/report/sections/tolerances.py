@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any  # Any: Plotly's dictionaries and traces, 
 import numpy as np
 
 from hdopt.report import Figure, Item, KeyFigures, Section, Table, Text
+from hdopt.report.cells import EACH, NAMES, in_words
 from hdopt.report.sections.words import in_sentence, listed
 from hdopt.report.theme import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, faded, figure
 
@@ -22,16 +23,22 @@ if TYPE_CHECKING:
     from hdopt.tolerance.sensitivity import Shapley, Sobol
     from hdopt.tolerance.stack import Stack
 
+JOINTLY = "directions_jointly"
+"""The share of a linearised stack that its directions and phases have together."""
+NIL_DIRECTIONS = (
+    "A direction or phase has little or no share of its own here, because the line averages over it: what all of them "
+    "do is the share of the directions jointly. Sobol' indices, where a page has them, count each as an input, so that "
+    "one may lead there and be nil here."
+)
+TURNING = ("direction_deg", "phase_deg")
+TURNING_INPUTS = (
+    "A direction counts as an input here: it has a part wherever two eccentricities add as vectors, though no "
+    "tolerance narrows it."
+)
+MOST_TICKS = 8
+"""Of an axis in powers of two, before every other is left out."""
 SMALLEST_SHARE = 0.0005
 """Contributions below this are left out of the figure, not of the table."""
-
-
-def readable(name: str) -> str:
-    """The study key or callout `name` in words: 'wg_tilt_major_deg' reads 'WG tilt major'."""
-    words = name.removesuffix("_mm").removesuffix("_deg").split("_")
-    words = [word.upper() if word in ("wg", "cs", "fs") else word for word in words]
-    text = " ".join(words)
-    return text[:1].upper() + text[1:]
 
 
 def stack_section(result: StackResult, key: str = "stack") -> Section:
@@ -41,7 +48,7 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
     conforming, quantile = stack.conforming, stack.required_quantile
     shares = _shares(stack)
     verdict = "keep" if conforming.low >= stack.required_yield else "do not keep"
-    most = [in_sentence(readable(name)) for name in shares["input"][:2]]
+    most = [in_sentence(in_words(name)) for name in shares["input"][:2]]
     return Section(
         key,
         "What the tolerances give",
@@ -58,7 +65,7 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
                 f"{key}-figures",
                 "The distribution in numbers, with 95 % intervals",
                 stack.to_frame().reset_index(),
-                formats={"value": ".6g", "low": ".6g", "high": ".6g"},
+                formats=dict.fromkeys(("value", "low", "high"), EACH),
             ),
             Figure(
                 f"{key}-contributions",
@@ -68,7 +75,13 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
                 f"averaged. The line's spread is {line.std:.4g} {unit}, the real one {stack.std.value:.4g} {unit}; its "
                 f"root-sum-square value at the required yield is off by {stack.rss - quantile.value:+.4g} {unit}.",
             ),
-            Table(f"{key}-contributions-table", "Contributions", shares, formats={"share": ".4f"}),
+            Table(
+                f"{key}-contributions-table",
+                "Contributions",
+                shares,
+                NIL_DIRECTIONS if JOINTLY in line.shares else "",
+                {"share": ".3f", "input": NAMES, "operating point": EACH, f"slope, {unit} per unit": EACH},
+            ),
             *(Text(note) for note in (*stack.notes, *result.notes)),
         ),
         f"As toleranced the drives {verdict} the requirement: {100 * conforming.value:.2f} % stay within "
@@ -147,7 +160,7 @@ def _contributions(shares: pd.DataFrame) -> go.Figure:
     shown = shares[shares["share"] > SMALLEST_SHARE].iloc[::-1]
     made = figure("Share of the variance [%]", "", height=90 + 30 * len(shown))
     made.add_bar(
-        y=[readable(name) for name in shown["input"]],
+        y=[in_words(name) for name in shown["input"]],
         x=100 * shown["share"],
         orientation="h",
         name="Share",
@@ -177,7 +190,7 @@ def sobol_section(result: SobolResult, key: str = "sobol") -> Section:
                 f"{sobol.evaluations} drives; whiskers: {sobol.interval}. What the total index has more than the first "
                 "is the input's part in interactions.",
             ),
-            Table(f"{key}-table", "Sobol' indices", sobol.to_frame().reset_index(), formats=_index_formats()),
+            _index_table(sobol, key),
             Figure(
                 f"{key}-convergence",
                 "How the total indices settle",
@@ -208,19 +221,25 @@ def sobol_section(result: SobolResult, key: str = "sobol") -> Section:
                 f"{key}-shapley-table",
                 "Shapley effects",
                 shapley.to_frame().reset_index(),
-                formats={"Shapley effect": ".4f", "low": ".4f", "high": ".4f"},
+                formats={"Shapley effect": ".3f", "low": ".3f", "high": ".3f", "input": NAMES},
             ),
         ]
     return Section(
         key,
         "Which tolerances matter",
         (*items, *(Text(note) for note in result.notes)),
-        f"The spread comes most from {listed([in_sentence(readable(name)) for name in most])}.",
+        f"The spread comes most from {listed([in_sentence(in_words(name)) for name in most])}.",
     )
 
 
+def _index_table(sobol: Sobol, key: str) -> Table:
+    turning = any(name.endswith(TURNING) for name in sobol.inputs)
+    frame = sobol.to_frame().reset_index()
+    return Table(f"{key}-table", "Sobol' indices", frame, TURNING_INPUTS if turning else "", _index_formats())
+
+
 def _index_formats() -> dict[str, str]:
-    return {f"{index}{end}": ".4f" for index in ("S1", "ST") for end in ("", " low", " high")}
+    return {f"{index}{end}": ".3f" for index in ("S1", "ST") for end in ("", " low", " high")} | {"input": NAMES}
 
 
 def _whiskers(estimates: Iterable[IntervalEstimate]) -> dict[str, Any]:
@@ -236,7 +255,7 @@ def _whiskers(estimates: Iterable[IntervalEstimate]) -> dict[str, Any]:
 
 def _indices(sobol: Sobol) -> go.Figure:
     rows = {**sobol.inputs, **sobol.groups}
-    names = [readable(name) for name in rows][::-1]
+    names = [in_words(name) for name in rows][::-1]
     made = figure("Sobol' index", "", height=110 + 34 * len(rows), barmode="group")
     for label, colour, estimates in (
         ("Total", ORANGE, [index.ST for index in rows.values()][::-1]),
@@ -272,10 +291,11 @@ def _convergence(sobol: Sobol) -> go.Figure:
             line={"width": 0},
             hoverinfo="skip",
             showlegend=False,
-            name=readable(name),
+            name=in_words(name),
         )
-        made.add_scatter(x=points, y=value, mode="lines+markers", name=readable(name), line={"color": colour})
-    made.update_xaxes(type="log", dtick="D2")
+        made.add_scatter(x=points, y=value, mode="lines+markers", name=in_words(name), line={"color": colour})
+    shown = points[:: 1 + len(points) // MOST_TICKS]
+    made.update_xaxes(type="log", tickvals=shown, ticktext=[f"{value:.0f}" for value in shown])
     return made
 
 
@@ -287,7 +307,7 @@ def _pairs(sobol: Sobol) -> go.Figure:
         for i, j in ((names.index(a), names.index(b)), (names.index(b), names.index(a))):
             values[i, j] = max(estimate.value, 0.0)
             texts[i, j] = f"{estimate.value:.4f} ({estimate.low:.4f} to {estimate.high:.4f})"
-    labels = [readable(name) for name in names]
+    labels = [in_words(name) for name in names]
     made = figure("", "", height=160 + 34 * len(names))
     from hdopt.report.theme import SEQUENTIAL
 
@@ -310,7 +330,7 @@ def _shapley(shapley: Shapley) -> go.Figure:
     effects = dict(sorted(shapley.effects.items(), key=lambda item: item[1].value))
     made = figure("Shapley effect", "", height=100 + 34 * len(effects))
     made.add_bar(
-        y=[readable(name) for name in effects],
+        y=[in_words(name) for name in effects],
         x=[e.value for e in effects.values()],
         error_x=_whiskers(effects.values()),
         orientation="h",
@@ -334,7 +354,7 @@ def allocate_section(result: AllocateResult, key: str = "allocate") -> Section:
             "Allocated tolerances",
             result.to_frame().reset_index(),
             f"Costs: {listed(sources)}." + "".join(f" Extrapolated: {flag}." for flag in flags),
-            {"present tolerance": ".6g", "tolerance": ".6g", "present cost": ".4f", "cost": ".4f"},
+            {"present tolerance": EACH, "tolerance": EACH, "present cost": ".3f", "cost": ".3f", "error": NAMES},
         ),
     ]
     if result.comparison:
@@ -344,7 +364,7 @@ def allocate_section(result: AllocateResult, key: str = "allocate") -> Section:
                 "The rules side by side",
                 _rules(result),
                 "Every rule's tolerances, judged by the same stack of the real response.",
-                {"cost": ".4f", "yield": ".5f", "low": ".5f", "high": ".5f"},
+                {"cost": ".3f", "yield": ".4f", "low": ".4f", "high": ".4f", "rule": NAMES},
             ),
             Figure(
                 f"{key}-comparison",
@@ -414,7 +434,7 @@ def _comparison(result: AllocateResult) -> go.Figure:
     for outcome, colour in zip(result.comparison, PALETTE, strict=False):
         names = [name for name in result.errors if name in outcome.tolerances]
         made.add_bar(
-            x=[readable(name) for name in names],
+            x=[in_words(name) for name in names],
             y=[outcome.tolerances[name] / result.errors[name].present for name in names],
             name=outcome.rule.replace("_", " "),
             marker={"color": colour},

@@ -38,7 +38,7 @@ def sensitivities_section(
                 f"Bars run from the base, {base_arcmin:.3f} arcmin, to the value at either end of the variable's "
                 "range, which is written beside them.",
             ),
-            Table(f"{key}-table", "Sensitivities", ordered, formats={"low_arcmin": ".4f", "high_arcmin": ".4f"}),
+            Table(f"{key}-table", "Sensitivities", ordered, formats={"low_arcmin": ".3f", "high_arcmin": ".3f"}),
         ),
         f"The {what} reacts most to {listed([in_sentence(name) for name in ordered['variable'][:3]])}.",
     )

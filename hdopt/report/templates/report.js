@@ -3,6 +3,7 @@
   const PRINT_WIDTH = 660; // px: fits A4 and Letter within the margins of the print style
   const printHeight = (height) => Math.round(height * (height > 460 ? 0.9 : 0.76)); // tall ones need their rows
   const PRINT_TYPE = 0.8; // size of a table's type in print against that on the screen, a little above the style's
+  const LEGEND_LINE = 17; // px
   const NARROW = 520; // px: below it a figure takes smaller type and leaves dragging to the page
   const json = (id) => JSON.parse(document.getElementById(id).textContent);
   const plots = [...document.querySelectorAll(".plot")];
@@ -21,23 +22,30 @@
   const sizes = (plot, width) => {
     const own = plot.ownLayout;
     const narrow = width < NARROW;
+    // On a narrow screen each entry of the legend takes a line of its own, which the plot is not to pay for.
+    const legend = narrow ? LEGEND_LINE * Math.max(0, plot.legendEntries - 2) : 0;
     const size = (own.font && own.font.size) || 13;
     return {
       width,
-      height: printing ? printHeight(plot.ownHeight) : plot.ownHeight,
+      height: (printing ? printHeight(plot.ownHeight) : plot.ownHeight) + legend,
       "font.size": narrow ? Math.min(size, 11) : size,
       dragmode: narrow ? false : own.dragmode || "zoom",
+      // Slanted labels of many ticks run into each other where there is little room.
+      ...(own.tickangle ? { "xaxis.tickangle": narrow ? -90 : own.tickangle } : {}),
     };
   };
 
   const draw = (plot) => {
     const { data, layout } = json("figure-data-" + plot.dataset.figure);
-    plot.ownLayout = { font: layout.font, dragmode: layout.dragmode };
+    plot.ownLayout = { font: layout.font, dragmode: layout.dragmode, tickangle: (layout.xaxis || {}).tickangle };
     plot.ownHeight = layout.height || plot.clientHeight;
+    plot.legendEntries = data.filter((trace) => trace.showlegend !== false && trace.name && !(trace.type === "heatmap")).length;
     const size = sizes(plot, plot.clientWidth);
     const font = { ...layout.font, size: size["font.size"] };
     const { width, height, dragmode } = size;
-    return Plotly.newPlot(plot, data, { ...layout, template, width, height, font, dragmode }, {
+    plot.style.height = height + "px";
+    const xaxis = size["xaxis.tickangle"] ? { xaxis: { ...layout.xaxis, tickangle: size["xaxis.tickangle"] } } : {};
+    return Plotly.newPlot(plot, data, { ...layout, ...xaxis, template, width, height, font, dragmode }, {
       ...config, toImageButtonOptions: { format: "svg", filename: plot.dataset.figure },
     });
   };
@@ -67,7 +75,10 @@
   };
   for (const button of document.querySelectorAll("[data-file]")) button.addEventListener("click", () => save(button.dataset.file));
   for (const button of document.querySelectorAll("[data-open]")) {
-    button.addEventListener("click", async () => open(URL.createObjectURL(await file(button.dataset.open, "text/html"))));
+    button.addEventListener("click", async () => {
+      const name = button.dataset.open;
+      open(URL.createObjectURL(await file(name, name.endsWith(".svg") ? "image/svg+xml" : "text/html")));
+    });
   }
 
   window.hdoptReport = { drawn: Promise.all(plots.map(draw)).then(() => plots.length), file };

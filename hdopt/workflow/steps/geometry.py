@@ -30,7 +30,8 @@ def geometry(study: Study, context: Context) -> StepResult:
         words = f"The export failed: {failed}."
         return StepResult((Section("geometry", "Wave generator to be made", (Text(words),)),), {}, (), (words,), False)
     picture = places["png"].read_bytes() if "png" in places else None
-    section = geometry_section(result, places["svg"].read_text(encoding="utf-8"), picture)
+    texts = {kind: places[kind].read_text(encoding="utf-8") for kind in ("step", "dxf", "svg")}
+    section = geometry_section(result, texts, picture)
     deviation = result.profile_deviation_um
     says = (f"wave generator: {len(result.model.parts)} parts, profile within {deviation:.2g} um in the files",)
     return StepResult((section,), result.to_dict(), tuple(places.values()), says)

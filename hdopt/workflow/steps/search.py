@@ -9,7 +9,7 @@ from hdopt.optimize.records import SearchResult
 from hdopt.optimize.robustness import perturb
 from hdopt.optimize.summary import chosen_words, design_words
 from hdopt.optimize.views import trade_views
-from hdopt.report import Section, Text
+from hdopt.report import Download, Section, Text
 from hdopt.report.sections.search import trade_sections
 from hdopt.study import Study
 from hdopt.workflow.search import search as search_designs
@@ -28,7 +28,8 @@ def search(study: Study, context: Context) -> StepResult:
     checked = verify(study, result, context.seed)
     perturbed = perturb(result.setup, result, (1 - share, 1 + share), context.seed)
     file = context.folder / f"{study.name}-chosen.toml"
-    write_text(file, chosen_study_toml(study, result))
+    text = chosen_study_toml(study, result)
+    write_text(file, text)
     results = result.to_dict() | {
         "verification": checked.to_dict(),
         "perturbations": [item.to_dict() for item in perturbed],
@@ -36,7 +37,8 @@ def search(study: Study, context: Context) -> StepResult:
     }
     first, *others = trade_sections(result, trade_views(result), checked, perturbed, file.name)
     notes = tuple(Text(f"{note[:1].upper()}{note[1:]}.") for note in result.notes)
-    sections = (replace(first, items=(*notes, *first.items)), *others)
+    chosen = Download(file.name, text, "The study file of the chosen design, for every other command.")
+    sections = (replace(first, items=(*notes, *first.items, chosen)), *others)
     says = (
         f"chosen wave generator: {chosen_words(result)}",
         f"study file: {file}  (hdopt export {file} --step wg.step)",
