@@ -7,6 +7,8 @@ import re
 from importlib import import_module
 from pathlib import Path
 
+from study_examples import EXAMPLES
+
 ROOMS = {
     "Drive": ("hdopt.drive.geometry", "hdopt.drive.errors", "hdopt.drive.profiles", "hdopt.drive.teeth"),
     "Kinematics": (
@@ -72,6 +74,8 @@ def study_file() -> str:
             if place:
                 lines += [f"### `{table.name}`" if "=" in table.name else f"### [{table.name}]", ""]
             lines += [_sentence(table.says), ""]
+            if table.name in EXAMPLES:
+                lines += ["```toml", EXAMPLES[table.name], "```", ""]
             lines += _key_table(table.keys)
     lines += ["## [effects.ID]", "", "What the base model leaves out, a table for each effect:"]
     lines += ["[the effects and their keys](../conventions.md#effects-in-a-study-file).", ""]

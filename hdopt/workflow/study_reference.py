@@ -91,6 +91,10 @@ def _kind_of(model: type[Section]) -> str:
 
 
 def _says(model: type[Section]) -> str:
+    """What a table is for: its own docstring, or of one kind of several what that kind means."""
+    for key in ("distribution", "model"):
+        if model.__doc__ is None and key in model.model_fields:
+            return meaning_of(model, key)
     return " ".join((inspect.getdoc(model) or "").split())
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import runpy
 import shlex
 import subprocess
 import sys
@@ -142,3 +143,35 @@ def test_completion_is_what_the_page_says(shell, tmp_path):
     env = {**os.environ, "_HDOPT_COMPLETE": f"{shell}_source"}
     made = subprocess.run([sys.executable, "-c", script], env=env, capture_output=True, text=True, timeout=60)
     assert made.returncode == 0 and "hdopt" in made.stdout and not made.stderr
+
+
+def study_examples() -> dict[str, str]:
+    """How the page on the study file writes each table."""
+    return runpy.run_path(str(DOCS / "study_examples.py"))["EXAMPLES"]
+
+
+WITHOUT_EXAMPLE = ("drive", "cs_teeth", "fs_teeth", "cs_roundness", "tolerances.cs_teeth", "contributors.NAME",
+                   "linear_stack.dimensions.NAME", 'model = "table".grades')  # fmt: skip
+"""Tables that a shipped study shows, or whose example stands one table above."""
+
+
+def test_every_table_of_a_study_has_an_example_that_loads(tmp_path):
+    """Would catch a kind of distribution or cost that was added without a word on how it is written."""
+    import hdopt
+    from hdopt.workflow.study_reference import study_reference
+
+    examples = study_examples()
+    tables = {table.name for tables in study_reference().values() for table in tables}
+    of_bounds = {name for name in tables if name.startswith("search.variables.")}
+    assert tables - examples.keys() - of_bounds <= set(WITHOUT_EXAMPLE)
+    (tmp_path / "eccentricities.csv").write_text("0.001\n0.004\n0.006\n0.003\n")
+    for name, text in examples.items():
+        file = tmp_path / "own.toml"
+        file.write_text(f'drive = "csf-25-80"\n{text}\n')
+        study = hdopt.load_study(file)
+        assert study.drive, name
+        if "tolerances" in text and "correlation" not in name:
+            assert study.sections["tolerances"].distributions(tmp_path), name
+            assert [cost.build((0.396, 63.36)) for cost in study.sections["tolerances"].costs().values()] or (
+                "cost" not in text
+            )
