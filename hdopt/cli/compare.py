@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Any  # Any: what the command's other options g
 
 import click
 
-from hdopt.cli.common import OutputFile, drive_option, emit, json_option, seed_option, set_option, table_options
+from hdopt.cli.common import (
+    OutputFile,
+    StudyOptions,
+    drive_option,
+    emit,
+    json_option,
+    seed_option,
+    set_option,
+    table_options,
+)
 
 if TYPE_CHECKING:
     from hdopt.workflow.compare import CompareResult
@@ -42,10 +51,9 @@ def command(cam: str, study: str | None, drive: str | None, overrides: tuple[str
     centre of a ball with --probe-radius-mm. Exit status 1 says that a point lies outside the profile's tolerance zone.
     The study that --write-study writes goes to `hdopt ke` and `hdopt stack`.
     """
-    from hdopt.study import load_study
     from hdopt.workflow.compare import compare, write_comparison
 
-    loaded = load_study(study, overrides, drive)
+    loaded = StudyOptions(study, drive, overrides).load()
     result = compare(
         loaded, cam, probe_radius_mm=options["probe_radius_mm"], surface=options["surface"], part=options["part"]
     )

@@ -9,6 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+from click.core import ParameterSource
+
+from hdopt.cli.common import DEFAULTS
 
 if TYPE_CHECKING:
     from hdopt.workflow.recorded_drive import RecordedDrive
@@ -48,6 +51,9 @@ def recording_options(command: Callable[..., R]) -> Callable[..., R]:
         bench_file: Path | None,
         **others: Any,  # what the command's own options give
     ) -> R:
+        context = click.get_current_context()
+        if context.get_parameter_source("drive") is ParameterSource.DEFAULT:
+            context.meta[DEFAULTS] = (f"no drive given: the shipped {drive}",)
         return command(RecordingOptions(recordings, drive, ratio, columns, bench_file), **others)
 
     options = (

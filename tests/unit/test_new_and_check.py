@@ -252,6 +252,16 @@ def test_what_a_command_falls_back_on_is_printed(tmp_path, capsys):
     assert "default:" not in out
 
 
+def test_a_drive_that_nobody_named_is_said(tmp_path, capsys):
+    """Would catch a recording judged by the shipped drive's ratio without a word."""
+    rows = "\n".join(f"{i * 0.01},{i * 3.6},{i * 3.6 / 80}" for i in range(400))
+    (tmp_path / "run.csv").write_text("time_s,input_angle_deg,output_angle_deg\n" + rows + "\n")
+    _, out, _ = said(capsys, "inspect", str(tmp_path / "run.csv"))
+    assert "default: no drive given: the shipped csf-25-80" in out
+    _, out, _ = said(capsys, "inspect", str(tmp_path / "run.csv"), "--drive", "csf-25-80")
+    assert "default:" not in out
+
+
 def test_a_study_that_says_everything_falls_back_on_nothing():
     study = hdopt.load_study()
     assert defaults_taken(study.sections, ("wave_generator", "errors", "tolerances", "requirement")) == ()
