@@ -47,6 +47,9 @@ def test_the_page_says_names_in_words_and_the_file_the_keys(sections):
     (names, *_) = columns(table.frame, table.formats)
     assert "WG tilt major" in names.cells and not any("_" in cell for cell in names.cells)
     assert "little or no share of its own" in table.caption
+    for key in ("sobol-table", "sobol-shapley-table"):
+        table = of_kind(sections["sobol"], Table)[key]
+        assert not any("_" in cell for cell in columns(table.frame, table.formats)[0].cells), key
     figures = of_kind(sections["stack"], Table)["stack-figures"]
     shown = next(column for column in columns(figures.frame, figures.formats) if column.name == "value")
     assert all(len(cell.replace(".", "").lstrip("0")) <= 5 for cell in shown.cells)

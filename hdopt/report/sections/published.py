@@ -107,7 +107,7 @@ def _dumbbells(frame: pd.DataFrame) -> go.Figure:
 
 
 def _differences(frame: pd.DataFrame, difference: pd.Series, tolerance_arcmin: float) -> go.Figure:
-    made = figure("", "Difference [arcmin]", height=340)
+    made = figure("", "Difference [arcmin]", height=340, hovermode="x")  # a bar of nil cannot be met
     made.add_hrect(-tolerance_arcmin, tolerance_arcmin, fillcolor=faded(BLUE, 0.08), line_width=0, layer="below")
     made.add_bar(
         x=frame["case"],

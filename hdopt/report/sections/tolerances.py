@@ -221,7 +221,7 @@ def sobol_section(result: SobolResult, key: str = "sobol") -> Section:
                 f"{key}-shapley-table",
                 "Shapley effects",
                 shapley.to_frame().reset_index(),
-                formats={"Shapley effect": ".3f", "low": ".3f", "high": ".3f", "input": NAMES},
+                formats={"Shapley effect": ".3f", "low": ".3f", "high": ".3f", "player": NAMES},
             ),
         ]
     return Section(
@@ -239,7 +239,7 @@ def _index_table(sobol: Sobol, key: str) -> Table:
 
 
 def _index_formats() -> dict[str, str]:
-    return {f"{index}{end}": ".3f" for index in ("S1", "ST") for end in ("", " low", " high")} | {"input": NAMES}
+    return {f"{index}{end}": ".3f" for index in ("S1", "ST") for end in ("", " low", " high")} | {"name": NAMES}
 
 
 def _whiskers(estimates: Iterable[IntervalEstimate]) -> dict[str, Any]:
