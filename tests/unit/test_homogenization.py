@@ -4,10 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases import PROFILES, drive
 
+from hdopt.drive.errors import DriveErrors
 from hdopt.kinematics.waveform import kinematic_error_arcmin
 from hdopt.mechanics.contact import contact_angle, homogenization_coefficient, meshing_teeth
 from hdopt.study import load_study
+from hdopt.tolerance.drive_inputs import Direct, DriveResponse
 from hdopt.workflow.stack import study_problem
 
 CONTACT = 'requirement.homogenization="contact"'
@@ -30,6 +33,16 @@ def evaluated(*settings):
 
 def test_stack_of_many_teeth_is_k_e_times_that_of_one(k_e):
     assert evaluated(CONTACT) == pytest.approx(k_e * evaluated(), rel=1e-12)
+
+
+def test_stack_of_a_measured_profile_is_evened_out():
+    """Its contour is searched drive by drive: another way through the program than that of smooth tips."""
+    inputs = np.array([[0.01], [0.004]])
+    design = drive(PROFILES["measured"])
+    errors, feeds = DriveErrors(fs_tooth_amplitude=0.001), (Direct(0, "axis_eccentricity"),)
+    made = (DriveResponse(design, errors, feeds, k_e) for k_e in (1.0, 0.2))
+    plain, evened = (response(inputs) for response in made)
+    assert evened == pytest.approx(0.2 * plain)
 
 
 def test_stack_with_an_effect_inside_the_zones_is_evened_out_as_a_whole(k_e):
