@@ -60,14 +60,14 @@ class DesignEffects:
         """Converged peak-to-peak of a design with errors `row` (12) and the effects, arcmin."""
         return float(matrix_peak_to_peak_arcmin(drive, row[None, :], self.table(drive), homogenization)[0])
 
-    def spans_near(self, drive: Drive, row: Array, most: int) -> Callable[[Drive], Array]:
-        """A function of designs near `drive`: every one of its highest maxima less every one of its lowest minima, as
-        they move with the design, arcmin, shape (k,)."""
+    def spans_near(self, drive: Drive, row: Array, most: int) -> Callable[[Drive, Array], Array]:
+        """A function of designs near `drive` and of their errors near `row` (12): every one of its highest maxima less
+        every one of its `most` lowest minima, as they move with the design, arcmin, shape (k,)."""
         lows, highs = local_extremes(drive, row, self.table(drive), most)
 
-        def spans(design: Drive) -> Array:
+        def spans(design: Drive, own: Array) -> Array:
             table = self.table(design)
-            return (highs.values(design, row, table)[:, None] - lows.values(design, row, table)[None, :]).ravel()
+            return (highs.values(design, own, table)[:, None] - lows.values(design, own, table)[None, :]).ravel()
 
         return spans
 

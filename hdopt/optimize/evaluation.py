@@ -30,7 +30,7 @@ def record(setup: Setup, design: Design, solution: Solution | None = None) -> De
         except MissingValue:
             continue
     if setup.trade.added is None and isinstance(design.drive.geometry.flexspline_teeth, int):
-        found[NOMINAL] = converged_peak_to_peak_arcmin(design.drive, setup.trade.errors)
+        found[NOMINAL] = converged_peak_to_peak_arcmin(design.drive, setup.trade.errors_of(design))
     limits = setup.limits() if solution is None else solution.problem.limits
     broken = tuple(str(x) for x in limits if x.quantity in found and x.excess(found[x.quantity]) > 1e-5)
     combination: Combination = design.combination

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.drive.errors import DriveErrors
+from hdopt.drive.errors import ERROR_NAMES, DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, MissingValue, unknown_name
 from hdopt.kinematics.closed_form import tip_geometry
@@ -46,6 +46,11 @@ STEP = 1e-5
 LOWEST_USED = 4
 """How many of the lowest local minima of the kinematic error count as pieces."""
 TURN = np.linspace(0.0, 2 * math.pi, 361)
+WG_TILT_NAMES = ("wg_tilt_major", "wg_tilt_minor")
+WG_TILTS = tuple(ERROR_NAMES.index(name) for name in WG_TILT_NAMES)
+"""Their columns in `DriveErrors.to_matrix`."""
+TILT_STEP = 1e-4
+"""Step of central differences over the tilts, as a share of them."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,8 @@ class DesignConditions:
     quantile: float = 0.9973
     added: DesignEffects | None = None
     """Effects that count beside the errors."""
+    over_bore: tuple[bool, bool] = (False, False)
+    """Whether the wave generator's tilts, along its major and its minor axis, are callouts over its fit's length."""
 
     def needed(self, name: str, needed_by: str) -> float:
         """The condition `name`, such as 'torque'; where it is not given, `MissingValue` says what is `needed_by` it."""
@@ -80,6 +87,30 @@ class DesignConditions:
     @cached_property
     def rows(self) -> Array:
         return self.errors.to_matrix()
+
+    def tilt_factor(self, design: Design) -> float:
+        """How much larger than in the reference a tilt is that is a callout over the wave generator's width."""
+        return self.reference.wave_generator.width / design.drive.wave_generator.width
+
+    def scaled(self, rows: Array, factor: float) -> Array:
+        """`rows` of `DriveErrors.to_matrix` of the reference with the tilts over the bore's length times `factor`."""
+        if not any(self.over_bore):
+            return rows
+        changed = rows.copy()
+        changed[:, [column for column, over in zip(WG_TILTS, self.over_bore, strict=True) if over]] *= factor
+        return changed
+
+    def of(self, rows: Array, design: Design) -> Array:
+        """`rows` of the reference's errors as they are in `design`."""
+        return self.scaled(rows, self.tilt_factor(design))
+
+    def errors_of(self, design: Design) -> DriveErrors:
+        """The errors of the one drive as they are in `design`."""
+        if not any(self.over_bore):
+            return self.errors
+        names = [name for name, over in zip(WG_TILT_NAMES, self.over_bore, strict=True) if over]
+        factor = self.tilt_factor(design)
+        return self.errors.with_(**{name: factor * getattr(self.errors, name) for name in names})
 
     @cached_property
     def weights(self) -> Array:
@@ -196,6 +227,25 @@ def _envelope(design: Design, rows: Array) -> Extremes:
     return extremes_of(tip_geometry(design.drive), math.tan(design.drive.geometry.pressure_angle), rows)
 
 
+def _tilt_slopes(point: Point, rows: Array, pieces: Callable[[Extremes], Array]) -> Array:
+    """What the tilts over the bore's length add to the slopes (k, n) of `pieces` (k,) of the extremes of the drives
+    with `rows` of the reference's errors: they change with the width."""
+    trade = point.trade
+    if not any(trade.over_bore):
+        return np.zeros((len(pieces(_envelope(point.design, rows))), len(point.free)))
+    factor = trade.tilt_factor(point.design)
+    below, above = (
+        pieces(_envelope(point.design, trade.scaled(rows, factor * (1 + sign * TILT_STEP)))) for sign in (-1, 1)
+    )
+    change = point.slopes(trade.tilt_factor)
+    return np.outer((above - below) / (2 * TILT_STEP * factor), change)
+
+
+def _spans(found: Extremes) -> Array:
+    """Every maximum of one drive less each of its lowest minima, mm of arc, (k,)."""
+    return np.asarray((found.highs[0][:, None] - found.lows[0, None, :LOWEST_USED]).ravel())
+
+
 @dataclass(frozen=True)
 class PeakToPeak:
     """Peak-to-peak of the errors in the study, k_e = 1: the envelope over all FS phases (see `envelope`).
@@ -209,25 +259,32 @@ class PeakToPeak:
     small_is_good: bool = True
 
     def value(self, trade: DesignConditions, design: Design) -> float:
+        rows = trade.of(trade.rows, design)
         if trade.added is not None:
-            return trade.added.peak_to_peak_arcmin(design.drive, trade.rows[0])
+            return trade.added.peak_to_peak_arcmin(design.drive, rows[0])
         if design.drive.has_measured_teeth:
-            return float(np.ptp(beat_extremes_arcmin(design.drive, trade.rows)))
-        found = _envelope(design, trade.rows)
+            return float(np.ptp(beat_extremes_arcmin(design.drive, rows)))
+        found = _envelope(design, rows)
         return float((found.highs.max() - found.lows.min()) * design.drive.geometry.arcmin_per_mm)
 
     def pieces(self, point: Point) -> tuple[Array, Array]:
-        if point.trade.added is not None:
-            spans = point.trade.added.spans_near(point.design.drive, point.trade.rows[0], LOWEST_USED)
-            return spans(point.design.drive), point.slopes(lambda design: spans(design.drive)).T
+        trade = point.trade
+        rows = trade.of(trade.rows, point.design)
+        if trade.added is not None:
+            spans_of = trade.added.spans_near(point.design.drive, rows[0], LOWEST_USED)
+
+            def moved(design: Design) -> Array:
+                return spans_of(design.drive, trade.of(trade.rows, design)[0])
+
+            return moved(point.design), point.slopes(moved).T
         if point.design.drive.has_measured_teeth:
             return _piece(self, point)
-        found, features = _envelope(point.design, point.trade.rows), point.slopes(tip_features)
-        lows, low_slopes = found.lows[0, :LOWEST_USED], found.low_slopes[0, :LOWEST_USED]
-        spans = (found.highs[0][:, None] - lows[None, :]).ravel()
+        found, features = _envelope(point.design, rows), point.slopes(tip_features)
+        spans, low_slopes = _spans(found), found.low_slopes[0, :LOWEST_USED]
         slopes = (found.high_slopes[0][:, None, :] - low_slopes[None, :, :]).reshape(-1, 4)
         scale = point.design.drive.geometry.arcmin_per_mm
-        return scale * spans, scale * slopes @ features[:, :4].T + np.outer(spans, features[:, 4])
+        over_bore = _tilt_slopes(point, trade.rows, _spans)
+        return scale * spans, scale * (slopes @ features[:, :4].T + over_bore) + np.outer(spans, features[:, 4])
 
 
 @dataclass(frozen=True)
@@ -243,7 +300,7 @@ class PeakToPeakQuantile:
     small_is_good: bool = True
 
     def _sample(self, trade: DesignConditions, design: Design) -> Array:
-        return matrix_peak_to_peak_arcmin(design.drive, trade.drawn())
+        return matrix_peak_to_peak_arcmin(design.drive, trade.of(trade.drawn(), design))
 
     def value(self, trade: DesignConditions, design: Design) -> float:
         weights = trade.weights
@@ -258,16 +315,16 @@ class PeakToPeakQuantile:
             return np.array([float(weights @ values[order])]), np.empty((1, 0))
         counts = weights > 2e-3 * weights.max()
         chosen, share = order[counts], weights[counts]
-        value = float(weights @ values[order])
+        value, rows = float(weights @ values[order]), trade.drawn()[chosen]
         if point.design.drive.has_measured_teeth:
-            rows = trade.drawn()[chosen]
-            each = point.slopes(lambda design: matrix_peak_to_peak_arcmin(design.drive, rows)).T
+            each = point.slopes(lambda design: matrix_peak_to_peak_arcmin(design.drive, trade.of(rows, design))).T
             return np.array([value]), (share @ each / share.sum())[None, :]
-        found, features = _envelope(point.design, trade.drawn()[chosen]), point.slopes(tip_features)
+        found, features = _envelope(point.design, trade.of(rows, point.design)), point.slopes(tip_features)
         n = np.arange(len(chosen))
         slopes = found.high_slopes[n, found.highs.argmax(axis=1)] - found.low_slopes[:, 0]
         scale = point.design.drive.geometry.arcmin_per_mm
-        each = scale * slopes @ features[:, :4].T + np.outer(values[chosen] / scale, features[:, 4])
+        over_bore = _tilt_slopes(point, rows, lambda extremes: extremes.highs.max(axis=1) - extremes.lows.min(axis=1))
+        each = scale * (slopes @ features[:, :4].T + over_bore) + np.outer(values[chosen] / scale, features[:, 4])
         return np.array([value]), (share @ each / share.sum())[None, :]
 
 
@@ -284,21 +341,23 @@ class LargestLag:
 
     def value(self, trade: DesignConditions, design: Design) -> float:
         backlash = trade.needed("backlash", "the lag")
-        scale = design.drive.geometry.arcmin_per_mm
+        scale, rows = design.drive.geometry.arcmin_per_mm, trade.of(trade.rows, design)
         if design.drive.has_measured_teeth:
-            lowest = float(beat_extremes_arcmin(design.drive, trade.rows)[:, 0].min())
+            lowest = float(beat_extremes_arcmin(design.drive, rows)[:, 0].min())
         else:
-            lowest = scale * float(_envelope(design, trade.rows).lows.min())
+            lowest = scale * float(_envelope(design, rows).lows.min())
         return backlash * scale - lowest + self._slide(trade, design.drive)
 
     def pieces(self, point: Point) -> tuple[Array, Array]:
         if point.design.drive.has_measured_teeth:
             return _piece(self, point)
         trade, scale = point.trade, point.design.drive.geometry.arcmin_per_mm
-        found, features = _envelope(point.design, trade.rows), point.slopes(tip_features)
+        found, features = _envelope(point.design, trade.of(trade.rows, point.design)), point.slopes(tip_features)
+        over_bore = _tilt_slopes(point, trade.rows, lambda extremes: -extremes.lows[0, :LOWEST_USED])
         play = trade.needed("backlash", "the lag") - found.lows[0, :LOWEST_USED]
         slide = point.slopes(lambda design: self._slide(trade, design.drive))
-        slopes = np.outer(play, features[:, 4]) - scale * found.low_slopes[0, :LOWEST_USED] @ features[:, :4].T
+        lows = over_bore - found.low_slopes[0, :LOWEST_USED] @ features[:, :4].T
+        slopes = np.outer(play, features[:, 4]) + scale * lows
         return scale * play + self._slide(trade, point.design.drive), slopes + slide
 
 
@@ -308,10 +367,20 @@ def carrying_angle(trade: DesignConditions, design: Design) -> float:
     return design.mesh.carrying_angle(design.drive.geometry.pressure_angle, backlash)
 
 
+def face_width(trade: DesignConditions, drive: Drive) -> float | None:
+    """Width of the tooth faces of `drive` that carries, mm: that of `trade` is the reference's, and it follows the wave
+    generator's width, which backs it; None where it is not given."""
+    if trade.face_width is None:
+        return None
+    return trade.face_width * drive.wave_generator.width / trade.reference.wave_generator.width
+
+
 def flank_pressure(trade: DesignConditions, design: Design) -> float:
     """Mean pressure, N/mm^2, on the flanks of `design` that can carry under the torque, face width and backlash of
     `trade` (`Mesh.flank_pressure`)."""
-    torque, face = trade.needed("torque", "the flank pressure"), trade.needed("face_width", "the flank pressure")
+    torque, face = trade.needed("torque", "the flank pressure"), face_width(trade, design.drive)
+    if face is None:
+        face = trade.needed("face_width", "the flank pressure")
     return design.mesh.flank_pressure(torque, face, carrying_angle(trade, design))
 
 
@@ -375,15 +444,16 @@ def life(trade: DesignConditions, design: Design) -> float:
 
 
 def ring_load(trade: DesignConditions, drive: Drive) -> float:
-    """`ring_force` that bends the toothed ring of `drive`, N, over the face width of `trade`.
+    """`ring_force` that bends the toothed ring of `drive`, N, over its `face_width` under `trade`.
 
     0 where wall, face width or modulus is not given.
     """
     gear = drive.geometry
-    if drive.material is None or gear.flexspline_wall is None or trade.face_width is None:
+    face = face_width(trade, drive)
+    if drive.material is None or gear.flexspline_wall is None or face is None:
         return 0.0
     deflection = drive.wave_generator.profile.semi_major - gear.flexspline_inner_radius
-    return ring_force(gear, deflection, drive.material.modulus, trade.face_width)
+    return ring_force(gear, deflection, drive.material.modulus, face)
 
 
 def evened_out(trade: DesignConditions, design: Design) -> float:
@@ -391,11 +461,12 @@ def evened_out(trade: DesignConditions, design: Design) -> float:
     arcmin. With measured teeth k_e is for sines beside them only, and misalignment has its own mean."""
     teeth = design.drive.geometry.circular_spline_teeth * design.mesh.contact_angle / (2 * math.pi)
     k_e = homogenization_coefficient(teeth, trade.k_b)
+    rows = trade.of(trade.rows, design)
     if trade.added is not None:
-        return trade.added.peak_to_peak_arcmin(design.drive, trade.rows[0], k_e)
+        return trade.added.peak_to_peak_arcmin(design.drive, rows[0], k_e)
     if design.drive.has_measured_teeth:
         shares = misalignment_share(design.drive), k_e
-        return float(np.ptp(beat_extremes_arcmin(design.drive, trade.rows, None, *shares)))
+        return float(np.ptp(beat_extremes_arcmin(design.drive, rows, None, *shares)))
     return PeakToPeak().value(trade, design) * k_e
 
 

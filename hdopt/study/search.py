@@ -111,6 +111,11 @@ class TradeSection(Section):
     """Coefficient of friction of the flanks."""
     notch_factor: Positive = 2.2
     """Notch factor of the bending stress under the teeth."""
+    wg_tilt_major_over: Literal["bore", "shoulder"] = "bore"
+    """What the wave generator's tilt along its major axis is a callout over: its fit on the shaft, whose length follows
+    its width, or a shoulder's diameter, which does not. The input axis tilts over its bearings' span."""
+    wg_tilt_minor_over: Literal["bore", "shoulder"] = "bore"
+    """The same of its tilt along its minor axis."""
 
 
 class SearchSection(Section):

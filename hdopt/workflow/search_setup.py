@@ -122,6 +122,7 @@ def _trade(study: Study, section: SearchSection, seed: int) -> DesignConditions:
         sample=sample_rows(study, section.samples, seed) if needs_sample else None,
         quantile=section.quantile,
         added=_effects(study, section, needs_sample),
+        over_bore=(given.wg_tilt_major_over == "bore", given.wg_tilt_minor_over == "bore"),
     )
 
 

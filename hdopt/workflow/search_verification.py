@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.drive.geometry import Drive
+from hdopt.drive.errors import DriveErrors
 from hdopt.kinematics.extremes import extremes_arcmin
+from hdopt.optimize.design_space import Design
+from hdopt.optimize.objectives import DesignConditions
 from hdopt.optimize.records import QuantileCheck, SearchResult, Verification
 from hdopt.study import Study
 from hdopt.workflow.stack import drive_problem_of
-
-if TYPE_CHECKING:
-    from hdopt.optimize.design_effects import DesignEffects
-
 
 VERIFICATION = 1 << 16
 """Fresh drives that verify a quantile; none of them was seen by the search."""
@@ -26,19 +22,20 @@ def verify(study: Study, result: SearchResult, seed: int) -> Verification:
     """The best design of a `result` against the exact geometry, and its quantile over drives of the `study` that are
     drawn with a seed next to `seed`."""
     setup = result.setup
-    drive = setup.space.design(result.chosen.combination, result.chosen.values).drive
+    design = setup.space.design(result.chosen.combination, result.chosen.values)
+    drive, errors = design.drive, setup.trade.errors_of(design)
     added = setup.trade.added
     if added is None:
-        low, high = extremes_arcmin(drive, study.errors, "exact")
+        low, high = extremes_arcmin(drive, errors, "exact")
     else:
         from hdopt.simulation import ExtendedModel
         from hdopt.simulation.extremes import extremes_arcmin as extended_extremes_arcmin
 
-        low, high = extended_extremes_arcmin(ExtendedModel(drive, study.errors, added.at(drive), added.operation))
+        low, high = extended_extremes_arcmin(ExtendedModel(drive, errors, added.at(drive), added.operation))
     kernel = result.best.quantities.get("peak_to_peak_arcmin", float("nan"))
     if "tolerances" not in study.sections:
         return Verification(high - low, kernel, None)
-    blocks = quantile_blocks(study, drive, setup.settings.quantile, seed + 1, added)
+    blocks = quantile_blocks(study, design, setup.settings.quantile, seed + 1, setup.trade)
     from scipy.stats import t
 
     middle = float(blocks.mean())
@@ -48,26 +45,25 @@ def verify(study: Study, result: SearchResult, seed: int) -> Verification:
     return Verification(high - low, kernel, fresh)
 
 
-def quantile_blocks(
-    study: Study, drive: Drive, quantile: float, seed: int, added: DesignEffects | None = None
-) -> Array:
-    """The `quantile` of the converged peak-to-peak of `drive` under the tolerances of `study`, in each of 16
-    independent scramblings of `seed`: shape (16,). `added` are the effects that count, if any."""
+def quantile_blocks(study: Study, design: Design, quantile: float, seed: int, trade: DesignConditions) -> Array:
+    """The `quantile` of the converged peak-to-peak of `design` under the tolerances of `study`, in each of 16
+    independent scramblings of `seed`: shape (16,). `trade` says which tilts follow the width, and which effects
+    count."""
     from hdopt.kinematics import peak_to_peak_arcmin
     from hdopt.tolerance.sampling import ScrambledSobol
 
-    problem = drive_problem_of(study)
+    problem, drive = drive_problem_of(study), design.drive
     response, space = problem.response, problem.space
     sampling = ScrambledSobol(BLOCKS)
     values = []
     for replicate in range(BLOCKS):
         points = np.concatenate(list(sampling.blocks(seed, replicate, VERIFICATION // BLOCKS, space.dimension)))
-        errors = response.errors(space.sample(points))
-        if added is None:
-            spans = peak_to_peak_arcmin(drive, errors)
+        rows = trade.of(response.errors(space.sample(points)).to_matrix(), design)
+        if trade.added is None:
+            spans = peak_to_peak_arcmin(drive, DriveErrors.from_matrix(rows))
         else:
             from hdopt.simulation.batch import matrix_peak_to_peak_arcmin
 
-            spans = matrix_peak_to_peak_arcmin(drive, errors.to_matrix(), added.table(drive))
+            spans = matrix_peak_to_peak_arcmin(drive, rows, trade.added.table(drive))
         values.append(np.quantile(spans, quantile))
     return np.array(values)

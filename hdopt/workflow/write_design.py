@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -10,6 +11,7 @@ from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
 from hdopt.drive.profiles import TwoDisk
 from hdopt.errors import HdoptError
+from hdopt.optimize.objectives import WG_TILT_NAMES
 from hdopt.optimize.records import SearchResult
 from hdopt.study import Study
 from hdopt.study.write import study_toml, with_moved_paths
@@ -56,12 +58,38 @@ def chosen_study_toml(study: Study, result: SearchResult, folder: Path | None = 
         "wave_generator": profile,
     }
     sections = {name: _rounded(content) for name, content in sections.items()}
-    kept = {name: study.data[name] for name in KEPT if name in study.data}
+    kept = _on_width({name: study.data[name] for name in KEPT if name in study.data}, result)
     head = (
         f"Chosen by a search of {study.name} from {len(result.solutions)} combinations of profile and structure.",
         f"{result.best.name}: {result.best.quantities[result.objective]:.4f} arcmin ({result.objective}).",
     )
     return study_toml(sections | with_moved_paths(kept, study.folder, folder), head)
+
+
+def _on_width(kept: Mapping[str, Any], result: SearchResult) -> dict[str, Any]:
+    """The sections `kept` with what follows the wave generator's width: tilts over its bore, the length of the callouts
+    that feed them, and the face that carries."""
+    trade = result.setup.trade
+    factor = trade.tilt_factor(result.setup.space.design(result.chosen.combination, result.chosen.values))
+    changed = {name: dict(content) for name, content in kept.items()}
+    tilts = [f"{name}_deg" for name, over in zip(WG_TILT_NAMES, trade.over_bore, strict=True) if over]
+    for section, key in itertools.product(("errors", "tolerances"), tilts):
+        if key in changed.get(section, {}):
+            changed[section][key] = _scaled(changed[section][key], factor)
+    for name, row in changed.get("contributors", {}).items():
+        if row.get("feeds", "").startswith("wg_tilt") and "length_mm" in row and tilts:
+            changed["contributors"][name] = {**row, "length_mm": row["length_mm"] / factor}
+    if "tooth_face_width_mm" in changed.get("load", {}):
+        changed["load"]["tooth_face_width_mm"] = round(changed["load"]["tooth_face_width_mm"] / factor, DECIMALS)
+    return changed
+
+
+def _scaled(value: Any, factor: float) -> Any:
+    """An error, or the sizes of a tolerance's distribution, times `factor`."""
+    if isinstance(value, Mapping):
+        shape = ("a", "b", "log_std", "cost")
+        return {key: inner if key in shape else _scaled(inner, factor) for key, inner in value.items()}
+    return round(value * factor, DECIMALS) if isinstance(value, int | float) else value
 
 
 def _rounded(content: Mapping[str, Any]) -> dict[str, Any]:

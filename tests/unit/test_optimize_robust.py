@@ -42,10 +42,11 @@ def test_slopes_of_the_quantile_agree_with_wide_differences(result):
     found = problem.evaluate(u)
     for i in range(problem.n):
         step = np.zeros(problem.n)
-        step[i] = 4e-3
+        step[i] = 2e-2
         wide = [problem.evaluate(u + sign * step, slopes=False).objective for sign in (-1, 1)]
-        # Drives change ranks within the step, and the kernel's real phases move under it: 2 % of the largest slope.
-        error = abs(found.piece_slopes[0, i] - (wide[1] - wide[0]) / 8e-3)
+        # Drives change ranks within the step, and the kernel's real phases move under it: 2 % of the largest slope. A
+        # step of a fifth shows them still (5 %), where the slope over the width is small beside the tilts that grow.
+        error = abs(found.piece_slopes[0, i] - (wide[1] - wide[0]) / 4e-2)
         assert error < 0.02 * np.abs(found.piece_slopes).max()
 
 
@@ -80,9 +81,9 @@ def test_every_constant_has_a_source_and_is_perturbed(result):
 
 
 def test_more_of_what_limits_never_helps(result):
-    """A fifth more of the bearing's life costs error; an easier limit cannot."""
+    """A fifth more of the safety costs error; an easier limit cannot."""
     made = {item.constant: item for item in perturb(result.setup, result, (1.2,), 1)}
-    assert made["Limit: WG bearing life L10"].objective > result.chosen.objective
+    assert made["Limit: Safety against bending fatigue"].objective > result.chosen.objective
     assert made["Endurance limit"].objective <= result.chosen.objective * (1 + 1e-4)
 
 
@@ -95,7 +96,14 @@ def test_the_chosen_study_file_is_the_chosen_design(study, result, tmp_path):
     # The file keeps a nanometre and 1e-6 deg.
     error = float(peak_to_peak_arcmin(chosen.drive, chosen.errors))
     assert error == pytest.approx(result.best.quantities["peak_to_peak_arcmin"], abs=1e-5)
-    assert chosen.sections["tolerances"] == study.sections["tolerances"]
+    # Tilts over the bore follow the width; all else stays.
+    factor = 9.0 / chosen.drive.wave_generator.width
+    own, written = (s.sections["tolerances"].rows for s in (study, chosen))
+    assert written["wg_tilt_major_deg"].upper == pytest.approx(factor * own["wg_tilt_major_deg"].upper, abs=1e-6)
+    assert {key: row for key, row in written.items() if "wg_tilt" not in key} == {
+        key: row for key, row in own.items() if "wg_tilt" not in key
+    }
+    assert chosen.drive.load.tooth_face_width == pytest.approx(study.drive.load.tooth_face_width / factor, abs=1e-6)
 
 
 @pytest.mark.slow

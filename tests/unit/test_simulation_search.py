@@ -59,7 +59,7 @@ def test_the_objective_is_the_extended_models_peak_to_peak(study_with):
     added = setup.trade.added
     assert "encoder_output_eccentricity" not in {effect.id for effect in added.effects}
     model = ExtendedModel(
-        design.drive, setup.trade.errors, added.at(design.drive), added.operation, geometry="closed form"
+        design.drive, setup.trade.errors_of(design), added.at(design.drive), added.operation, geometry="closed form"
     )
     assert find_quantity(NOMINAL).value(setup.trade, design) == pytest.approx(peak_to_peak_arcmin(model), abs=1e-3)
     before, after = (next(e for e in effects if e.id == "circular_spline_lobing")
