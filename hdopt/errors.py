@@ -20,11 +20,12 @@ class MissingValue(HdoptError):
 
 
 class MissingSection(MissingValue):
-    """A whole section of the study is needed that it does not have; `keys` holds its name in brackets."""
+    """Whole sections of the study are needed that it does not have; `keys` holds their names in brackets."""
 
-    def __init__(self, needed_by: str, section: str, source: str) -> None:
-        HdoptError.__init__(self, f"{needed_by} needs a [{section}] section, which {source} does not have; add it")
-        self.keys = (f"[{section}]",)
+    def __init__(self, needed_by: str, source: str, *sections: str) -> None:
+        self.keys = tuple(f"[{section}]" for section in sections)
+        what, them = (f"a {self.keys[0]} section", "it") if len(sections) == 1 else (" and ".join(self.keys), "them")
+        HdoptError.__init__(self, f"{needed_by} needs {what}, which {source} does not have; add {them}")
 
 
 class IncompleteStudy(MissingValue):

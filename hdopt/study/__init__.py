@@ -69,8 +69,15 @@ class Study:
         `needed_by` what."""
         found = self.find(name, kind)
         if found is None:
-            raise MissingSection(needed_by, name, self.source)
+            raise MissingSection(needed_by, self.source, name)
         return found
+
+    def require(self, names: Sequence[str], needed_by: str) -> None:
+        """Raise one `MissingSection` for all of the sections `names` that the study has not, which are `needed_by`
+        what."""
+        missing = [name for name in names if name not in self.sections]
+        if missing:
+            raise MissingSection(needed_by, self.source, *missing)
 
     @cached_property
     def drive(self) -> Drive:

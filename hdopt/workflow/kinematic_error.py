@@ -343,7 +343,10 @@ def _study_of(study: AnyStudy | Drive, errors: DriveErrors | None) -> Study:
         return study_of_drive(study, DriveErrors() if errors is None else errors)
     if errors is not None:
         raise HdoptError("errors go with the record of a drive; a study has its own, change them with study.with_(...)")
-    return as_study(study)
+    found = as_study(study)
+    if found.sections:  # a study of records has none
+        found.require(("drive", "wave_generator", "errors"), "the kinematic error of a drive")
+    return found
 
 
 def profile(study: AnyStudy = None) -> ProfileResult:

@@ -114,6 +114,7 @@ def study_problem(study: AnyProblem) -> ToleranceProblem:
 def drive_problem_of(study: Study) -> DriveProblem:
     """The drives of a `study` under its [tolerances] and [contributors], without effects: their response, arcmin, and
     their random inputs. Raises `HdoptError` where it has no [tolerances] or no [requirement]."""
+    study.require(("drive", "wave_generator", "tolerances", "requirement"), "a stack")
     tolerances = study.section("tolerances", TolerancesBase, "a stack")
     requirement = study.section("requirement", RequirementSection, "a stack")
     contributors = study.find("contributors", ContributorsSection)

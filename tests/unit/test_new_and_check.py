@@ -110,6 +110,16 @@ def test_a_new_drive_needs_one_message_for_all_that_it_lacks(tmp_path, capsys):
     assert hdopt.kinematic_error(file).peak_to_peak_arcmin > 0
 
 
+def test_sections_that_are_missing_come_in_one_message(tmp_path):
+    file = tmp_path / "own.toml"
+    file.write_text(OWN.partition("[wave_generator]")[0])
+    with pytest.raises(MissingValue, match=r"needs \[wave_generator\] and \[errors\], which .* add them"):
+        hdopt.kinematic_error(file)
+    file.write_text(OWN)
+    with pytest.raises(MissingValue, match=r"a stack needs \[tolerances\] and \[requirement\], which .* add them"):
+        hdopt.stack(file)
+
+
 def test_check_tells_what_an_own_drive_allows(tmp_path, capsys):
     file = tmp_path / "own.toml"
     file.write_text(OWN)
