@@ -126,11 +126,11 @@ class StudyOptions:
     def load(self, *further: str) -> Study:
         """The study that is meant, with `further` KEY=VALUE after those of --set."""
         from hdopt.study import DEFAULT_STUDY, load_study
-        from hdopt.study.defaults import USED, defaults_taken
+        from hdopt.study.defaults import defaults_taken, used_by
 
         study = load_study(self.study, (*self.overrides, *further), self.drive)
         context = click.get_current_context()
-        said = defaults_taken(study.sections, USED.get(context.info_name or "", ()))
+        said = defaults_taken(study.sections, used_by(context.info_name, study.sections))
         if self.study is None and self.drive is None:
             said = (f"no study given: the shipped {DEFAULT_STUDY}", *said)
         context.meta[DEFAULTS] = said

@@ -19,12 +19,20 @@ USED: dict[str, tuple[str, ...]] = {
     "search": (*TOLERANCED, "search"),
     "export": ("wave_generator",),
     "compare": ("wave_generator",),
+    "explore": DRIVE,
 }
 """Command -> the sections whose defaults it may fall back on; a command that is not here says them itself."""
+WHOLE_STUDY = "run"
+"""The command that uses every section that a study has."""
 WHOLE = ("allocate", "search")
 """Sections that a command may be run without: then all of their defaults hold."""
 OF_NO_WEIGHT = ("source", "noise_um", "correlation", "cost", "rated_torque_nm", "rated_speed_rpm")
 """Keys whose default changes nothing, or that another line speaks of."""
+
+
+def used_by(command: str | None, sections: Mapping[str, Section]) -> tuple[str, ...]:
+    """The sections, of a study's checked `sections`, whose defaults the `command` may fall back on."""
+    return tuple(sections) if command == WHOLE_STUDY else USED.get(command or "", ())
 
 
 def defaults_taken(sections: Mapping[str, Section], names: Sequence[str]) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import hdopt
 from hdopt.cli import main
 from hdopt.errors import HdoptError, IncompleteStudy, MissingValue
 from hdopt.study import shipped_drives, shipped_studies
-from hdopt.study.defaults import defaults_taken
+from hdopt.study.defaults import defaults_taken, used_by
 from hdopt.study.nearest import near_keys
 from hdopt.study.schema import SECTIONS, section_model
 from hdopt.workflow.check_study import PROBES
@@ -270,6 +270,12 @@ def test_a_drive_that_nobody_named_is_said(tmp_path, capsys):
     assert "default: no drive given: the shipped csf-25-80" in out
     _, out, _ = said(capsys, "inspect", str(tmp_path / "run.csv"), "--drive", "csf-25-80")
     assert "default:" not in out
+
+
+def test_run_speaks_for_every_section_that_a_study_has():
+    sections = hdopt.load_study("chase-shaft-housing").sections
+    assert used_by("run", sections) == tuple(sections)
+    assert defaults_taken(sections, used_by("run", sections))[0].startswith("[linear_stack] falls back on")
 
 
 def test_a_study_that_says_everything_falls_back_on_nothing():
