@@ -294,3 +294,9 @@ def test_keys_that_were_changed_after_sealing_are_refused(tmp_path, capsys):
     (tmp_path / "sealed" / "keys.jsonl").write_text(text.replace("nothing", "unknown"))
     with pytest.raises(ValueError, match="is not what was sealed"):
         read(tmp_path)
+
+
+@pytest.mark.parametrize(("low", "high"), [(None, 1.0), (0.0, None), (None, None)])
+def test_an_interval_without_ends_holds_nothing(low, high):
+    assert not covered({"low": low, "high": high}, "delay_s", {"value": 0.5})
+    assert covered({"low": 0.0, "high": 1.0}, "delay_s", {"value": -0.5})

@@ -34,19 +34,33 @@ def test_tilts_of_axis_and_wave_generator_add():
     assert bound(axis_tilt_y=0.002, wg_tilt_minor=0.001) == pytest.approx(FLANK * HALF_WIDTH * sin(0.003))
 
 
+def radius(phi):
+    return A * B / sqrt((B * cos(phi)) ** 2 + (A * sin(phi)) ** 2)
+
+
+def slope(phi):
+    return radius(phi) ** 3 * (A * A - B * B) * sin(phi) * cos(phi) / (A * B) ** 2
+
+
+def shift_of(e):
+    """Where the radius falls as fast as the centre's offset e lets it: |r'| = e sqrt(1 + (r'/r)^2)."""
+    return brentq(lambda phi: slope(phi) - e * sqrt(1 + (slope(phi) / radius(phi)) ** 2), 0.0, pi / 6)
+
+
+def test_where_only_the_part_across_passes_it_counts_by_its_shift_and_its_square():
+    """|A + c| <= |A| + c.A/|A| + |c|^2/(2 |A|): c lies across, but for the deepest point's shift; |A| is B at least."""
+    e = 0.05
+    found = bound(Structure.ONE_WAY_MAJOR, axis_eccentricity=e)
+    # The program looks at the slope every 5e-5 rad.
+    assert found == pytest.approx(FLANK * (e * sin(shift_of(e)) + e**2 / (2 * B)), abs=FLANK * e * 1e-4)
+
+
 @pytest.mark.parametrize("spline", ["cs", "fs"])
 def test_teeth_of_opposite_zones_cancel_but_for_their_shift(spline):
-    """A deepest point is shifted to where the radius falls as fast as the centre's offset e lets it: |r'| = e
-    sqrt(1 + (r'/r)^2). The circular spline's teeth are met where the offset has turned it besides."""
+    """A deepest point is shifted as far as the centre's offset e lets it. The circular spline's teeth are met where the
+    offset has turned it besides."""
     e, amplitude = 0.05, 0.004
-
-    def radius(phi):
-        return A * B / sqrt((B * cos(phi)) ** 2 + (A * sin(phi)) ** 2)
-
-    def slope(phi):
-        return radius(phi) ** 3 * (A * A - B * B) * sin(phi) * cos(phi) / (A * B) ** 2
-
-    shift = brentq(lambda phi: slope(phi) - e * sqrt(1 + (slope(phi) / radius(phi)) ** 2), 0.0, pi / 6)
+    shift = shift_of(e)
     if spline == "cs":
         shift += asin(e / (B - e))
     found = bound(axis_eccentricity=e, **{f"{spline}_tooth_amplitude": amplitude})
