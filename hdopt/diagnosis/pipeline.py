@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from hdopt.diagnosis.checks.assessment import Evidence, assess
+from hdopt.diagnosis.inference.encoder_steps import without_output_steps
 from hdopt.diagnosis.nested import nested_held_out
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
-from hdopt.diagnosis.stages import STAGES, STAGES_OF_A_PART, begin
+from hdopt.diagnosis.stages import STAGES, STAGES_OF_A_PART, begin, smooth_model
 from hdopt.diagnosis.state import State
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import Recording
@@ -23,7 +24,8 @@ def gather_evidence(
 ) -> Evidence:
     """Run all stages on `recordings` with the `base` model (None for a gear without one); random drives are drawn
     with `seed`, and `nuisance` names what is free beside the model (`inference.nuisance`). `settings` are the
-    thresholds. All of it is done once more on a part of the turns, and looked at on the others.
+    thresholds. Steps of a coarse output encoder are taken out first. All else is done once more on a part of the turns,
+    and looked at on the others.
     """
 
     def run(some: Sequence[Recording], stages: Sequence[Callable[[State], State]]) -> State:
@@ -32,6 +34,9 @@ def gather_evidence(
             state = stage(state)
         return state
 
+    recordings = without_output_steps(
+        recordings, lambda some: smooth_model(some, base, seed, settings, nuisance), settings.encoder_steps
+    )
     # First, so that what it worked with is gone before the diagnosis itself is in memory.
     nested = nested_held_out(recordings, lambda some: run(some, STAGES_OF_A_PART), seed, settings)
     return replace(assess(run(recordings, STAGES)), nested=nested)

@@ -383,6 +383,18 @@ class StepSettings:
 
 
 @dataclass(frozen=True)
+class EncoderStepSettings:
+    """Steps of a coarse output encoder."""
+
+    share_of_scatter: float = threshold(
+        0.75, "1", "choice: share of what a smooth model leaves that the steps must be, q/sqrt(12), to be taken out"
+    )
+    rounds: int = threshold(8, "1", "choice: effort; the model is fitted anew to what was freed of steps")
+    worth_a_round: float = threshold(0.97, "1", "choice: scatter over the last round's up to which it goes on")
+    told: float = threshold(1.5, "steps", "choice: height up to which a jump may be the encoder's")
+
+
+@dataclass(frozen=True)
 class OrientationSettings:
     """Which way the angles count."""
 
@@ -434,6 +446,9 @@ class VerdictSettings:
     sensor_resolution: float = threshold(
         0.1, "1", "choice: share of the noise between neighbouring samples below which nothing is a finding"
     )
+    stepped_resolution: float = threshold(
+        0.5, "1", "choice: share of what steps taken out of a coarse encoder leave below which nothing is a finding"
+    )
     far_base: float = threshold(
         1.4, "1", "choice: a base error over its prior from which the study's tolerances are left"
     )
@@ -480,6 +495,7 @@ class DiagnosisSettings:
     wander: WanderSettings = WanderSettings()
     steps: StepSettings = StepSettings()
     orientation: OrientationSettings = OrientationSettings()
+    encoder_steps: EncoderStepSettings = EncoderStepSettings()
     verdict: VerdictSettings = VerdictSettings()
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hdopt.arrays import Array
 from hdopt.diagnosis.inference.base_fit import fit_base
 from hdopt.diagnosis.inference.catalogue import SCALE, STRAIN_WAVE_ONLY
 from hdopt.diagnosis.inference.common_slope import TakenSlope, common_slope, input_is_off
@@ -209,6 +210,27 @@ def beside_smooth(clean: Fit) -> Fit:
     beside = replace(problem, nuisance=own)
     free = np.r_[clean.offsets, np.zeros(own.shape[1] - len(clean.offsets))]
     return refine(evaluate(beside, clean.errors, free, (), ()), problem.settings.fit.offset_iterations)
+
+
+def smooth_model(
+    recordings: Sequence[Recording],
+    base: CartesianModel | None,
+    seed: int,
+    settings: DiagnosisSettings,
+    nuisance: Sequence[str] = (),
+) -> Array:
+    """What the `base` and smooth columns beside it make of the averaged rows of `recordings`, (n,) arcmin; smooth
+    columns alone for a gear without one. `seed`, `settings` and `nuisance` as in `begin`.
+    """
+    state = begin(recordings, base, seed, settings, nuisance)
+    clean = fit_clean_base(state.problem, state.draws())
+    if clean is not None:
+        residual = beside_smooth(clean).residual
+    else:
+        rows = state.problem.rows
+        columns = np.column_stack([state.problem.nuisance, generic_columns(rows, settings=settings.generic)[0]])
+        residual = rows.error - columns @ np.linalg.lstsq(columns, rows.error, rcond=None)[0]
+    return np.asarray(gather(recordings, neighbours_for(recordings)).error - residual)
 
 
 def better_way(state: State, turned: State, preferred: float) -> State:

@@ -32,7 +32,8 @@ class Conditions:
     first reversal; `record` the recording, 0, 1, ...; `piece` contiguous rows, 0, 1, ...; `time`, s; `speed` of the
     input, rad/s, with its sign; `torque` at the output, Nm, above 0 where it opposes positive rotation;
     `temperature`, deg C, or K from a reference; each of the last four None where nobody knows it. `locked`: the input
-    stands still and the torque moves. `averaged`: samples behind a row, on average.
+    stands still and the torque moves. `averaged`: samples behind a row, on average. `output_step`: step of the output's
+    encoder, arcmin, where it is coarser than all else, else 0.
     """
 
     ratio: float
@@ -49,6 +50,7 @@ class Conditions:
     temperature: Array | None
     locked: bool = False
     averaged: float = 1.0
+    output_step: float = 0.0
 
     def __len__(self) -> int:
         return len(self.theta)

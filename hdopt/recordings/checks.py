@@ -13,6 +13,7 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import ARCMIN
+from hdopt.recordings.encoder_step import encoder_step
 from hdopt.recordings.ratio import check_ratio
 from hdopt.recordings.recording import TURN, Recording
 from hdopt.recordings.repairs import (
@@ -35,6 +36,8 @@ FEWEST_ROWS = 50
 """Below this nothing can be told apart from the 12 parameters of the base model."""
 ARE_THE_SAME = 0.999
 """Correlation from which an error column is the input angle itself."""
+SMALLEST_STEP_ARCMIN = 0.02
+"""A finer grid is that of the digits written, or of an encoder that no drive can tell from a line."""
 LARGEST_ERROR_ARCMIN = 600.0
 SMALLEST_ERROR_ARCMIN = 1e-3
 """An error beyond these is in another unit than stated, or no error: drives have 0.1 to 60 arcmin."""
@@ -71,7 +74,8 @@ def checked_recording(channels: Mapping[str, Array], ratio: float, name: str) ->
             "cut the file to its sound part"
         )
     smooth_clock(checks)
-    quantum = quantisation(checks)
+    output_step = encoder_step(checks.channels["output"]) / ARCMIN if "output" in checks.channels else 0.0
+    quantum = max(quantisation(checks), output_step if output_step > SMALLEST_STEP_ARCMIN else 0.0)
     error = error_arcmin(checks)
     turns = float(np.ptp(checks.channels["input"])) / TURN
     if 0.02 <= turns < 2:
@@ -86,6 +90,7 @@ def checked_recording(channels: Mapping[str, Array], ratio: float, name: str) ->
         temperature=checks.get("temperature"),
         segment=segment,
         quantum_arcmin=quantum,
+        output_step_arcmin=output_step if output_step > SMALLEST_STEP_ARCMIN else 0.0,
         warnings=tuple(checks.warnings),
         understood=tuple(checks.said),
         output_reversed=reversed_output,

@@ -20,9 +20,9 @@ class Recording:
 
     `input_angle` rad, unwrapped; `error_arcmin` KE at the output; `time` s, `torque` Nm at the output, `temperature`
     deg C or None; `segment` counts up at each gap. `quantum_arcmin` is the step of the coarser encoder at the output, 0
-    where none shows. `warnings` say what was repaired, `understood` how the file was read, a plain sentence each.
-    `sensor_arcmin` is the encoders' standard uncertainty at the output, 0 where nobody stated it; `output_reversed`
-    says that the output was counted against the input.
+    where none shows; `output_step_arcmin` that of the output's alone. `warnings` say what was repaired, `understood`
+    how the file was read, a plain sentence each. `sensor_arcmin` is the encoders' standard uncertainty at the output, 0
+    where nobody stated it; `output_reversed` says that the output was counted against the input.
     """
 
     name: str
@@ -34,6 +34,7 @@ class Recording:
     temperature: Array | None = None
     segment: Index | None = None
     quantum_arcmin: float = 0.0
+    output_step_arcmin: float = 0.0
     warnings: tuple[str, ...] = field(default=())
     understood: tuple[str, ...] = field(default=())
     sensor_arcmin: float = 0.0

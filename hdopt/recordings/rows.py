@@ -75,6 +75,7 @@ def gather(recordings: Sequence[Recording], neighbours: int = 1) -> Rows:
         block=block if not locked else np.minimum(np.arange(len(record)) * 40 // len(record), 39),
         locked=locked,
         quantum=max(recording.quantum_arcmin for recording in recordings),
+        output_step=max(recording.output_step_arcmin for recording in recordings),
         averaged=sum(len(recording) for recording in recordings) / len(record),
         **columns,
     )

@@ -50,6 +50,7 @@ def sudden_steps(fit: Fit) -> Steps:
     size = np.maximum(np.abs(as_step), np.abs(as_slip))
     usable = (noise.root_weight[: len(as_step)] > 0) & ~_near_an_edge(record, settings)[: len(as_step)]
     found = usable & (size > settings.out) & (size**2 > as_glitch**2 + settings.over_a_glitch)
+    found &= ~_of_the_encoder(fit)[: len(found)]
     rows = _separate(size, found, reach)
     if len(rows) < settings.fewest or len(np.unique(record.block[rows])) < settings.fewest_turns:
         return none
@@ -57,6 +58,12 @@ def sudden_steps(fit: Fit) -> Steps:
         return none
     quiet = float(np.var(white[np.abs(white) < settings.quiet * _scatter(white)]))
     return Steps(rows, float(np.sqrt(max(float(np.var(fit.residual)) - quiet, 0.0))))
+
+
+def _of_the_encoder(fit: Fit) -> Mask:
+    """Rows at which what `fit` leaves jumps by no more than a step of the encoder may."""
+    reach = fit.problem.settings.encoder_steps.told * fit.problem.rows.output_step
+    return np.asarray(np.abs(np.diff(fit.residual, prepend=fit.residual[:1])) < reach)
 
 
 def _scores(white: Array, trace: Array, block: Index) -> Array:

@@ -143,6 +143,8 @@ class Event(Alternative):
     domain = "time"
 
     def lacks(self, samples: Conditions) -> str | None:
+        if samples.output_step > 0:
+            return "an output encoder of finer steps"
         return None if not samples.locked else "an input that turns"
 
 

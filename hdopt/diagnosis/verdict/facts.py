@@ -17,6 +17,7 @@ from hdopt.diagnosis.verdict.residual_structure import (
     clearly_unexplained,
     momentary,
     outside_share,
+    resolution,
     term_powers,
     unsteady,
 )
@@ -139,7 +140,7 @@ def find(evidence: Evidence) -> Findings:
         heldout_over_floor=evidence.extended_held_out.rms / evidence.noise_floor,
         noise_over_neighbours=evidence.extended_held_out.rms
         / max(evidence.neighbours_arcmin, evidence.sensor_arcmin, TINY),
-        above_resolution=any(power >= resolution(evidence) ** 2 for power in effect_powers(best)),
+        above_resolution=above_resolution(evidence),
     )
     pairs = confounded_pairs(evidence, facts.named, high) if facts.said else ()
     effects = effects_said(evidence, facts, high)
@@ -158,14 +159,13 @@ def effect_powers(candidate: Candidate) -> list[float]:
     return [power for power, name in zip(powers, candidate.effects, strict=True) if name not in INSTRUMENTS]
 
 
-def resolution(evidence: Evidence) -> float:
-    """Rms (arcmin) below which nothing in `evidence` is a finding: a share of the base's own, to which its model is
-    accurate, and of the noise and the steps of the sensors.
+def above_resolution(evidence: Evidence) -> bool:
+    """Whether some effect of the best set, and what the set predicts of unseen turns, is larger than what sensors and
+    model resolve. `evidence` is that of the diagnosis.
     """
-    settings = evidence.settings.verdict
-    base = float(np.std(evidence.selection.base.base_value))
-    sensors = max(evidence.neighbours_arcmin, evidence.sensor_arcmin)
-    return max(settings.model_resolution * base, settings.sensor_resolution * sensors)
+    least = resolution(evidence) ** 2
+    predicted = evidence.base_held_out.variance - evidence.extended_held_out.variance
+    return predicted >= least and any(power >= least for power in effect_powers(evidence.selection.best))
 
 
 def own_gain(evidence: Evidence) -> float:

@@ -74,6 +74,19 @@ def unsteady(evidence: Evidence) -> Where | None:
     return where
 
 
+def resolution(evidence: Evidence) -> float:
+    """Rms (arcmin) below which nothing in `evidence` is a finding: a share of the base's own, to which its model is
+    accurate, and of the noise and the steps of the sensors; of what is left where a coarse encoder's steps were taken
+    out.
+    """
+    settings = evidence.settings.verdict
+    base = float(np.std(evidence.selection.base.base_value))
+    sensors = settings.sensor_resolution * max(evidence.neighbours_arcmin, evidence.sensor_arcmin)
+    if evidence.rows.output_step > 0:
+        sensors = settings.stepped_resolution * evidence.extended_held_out.rms
+    return max(settings.model_resolution * base, sensors)
+
+
 def outside_share(candidate: Candidate) -> float:
     """Share of what a set explains that its descriptions without physics carry. `candidate` is that set."""
     fit = candidate.fit
@@ -83,8 +96,8 @@ def outside_share(candidate: Candidate) -> float:
 
 
 def clearly_unexplained(evidence: Evidence) -> bool:
-    """Whether the generic basis clearly beats the explanation on held-out turns. `evidence` is that of the
-    diagnosis.
+    """Whether the generic basis clearly beats the explanation on held-out turns, by more than sensors resolve.
+    `evidence` is that of the diagnosis.
     """
     left = evidence.extended_held_out.variance - evidence.remainder.held_out.variance
     explainable = evidence.base_held_out.variance - min(
@@ -94,7 +107,11 @@ def clearly_unexplained(evidence: Evidence) -> bool:
         explainable += float(np.var(evidence.high.best.fit.contributions))
     base_power = float(np.var(evidence.selection.base.base_value))
     settings = evidence.settings.verdict
-    floor = max(settings.remainder_floor * evidence.remainder.held_out.variance, settings.base_floor * base_power)
+    floor = max(
+        settings.remainder_floor * evidence.remainder.held_out.variance,
+        settings.base_floor * base_power,
+        resolution(evidence) ** 2,
+    )
     return (
         evidence.remainder.t > settings.remainder_t and left > settings.remainder_share * explainable and left > floor
     )

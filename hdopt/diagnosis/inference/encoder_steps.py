@@ -1,0 +1,65 @@
+"""A coarse output encoder: its steps taken out of the error wherever a smooth model says between which it stood.
+
+An encoder of 12 or 14 bits reads the nearest of its steps. What that adds to the error is no noise: it is a sawtooth of
+the output angle, which a steady sampling folds down to a few sharp orders that no physics of the drive has. With a
+model m of the error that is right to a small part of a step q, the reading nearest to the model's own output is known,
+and what is left is whole steps: the error is m + q round((e - m)/q). Over the places within a step its mean is the true
+error whatever m was (a uniform dither: Widrow, Kollar, Quantization Noise, 2008, ch. 19), its scatter the root of q
+times what m misses, in place of q/sqrt(12), and no order stands out of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hdopt.arrays import Array
+from hdopt.diagnosis.settings import EncoderStepSettings
+from hdopt.recordings.read import Recording
+from hdopt.recordings.rows import gather, neighbours_for
+
+EVEN = 1 / math.sqrt(12)
+"""Standard deviation of what is evenly spread over one."""
+
+Smooth = Callable[[Sequence[Recording]], Array]
+"""A smooth model of recordings: its errors (arcmin) on their averaged rows, (n,)."""
+
+
+def without_output_steps(
+    recordings: Sequence[Recording], smooth: Smooth, settings: EncoderStepSettings
+) -> tuple[Recording, ...]:
+    """`recordings` with the steps of their output encoder taken out about the model that `smooth` fits to them; as they
+    are, with no step, where none shows or where something else is larger, by the `settings`.
+    """
+    step = max(one.output_step_arcmin for one in recordings)
+    fine = tuple(replace(one, output_step_arcmin=0.0) for one in recordings)
+    if step == 0 or any(one.input_locked for one in recordings):
+        return fine
+    recordings = tuple(replace(one, output_step_arcmin=step) for one in recordings)
+    found, scatter = recordings, math.inf
+    for _ in range(settings.rounds):
+        model = on_samples(recordings, smooth(found))
+        left = [one.error_arcmin - m for one, m in zip(recordings, model, strict=True)]
+        as_read = float(np.std(np.concatenate(left)))
+        if not settings.share_of_scatter * as_read < EVEN * step:
+            return fine
+        steps = [step * np.round(one / step) for one in left]
+        now = float(np.std(np.concatenate(steps)))
+        if now > settings.worth_a_round * scatter:
+            break
+        scatter = now
+        found = tuple(replace(one, error_arcmin=m + s) for one, m, s in zip(recordings, model, steps, strict=True))
+    return found
+
+
+def on_samples(recordings: Sequence[Recording], values: Array) -> list[Array]:
+    """`values` (n,) of the averaged rows of `recordings` on the samples of each, by straight lines."""
+    counted = [replace(one, error_arcmin=np.arange(len(one), dtype=float)) for one in recordings]
+    rows = gather(counted, neighbours_for(recordings))
+    return [
+        np.interp(np.arange(len(one)), rows.error[rows.record == i], values[rows.record == i])
+        for i, one in enumerate(recordings)
+    ]

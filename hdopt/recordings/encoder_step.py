@@ -1,0 +1,44 @@
+"""The step of an encoder, read off the angles that it gave: all of them lie on one even grid."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hdopt.arrays import Array
+
+FEWEST_LEVELS = 20
+"""Different angles from which a grid can be told."""
+NEIGHBOURS = 0.05
+"""Part of the usual distance between levels below which two are one, written with other digits."""
+ON_THE_GRID = 0.02
+"""How far from the grid, in steps, a level may lie by its written digits."""
+PARTS = (1, 2, 3, 4, 5, 6)
+"""Steps that the smallest distance between two levels may be."""
+NEARLY_ALL = 0.99
+"""Share of the levels that must lie on the grid: a few may be repaired rows. Of 20 levels off a grid a chance of
+(2 x 0.02)^20 puts them all on it."""
+
+
+def encoder_step(angle: Array) -> float:
+    """Step of the even grid on which the values of `angle` (n,) lie, in their unit; 0 where there is none.
+
+    Levels may be left out, as where the output moves by several steps from sample to sample. The step is the smallest
+    distance between levels, or a whole part of it, made precise over ever more of them.
+    """
+    levels = np.unique(angle)
+    apart = np.diff(levels)
+    if len(levels) < FEWEST_LEVELS:
+        return 0.0
+    least = float(apart[apart > NEIGHBOURS * np.median(apart)].min())
+    return next((step for part in PARTS if (step := _refined(levels, least / part)) > 0), 0.0)
+
+
+def _refined(levels: Array, step: float) -> float:
+    """`step` made precise over ever more of the `levels` (n,); 0 where they do not lie on its grid."""
+    reach = 1
+    while reach < len(levels) - 1:
+        reach = min(2 * reach, len(levels) - 1)
+        steps = round(float(levels[reach] - levels[0]) / step)
+        step = float(levels[reach] - levels[0]) / max(steps, 1)
+    places = (levels - levels[0]) / step
+    return step if np.mean(np.abs(places - np.round(places)) < ON_THE_GRID) > NEARLY_ALL else 0.0

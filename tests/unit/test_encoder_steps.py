@@ -1,0 +1,102 @@
+"""Steps of a coarse output encoder: read off the angles, and taken out of the error about a model that may be wrong."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hdopt.bench.cases import Spec, simulate
+from hdopt.diagnosis import diagnose
+from hdopt.diagnosis.inference.encoder_steps import without_output_steps
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.recordings.encoder_step import encoder_step
+from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.rows import gather
+from hdopt.study import load_study
+
+TURN = 2 * np.pi
+STEP = 360 / 2**14
+RATIO = 80.0
+SETTINGS = DEFAULT.encoder_steps
+
+
+@pytest.mark.parametrize("leaps", [1, 3, 7])
+@pytest.mark.parametrize("precision", [np.float64, np.float32])
+def test_step_is_read_off_levels_that_are_left_out(leaps, precision):
+    """Would catch a step taken from the usual distance of levels: where the output moves by several, that is twice."""
+    counts = np.cumsum(np.random.default_rng(0).integers(leaps // 2, leaps + 1, 5000)) - 40
+    assert encoder_step(precision(counts * STEP)) == pytest.approx(STEP, rel=1e-4)
+
+
+def test_angles_off_every_grid_have_no_step():
+    rng = np.random.default_rng(1)
+    assert encoder_step(np.cumsum(rng.random(3000))) == 0
+    assert encoder_step(np.cumsum(rng.random(10))) == 0
+    assert encoder_step(np.zeros(100)) == 0
+
+
+def recorded(error_arcmin, theta, step_deg=STEP):
+    """A recording whose output encoder reads the nearest of its steps."""
+    output = np.degrees(theta) / RATIO - error_arcmin / 60
+    if step_deg:
+        output = np.round(output / step_deg) * step_deg
+    table = pd.DataFrame({"time_s": theta, "input_angle_deg": np.degrees(theta), "output_angle_deg": output})
+    return recording_from_table(table, RATIO)
+
+
+THETA = np.arange(8000) * TURN / 100
+KE = 0.1 * np.sin(2 * THETA + 0.4)
+
+
+def wave(values, order):
+    """Amplitude of a wave of `order` in `values` (n,)."""
+    return 2 * abs(np.mean(values * np.exp(-1j * order * THETA)))
+
+
+def smooth(missed=0.0):
+    """A model that fits the truth but for a wave of order 3, `missed` (arcmin), and a zero that it finds."""
+
+    def model(recordings):
+        rows = gather(recordings)
+        known = KE + missed * np.sin(3 * THETA)
+        return known + np.mean(rows.error - known)
+
+    return model
+
+
+def test_a_recording_says_the_step_of_its_output():
+    assert recorded(KE, THETA).output_step_arcmin == pytest.approx(60 * STEP, rel=1e-4)
+    assert recorded(KE, THETA, 0).output_step_arcmin == 0
+
+
+def test_the_folded_order_vanishes_and_what_the_model_missed_stays():
+    """16384 steps an output turn are 204.8 an input turn, which 100 rows fold to 4.8: q/pi high as read. A wave that
+    the model gets wrong by 0.05 comes back as the truth has it, to the scatter's standard error of 0.005."""
+    record = recorded(KE, THETA)
+    assert wave(record.error_arcmin, 4.8) == pytest.approx(60 * STEP / np.pi, rel=0.1)
+    (freed,) = without_output_steps([record], smooth(0.05), SETTINGS)
+    assert wave(freed.error_arcmin, 4.8) < 0.05 * wave(record.error_arcmin, 4.8)
+    left = freed.error_arcmin - KE
+    assert wave(left, 3) < 0.015
+    assert np.std(left) < 0.7 * 60 * STEP / np.sqrt(12)
+
+
+def test_steps_stay_where_something_else_is_larger_or_none_is_there():
+    loud = recorded(KE + np.random.default_rng(2).normal(0, 1.0, len(THETA)), THETA)
+    (kept,) = without_output_steps([loud], smooth(), SETTINGS)
+    assert kept.output_step_arcmin == 0
+    np.testing.assert_array_equal(kept.error_arcmin, loud.error_arcmin)
+    fine = replace(recorded(KE, THETA), output_step_arcmin=0.0)
+    (kept,) = without_output_steps([fine], smooth(), SETTINGS)
+    np.testing.assert_array_equal(kept.error_arcmin, fine.error_arcmin)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("reading", ["12-bit output", "14-bit output"])
+def test_a_sound_drive_on_a_coarse_encoder_is_adequate(reading):
+    """Before steps were taken out each was `unknown`, at an order to which the sampling folds them."""
+    drive = load_study(drive="csf-25-80").drive
+    drawn = simulate(Spec("coarse", 2, reading=reading, size="small", gear="csf-25-80"))
+    answer = diagnose([recording_from_table(table, RATIO) for table in drawn.tables], drive)
+    assert (answer.verdict, answer.effects) == ("adequate", ())
