@@ -17,6 +17,7 @@ import pickle
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +53,8 @@ as shipped.
 
 Thresholds of the verdict are moved one by one, on what the other stages had found. The others are moved as groups
 first: in a group that changes no answer each stands with 0, though moves within it may make up for each other;
-"group: n" says that the group changes n answers and that its members were not moved singly yet.
+"group: n" says that the group changes n answers and that its members were not moved singly yet. The last of these
+answers was given on {last}, by the program of that day.
 """
 NOT_TRIED = """\
 The moves have not been tried on these settings yet.
@@ -174,6 +176,12 @@ class Answers:
         """Keep the `answer` to `case` after `move` (None: as shipped)."""
         write_text(self._file(case, move), json.dumps(answer))
 
+    @property
+    def last(self) -> date:
+        """The day of the last answer, today where none was given."""
+        days = [date.fromtimestamp(file.stat().st_mtime) for file in self.folder.glob("*.json")]
+        return max(days, default=date.today())
+
     def evidence(self, case: Case) -> Path:
         """Where the evidence of `case` is kept."""
         return self.folder / f"{case.name}.evidence"
@@ -257,7 +265,8 @@ def page(answers: Answers, tried: Sequence[Case]) -> str:
     """The documentation's page on every threshold, from the `answers` to the cases `tried`."""
     given = [answers.get(case, None) for case in tried]
     right = sum(answer in case.answers for case, answer in zip(tried, given, strict=True))
-    tells = NOT_TRIED if None in given else TRIED.format(cases=len(tried), outside=len(KINDS), right=right)
+    counts = {"cases": len(tried), "outside": len(KINDS), "right": right}
+    tells = NOT_TRIED if None in given else TRIED.format(**counts, last=answers.last)
     lines = (HEADER + tells).splitlines()
     group = ""
     for one in thresholds():
