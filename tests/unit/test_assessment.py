@@ -9,9 +9,10 @@ from test_cross_validation import RATE, noisy, rows_of, without_base
 from test_diagnosis_evidence import state
 
 from hdopt.diagnosis.checks import assessment
-from hdopt.diagnosis.checks.assessment import assess, detection_limits, look_at_remainder, noise_between_neighbours
+from hdopt.diagnosis.checks.assessment import assess, detection_limits, look_at_remainder
 from hdopt.diagnosis.inference.catalogue import SCALE
 from hdopt.diagnosis.inference.fit import extend
+from hdopt.diagnosis.inference.neighbour_noise import noise_between_neighbours
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.search.candidates import Candidate, penalty_scale, search_terms
 from hdopt.diagnosis.search.penalty import Scale, penalty

@@ -18,9 +18,10 @@ from hdopt.diagnosis.inference.cross_validation import HeldOut, family_wise_p, h
 from hdopt.diagnosis.inference.fit import Fit, term_columns
 from hdopt.diagnosis.inference.generic_basis import useful_columns
 from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut
+from hdopt.diagnosis.inference.neighbour_noise import noise_between_neighbours
 from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.inference.residual_gains import FitProbe
-from hdopt.diagnosis.numerical import MAD_TO_SIGMA, SMALLEST_POWER, TINY
+from hdopt.diagnosis.numerical import SMALLEST_POWER, TINY
 from hdopt.diagnosis.orientation import Orientation
 from hdopt.diagnosis.search.candidates import penalty_scale, search_terms
 from hdopt.diagnosis.search.penalty import Scale as PenaltyScale
@@ -31,11 +32,7 @@ from hdopt.diagnosis.state import State
 from hdopt.effects import EFFECTS, HIGH_ORDER
 from hdopt.effects.probe import strongest_orders
 from hdopt.effects.term import Term
-from hdopt.recordings.recording import Recording
 from hdopt.recordings.rows import Rows
-
-SECOND_DIFFERENCE = 6
-"""Variance of a second difference of white noise over the noise's own: 1 + 4 + 1."""
 
 
 @dataclass(frozen=True)
@@ -145,14 +142,6 @@ def best_placebo(probe: FitProbe, pool: Sequence[Term], best: Fit) -> Term | Non
 def placebo_error(probe: FitProbe, placebo: Term, folds: Index) -> HeldOut:
     """Held-out error, on `folds` (n,), with the `placebo` beside the base that `probe` looks at."""
     return held_out(probe.fit, term_columns(placebo, probe.fit.zone, probe.fit.problem.base), folds)
-
-
-def noise_between_neighbours(recordings: Sequence[Recording]) -> float:
-    """Standard deviation (arcmin) of the noise of one sample of the `recordings` as recorded, from second differences
-    of neighbours, in which whatever is smooth over three samples vanishes: the median over the recordings.
-    """
-    sizes = [np.median(np.abs(np.diff(one.error_arcmin, 2))) for one in recordings]
-    return float(np.median(sizes)) * MAD_TO_SIGMA / math.sqrt(SECOND_DIFFERENCE)
 
 
 def lacking_effects(state: State, strange: Sequence[str]) -> dict[str, str]:

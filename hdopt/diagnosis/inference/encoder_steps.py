@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from hdopt.arrays import Array
+from hdopt.diagnosis.inference.neighbour_noise import noise_between_neighbours
 from hdopt.diagnosis.settings import EncoderStepSettings
 from hdopt.recordings.read import Recording
 from hdopt.recordings.rows import gather, neighbours_for
@@ -36,7 +37,9 @@ def without_output_steps(
     """
     step = max(one.output_step_arcmin for one in recordings)
     fine = tuple(replace(one, output_step_arcmin=0.0) for one in recordings)
-    if step == 0 or any(one.input_locked for one in recordings):
+    if any(one.input_locked for one in recordings) or not _is_most(
+        step, noise_between_neighbours(recordings), settings
+    ):
         return fine
     recordings = tuple(replace(one, output_step_arcmin=step) for one in recordings)
     found, scatter = recordings, math.inf
@@ -44,7 +47,7 @@ def without_output_steps(
         model = on_samples(recordings, smooth(found))
         left = [one.error_arcmin - m for one, m in zip(recordings, model, strict=True)]
         as_read = float(np.std(np.concatenate(left)))
-        if not settings.share_of_scatter * as_read < EVEN * step:
+        if not _is_most(step, as_read, settings):
             return fine
         steps = [step * np.round(one / step) for one in left]
         now = float(np.std(np.concatenate(steps)))
@@ -53,6 +56,11 @@ def without_output_steps(
         scatter = now
         found = tuple(replace(one, error_arcmin=m + s) for one, m, s in zip(recordings, model, steps, strict=True))
     return found
+
+
+def _is_most(step: float, scatter: float, settings: EncoderStepSettings) -> bool:
+    """Whether what a `step` adds is most of a `scatter`, both arcmin."""
+    return settings.share_of_scatter * scatter < EVEN * step
 
 
 def on_samples(recordings: Sequence[Recording], values: Array) -> list[Array]:
