@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from hdopt.allocation.request import AllocationRequest
@@ -10,7 +11,7 @@ from hdopt.errors import HdoptError, unknown_name
 from hdopt.parallel.engine import Engine
 from hdopt.study import AnyStudy, Study, as_study
 from hdopt.tolerance.intervals import IntervalEstimate
-from hdopt.workflow.stack import ToleranceProblem, study_problem
+from hdopt.workflow.stack import ToleranceProblem, study_problem, words_on_model
 
 if TYPE_CHECKING:
     from hdopt.allocation.convex import Item
@@ -135,7 +136,8 @@ def _drive_result(
     chosen, sources = decided
     outcomes, points = beside
     status = "verified" if verified.low >= stated.required_yield else "not verified"
-    notes = [*stated.notes]
+    allocated = replace(stated, space=stated.space.with_tolerances(chosen.tolerances))
+    notes = [*stated.notes, *words_on_model(allocated, request.seed)]
     if status == "not verified":
         notes.append(
             f"the {request.rule} rule's tolerances do not reach the yield: its lower bound is {verified.low:.5f}, "

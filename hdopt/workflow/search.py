@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from hdopt.files import write_text
+from hdopt.kinematics.model_error import model_error
 from hdopt.optimize.fronts import Progress
 from hdopt.optimize.records import SearchResult
 from hdopt.optimize.search import search_designs
 from hdopt.study import AnyStudy, Study, as_study
 from hdopt.workflow.output_files import Files, checked_files, write_table_files
 from hdopt.workflow.search_setup import setup_of
+from hdopt.workflow.stack import PILOT_MEASURED, PILOT_N
 from hdopt.workflow.write_design import chosen_study_toml
 
 FILES = ("csv", "xlsx", "study")
@@ -34,6 +37,7 @@ def search(
     study, wanted = as_study(study), checked_files(files, FILES)
     setup = setup_of(study, seed)
     result = search_designs(setup, seed, progress, fronts=fronts, study=study.name, notes=_notes(study))
+    result = replace(result, notes=(*result.notes, *words_on_model(result)))
     write_search(result, wanted, study)
     return result
 
@@ -47,6 +51,18 @@ def write_search(result: SearchResult, files: Mapping[str, Path], study: Study) 
     write_table_files(result, files)
     if "study" in files and result.feasible:
         write_text(files["study"], chosen_study_toml(study, result, files["study"].parent))
+
+
+def words_on_model(result: SearchResult) -> tuple[str, ...]:
+    """A sentence where the closed form is far from the exact geometry for the best design of `result` under the
+    tolerances; () where it is not, or where no tolerances were searched under."""
+    setup = result.setup
+    design = setup.space.design(result.chosen.combination, result.chosen.values)
+    if setup.trade.sample is None or not isinstance(design.drive.geometry.flexspline_teeth, int):
+        return ()
+    drives = PILOT_MEASURED if design.drive.has_measured_teeth else PILOT_N
+    said = model_error(design.drive, setup.trade.of(setup.trade.sample[:drives], design)).says
+    return () if said is None else (f"the best design: {said}",)
 
 
 def _notes(study: Study) -> tuple[str, ...]:

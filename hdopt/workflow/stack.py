@@ -6,10 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
+import numpy as np
+
 from hdopt.drive.errors import PHASE_OF, DriveErrors, study_key
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, unknown_name
-from hdopt.kinematics.model_error import ModelError, model_error
+from hdopt.kinematics.model_error import WORTH_A_WORD_ARCMIN, ModelError, model_error
 from hdopt.kinematics.waveform import CLOSED_FORM, EXACT
 from hdopt.parallel.engine import Engine
 from hdopt.study import AnyStudy, Study, as_study
@@ -24,6 +26,7 @@ from hdopt.tolerance.sampling import SAMPLINGS
 from hdopt.tolerance.screening import Screening, run_screening
 from hdopt.tolerance.space import InputSpace
 from hdopt.tolerance.stack import StackRequest, run_stack
+from hdopt.tolerance.worst_case import WorstCase
 
 STACK_N = 2**18
 USUAL_YIELD = 0.9973
@@ -247,6 +250,8 @@ def stack(
         from hdopt.tolerance.tail import tail_probability
 
         rare = tail_probability(problem.response, problem.space, tail, seed=seed)
+    if worst is not None:
+        notes += _exact_at(problem, worst)
     method, distance = _method(problem, seed)
     if distance is not None and distance.says is not None:
         notes.append(distance.says)
@@ -264,6 +269,30 @@ def _method(problem: ToleranceProblem, seed: int) -> tuple[str | None, ModelErro
     if response.drive.has_measured_teeth or response.teeth:
         points = points[:PILOT_MEASURED]
     return CLOSED_FORM, model_error(response.drive, response.matrix(problem.space.sample(points)))
+
+
+def words_on_model(problem: ToleranceProblem, seed: int) -> tuple[str, ...]:
+    """A sentence where the closed form that the drives of `problem` are computed with is far from the exact geometry
+    for a pilot of them, drawn with `seed`; () where it is not."""
+    distance = _method(problem, seed)[1]
+    return () if distance is None or distance.says is None else (distance.says,)
+
+
+def _exact_at(problem: ToleranceProblem, worst: WorstCase) -> tuple[str, ...]:
+    """A sentence where the exact geometry of the worst drive found differs from what was maximised."""
+    response = problem.response
+    if not isinstance(response, DriveResponse) or response.drive.has_measured_teeth:
+        return ()
+    from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin
+
+    row = response.matrix(np.array([[worst.at[name] for name in problem.space.names]]))
+    exact = response.homogenization * converged_peak_to_peak_arcmin(response.drive, DriveErrors.from_matrix(row[0]))
+    if abs(exact - worst.value) <= WORTH_A_WORD_ARCMIN:
+        return ()
+    return (
+        f"the worst case found is {worst.value:.4g} arcmin by the closed form and {exact:.4g} by the exact geometry of "
+        "that drive: such large errors leave the closed form's range",
+    )
 
 
 def sobol(
@@ -293,6 +322,7 @@ def sobol(
     elif shapley is None:
         shapley = "inputs" if space.dimension <= SHAPLEY_INPUTS or not space.groups else "groups"
         notes.append("inputs are correlated: Shapley effects share the variance, Sobol' indices would not sum up")
+    notes += words_on_model(problem, seed)
     if shapley is None:
         return SobolResult(problem.study, indices, None, tuple(notes))
     players = None if shapley == "inputs" else space.groups
@@ -317,4 +347,5 @@ def screen(
     found = run_screening(
         problem.response, problem.space, method.replace("-", "_"), n=n, seed=seed, engine=engine, unit=problem.unit
     )
-    return replace(found, study=problem.study, notes=(*problem.notes, *found.notes))
+    notes = (*problem.notes, *words_on_model(problem, seed), *found.notes)
+    return replace(found, study=problem.study, notes=notes)

@@ -10,7 +10,7 @@ from hdopt.optimize.objectives import ROBUST
 from hdopt.optimize.robustness import constants_of, perturb
 from hdopt.report import Figure, Table
 from hdopt.study import load_study
-from hdopt.workflow.search import search
+from hdopt.workflow.search import search, words_on_model
 from hdopt.workflow.search_setup import sample_rows
 from hdopt.workflow.search_verification import verify
 from hdopt.workflow.stack import drive_problem_of
@@ -68,6 +68,13 @@ def test_fresh_drives_confirm_the_quantile(study, result):
     # 512 drives know the 99.73 % quantile to a few per cent: 1.4 of them lie beyond it.
     assert fresh.searched_arcmin == pytest.approx(fresh.quantile_arcmin, rel=0.05)
     assert checked.exact_arcmin == pytest.approx(checked.kernel_arcmin, abs=1e-3)
+
+
+def test_a_search_says_how_far_its_best_design_is_from_the_exact_geometry(result, monkeypatch):
+    assert words_on_model(result) == ()
+    monkeypatch.setattr("hdopt.kinematics.model_error.WORTH_A_WORD_ARCMIN", 1e-7)
+    (said,) = words_on_model(result)
+    assert said.startswith("the best design: the closed form") and "over 16 drives" in said
 
 
 def test_every_constant_has_a_source_and_is_perturbed(result):

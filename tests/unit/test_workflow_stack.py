@@ -18,8 +18,8 @@ from hdopt.tolerance.drive_bound import peak_to_peak_bound_arcmin
 from hdopt.tolerance.drive_inputs import contributor_distribution, drive_problem
 from hdopt.tolerance.sampling import ScrambledSobol
 from hdopt.tolerance.tail import tail_probability
-from hdopt.tolerance.worst_case import find_worst_case
-from hdopt.workflow.stack import sobol, stack, study_problem
+from hdopt.tolerance.worst_case import WorstCase, find_worst_case
+from hdopt.workflow.stack import _exact_at, screen, sobol, stack, study_problem
 
 TURN = Uniform(lower=0.0, upper=360.0)
 
@@ -163,6 +163,24 @@ def test_a_stack_says_its_method_and_how_far_it_is_from_the_exact_geometry():
     assert any(
         "differs by up to" in note and "from the exact geometry over 16 drives" in note for note in found["notes"]
     )
+
+
+@pytest.mark.slow
+def test_sensitivities_and_worst_cases_say_how_far_they_are_from_the_exact_geometry():
+    wide = [f"tolerances.axis_tilt_{x}_deg={{distribution='uniform',lower=-4,upper=4}}" for x in "yx"]
+    far, near = load_study("csf-25-80", wide), load_study("csf-25-80")
+    for call in (lambda study: sobol(study, 256, second_order=False), lambda study: screen(study, "pawn", 128)):
+        assert any("from the exact geometry over 16 drives" in note for note in call(far).notes)
+        assert not any("exact geometry" in note for note in call(near).notes)
+    problem = study_problem(far)
+    at = dict.fromkeys(problem.space.names, 0.0) | {"axis_tilt_y_deg": 4.0, "axis_tilt_x_deg": 4.0}
+    row = np.array([[at[name] for name in problem.space.names]])
+    exact = converged_peak_to_peak_arcmin(
+        problem.response.drive, DriveErrors.from_matrix(problem.response.matrix(row)[0])
+    )
+    (said,) = _exact_at(problem, WorstCase(float(problem.response(row)[0]), at, None, 1))
+    assert f"{exact:.4g} by the exact geometry" in said
+    assert not _exact_at(problem, WorstCase(exact, at, None, 1))
 
 
 def test_a_worst_case_of_tilts_beyond_the_proof_is_best_found():
