@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 Array: TypeAlias = NDArray[np.float64]
 """Numbers in double precision."""
 
+Singles: TypeAlias = NDArray[np.float32]
+"""Numbers in single precision, as compiled lanes work on them."""
+
 Index: TypeAlias = NDArray[np.int64]
 """Whole numbers: counts and places in other arrays."""
 

@@ -10,7 +10,7 @@ of the size of the shipped tolerances; the error grows with the third power of t
 
 from __future__ import annotations
 
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +20,9 @@ from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.drive.profiles import tip_radius_of_curvature
 from hdopt.kinematics.branches import Branches, DeepestPoints, deepest
+
+HALF = cast("float", np.float32(0.5))
+"""A half that does not widen single precision, and is exact."""
 
 V = TypeVar("V", float, Array)
 """Numbers of one drive at one angle, as compiled kernels have them, or arrays of any shapes that broadcast."""
@@ -139,9 +142,9 @@ def rigid_motion(tip: TipGeometry, errors: ErrorComponents[V]) -> RigidMotion[V]
         tl_cos=lift_x,
         tl_sin=-lift_y,
         tl_0=tip.half_width * errors.tan_wg_minor,
-        twist_cos=(errors.tan_tilt_y * errors.tan_wg_minor - errors.tan_tilt_x * errors.tan_wg_major) * 0.5,
-        twist_sin=(errors.tan_tilt_x * errors.tan_wg_minor + errors.tan_tilt_y * errors.tan_wg_major) * 0.5,
-        twist_0=(errors.tan_tilt_x * errors.tan_tilt_y + errors.tan_wg_major * errors.tan_wg_minor) * 0.5,
+        twist_cos=(errors.tan_tilt_y * errors.tan_wg_minor - errors.tan_tilt_x * errors.tan_wg_major) * HALF,
+        twist_sin=(errors.tan_tilt_x * errors.tan_wg_minor + errors.tan_tilt_y * errors.tan_wg_major) * HALF,
+        twist_0=(errors.tan_tilt_x * errors.tan_tilt_y + errors.tan_wg_major * errors.tan_wg_minor) * HALF,
     )
 
 

@@ -74,7 +74,10 @@ def test_walk_of_80_turns_in_numpy(benchmark):
 
 
 def test_against_the_exact_geometry(benchmark, request):
-    """99 % of random drives within 1e-3 arcmin of the exact geometry's converged value, all within 5e-3."""
+    """99.9 % of random drives within 1e-3 arcmin of the exact geometry's converged value: of 500, all.
+
+    `python -m tests.benchmarks.kernel_accuracy` measures the share on 20,000, over every structure and profile.
+    """
     count = 500 if in_earnest(request) else 24
     errors = random_errors(count, seed=5)
     rows = [DriveErrors.from_matrix(row) for row in errors.to_matrix()]
@@ -90,7 +93,7 @@ def test_against_the_exact_geometry(benchmark, request):
         "median": float(np.median(difference)),
         "largest": float(difference.max()),
     }
-    assert np.mean(difference < 1e-3) >= 0.99
+    assert np.mean(difference < 1e-3) >= 0.999
     assert difference.max() < 5e-3
 
 

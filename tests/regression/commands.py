@@ -10,6 +10,8 @@ from tests.regression.golden import compact, hdopt
 
 # The closed form and its sums: rounding may change with the order of summation, by parts in 1e12.
 EXACT = 1e-9
+# Peak-to-peaks of many drives are in single precision: another processor type rounds them by a few parts in 1e7.
+SINGLE = 1e-6
 # An optimiser stops where the objective no longer changes by 1e-9, so about 1e-4.5 away along a flat direction: another
 # order of summation moved an allocated tolerance by 1e-5.
 SEARCHED = 1e-4
@@ -46,15 +48,15 @@ COMMANDS = (
     Command(("ke", "chase-shaft-housing")),
     *(Command(("profile", study)) for study in CSF),
     *(Command(("profile", "--profile", p)) for p in ("resal", "two_disk", "ellipse")),
-    Command(("stack", "csf-25-80", *FAST_STACK)),
-    Command(("stack", "csf-25-80", "-n", "2048", "--sampling", "monte-carlo")),
+    Command(("stack", "csf-25-80", *FAST_STACK), SINGLE),
+    Command(("stack", "csf-25-80", "-n", "2048", "--sampling", "monte-carlo"), SINGLE),
     Command(("stack", "csf-25-80", "-n", "2048", "--worst-case"), SEARCHED),
-    Command(("stack", "csf-25-80", "-n", "2048", "--tail", "1.2"), slow=True),
-    Command(("stack", "csf-25-80-tolerances", "-n", "2048", "--quantile", "0.95")),
+    Command(("stack", "csf-25-80", "-n", "2048", "--tail", "1.2"), SINGLE, slow=True),
+    Command(("stack", "csf-25-80-tolerances", "-n", "2048", "--quantile", "0.95"), SINGLE),
     Command(("stack", "chase-shaft-housing", *FAST_STACK, "--worst-case"), SEARCHED),
-    Command(("stack", "paper-reproduction", "-n", "2048")),
-    Command(("sobol", "csf-25-80", "-n", "256")),
-    Command(("sobol", "csf-25-80", "-n", "256", "--no-second-order", "--shapley", "groups"), slow=True),
+    Command(("stack", "paper-reproduction", "-n", "2048"), SINGLE),
+    Command(("sobol", "csf-25-80", "-n", "256"), SINGLE),
+    Command(("sobol", "csf-25-80", "-n", "256", "--no-second-order", "--shapley", "groups"), SINGLE, slow=True),
     Command(("sobol", "chase-shaft-housing", "-n", "512")),
     *(Command(("allocate", "chase-shaft-housing", "--rule", r), SEARCHED) for r in ("worst_case", "rss")),
     Command(("allocate", "csf-25-80-tolerances", "--rule", "rss", *FAST_ALLOCATION), SEARCHED, slow=True),
@@ -68,8 +70,8 @@ COMMANDS = (
     *(Command(("export", study)) for study in ("csf-25-80", "csf-25-80-tolerances")),
     Command(("export", "csf-25-80", "--set", "wave_generator.profile=resal")),
     Command(("run", "chase-shaft-housing"), SEARCHED, slow=True),
-    Command(("run", "paper-reproduction"), slow=True),
-    Command(("run", "csf-25-80"), slow=True),
+    Command(("run", "paper-reproduction"), SINGLE, slow=True),
+    Command(("run", "csf-25-80"), SINGLE, slow=True),
 )
 
 
