@@ -18,6 +18,28 @@ NOT_MODELLED = (
 """What stands beside every choice, because no formula of the trade knows it."""
 
 
+def break_evens(result: SearchResult) -> tuple[str, ...]:
+    """For each structure other than the one that `result` chose, a phrase of what the chosen one may cost beside it
+    before that one is the better: the gap of the best designs of both, in the objective's unit and as a share.
+
+    What an alignment structure loses in stiffness and efficiency is not modelled: this is the number to hold it
+    against. Structures without a design that keeps the limits are left out.
+    """
+    best, unit = result.best, QUANTITIES[result.objective].unit
+    if not result.feasible:
+        return ()
+    at_best = best.quantities[result.objective]
+    others: dict[str, float] = {}
+    for design in result.combinations:
+        if design.feasible and design.structure != best.structure:
+            value = design.quantities[result.objective]
+            others[design.structure] = min(value, others.get(design.structure, value))
+    return tuple(
+        f"{number(abs(value - at_best), unit)} ({100 * abs(value / at_best - 1):.2g} %) beside {structure}"
+        for structure, value in sorted(others.items(), key=lambda item: abs(item[1] - at_best))
+    )
+
+
 def number(value: float, unit: str = "") -> str:
     """A `value` to four digits with its `unit`; a large one written out: '35000 h'."""
     digits = f"{value:.4g}" if abs(value) < 10_000 else f"{value:.0f}"
@@ -57,6 +79,8 @@ def result_lines(result: SearchResult) -> Iterator[str]:
             f"  front of {front.objective} and {front.second}: {len(front.designs)} designs, "
             f"hypervolume {front.hypervolume:.4g}"
         )
+    if gaps := break_evens(result):
+        yield f"  {best.structure} stays the choice until what it costs is worth {', '.join(gaps)}"
     for note in result.notes:
         yield f"  note: {note}"
     yield f"  not modelled: {'; '.join(NOT_MODELLED)}"

@@ -10,7 +10,7 @@ import pandas as pd
 from hdopt.optimize.design_space import VARIABLES
 from hdopt.optimize.objectives import NOMINAL, QUANTITIES, ROBUST, Quantity, find_quantity
 from hdopt.optimize.records import DesignRecord, Front, Perturbation, SearchResult, Verification
-from hdopt.optimize.summary import NOT_MODELLED, number
+from hdopt.optimize.summary import NOT_MODELLED, break_evens, number
 from hdopt.optimize.views import DesignMap, Rings, TradeViews
 from hdopt.report import Figure, KeyFigures, Section, Table, Text
 from hdopt.report.sections.design_map import Design, design_map, words_on_limits
@@ -119,11 +119,20 @@ def chosen_section(result: SearchResult, file: str, key: str = "trade-chosen") -
                 "From the multipliers at the optimum: the fall of the objective for one unit more room.",
             ),
             Table(f"{key}-combinations", "Every profile and structure at its own best", _combinations(result)),
-            Text(f"Not modelled: {'; '.join(NOT_MODELLED)}. Weigh these beside the table."),
+            Text(_not_modelled(result)),
         ),
         f"{name_of(best)}: {number(after, objective.unit)} instead of {number(before, objective.unit)}. "
         f"Its study file is {file}.",
     )
+
+
+def _not_modelled(result: SearchResult) -> str:
+    """What no formula knows, and how much of it would change the structure that `result` chose."""
+    words = f"Not modelled: {'; '.join(NOT_MODELLED)}. Weigh these beside the table."
+    if not (gaps := break_evens(result)):
+        return words
+    structure = in_sentence(label(result.best.structure))
+    return f"{words} The structure ({structure}) stays the choice until what it costs is worth {', '.join(gaps)}."
 
 
 def _against_baseline(result: SearchResult) -> pd.DataFrame:
