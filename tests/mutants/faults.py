@@ -2,8 +2,8 @@
 
 Each fault in `hand_made/ROOM.toml` is one that a reviewer who knows the physics would look for: a term dropped, a sign
 turned, rows leaked. The tests that should notice it are those of its room, or those that it names, one file after the
-other; golden answers do not count. Outcomes are kept below `build/mutants`; those that survived are asked again. Whole
-rooms are written to docs/mutants.md.
+other; golden answers do not count. Outcomes are kept below `build/mutants`; survivors are asked again. What is known of
+a room is written to docs/mutants.md.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ PAGE = ROOT / "docs" / "mutants.md"
 def section(room: str, faults: Sequence[Fault], found: dict[str, str]) -> str:
     """The part of the page about one `room`: counts, survivors, and what cannot be seen, with its reason."""
     counted = [fault for fault in faults if not fault.equivalent]
-    said = [found[fault.key] for fault in counted]
-    killed, survived, late = (said.count(word) for word in ("killed", "survived", "timeout"))
+    said = {fault: found.get(fault.key, "not asked") for fault in counted}
+    killed, survived, late, left = (
+        list(said.values()).count(word) for word in ("killed", "survived", "timeout", "not asked")
+    )
     share = killed / max(killed + survived, 1)
-    lines = [f"## {room}", "", f"{killed} of {killed + survived} noticed ({share:.0%}); {late} ran out of time.", ""]
-    for fault in counted:
-        if found[fault.key] != "killed":
-            lines.append(f"- {found[fault.key]}: {fault.name} (`{fault.file}`)")
+    counts = f"{killed} of {killed + survived} noticed ({share:.0%}); {late} ran out of time, {left} not asked yet."
+    lines = [f"## {room}", "", counts, ""]
+    lines += [f"- {word}: {one.name} (`{one.file}`)" for one, word in said.items() if word in ("survived", "timeout")]
     lines += [f"- nothing to see: {fault.name}: {fault.equivalent}" for fault in faults if fault.equivalent]
     return "\n".join(lines).rstrip() + "\n"
 
@@ -72,7 +73,7 @@ def main() -> int:
     written = {
         room: section(room, faults, found)
         for room, faults in listed.items()
-        if all(fault.key in found for fault in faults if not fault.equivalent)
+        if any(fault.key in found for fault in faults)
     }
     print("\n".join(written.values()))
     if PAGE.exists():
