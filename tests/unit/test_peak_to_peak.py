@@ -78,6 +78,18 @@ def test_single_causes_and_none(errors):
     assert float(peak_to_peak_arcmin(drive(), errors)) == pytest.approx(searched, abs=1e-6)
 
 
+def test_any_errors_may_be_zero():
+    """Would catch a stretch of angles that no rule lets in: the value is then 1e32."""
+    matrix = random_errors(300, seed=4).to_matrix()
+    matrix[np.random.default_rng(1).random(matrix.shape) < 0.5] = 0.0
+    for structure in Structure:
+        design = drive(PROFILES["resal"], structure)
+        found = matrix_peak_to_peak_arcmin(design, matrix)
+        searched = peak_to_peak_by_search_arcmin(design, DriveErrors.from_matrix(matrix[:40]), "closed form")
+        assert np.abs(found).max() < 5.0
+        assert np.abs(found[:40] - searched).max() < 1e-3
+
+
 def test_arrays_keep_their_shape_and_engines_do_not_matter():
     errors = random_errors(20_000, seed=1)
     found = []

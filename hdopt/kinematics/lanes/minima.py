@@ -50,6 +50,8 @@ from hdopt.kinematics.lanes.single import (
 
 GROUP = 16
 """Lanes of a group: lists are padded to whole ones."""
+LONG = single(0.009)
+"""A stretch that long, rad, always counts: half a place of the exact search."""
 MOVE = single(0.35)
 """How far, rad, second order may move a place."""
 TIE = single(TIE_MM)
@@ -236,7 +238,7 @@ def _lowest(
     two = _chosen(ahead, two_before, two_after)
     before, after = _stretch(-REACH, earlier, one_before, two_before), _stretch(later, REACH, one_after, two_after)
     # Seen from afar, a stretch that short may be on the wrong side of nothing.
-    shortest = SLIVER * abs(earlier * later) + TIE / max(min(rate_one, rate_two), TINY)
+    shortest = min(SLIVER * abs(earlier * later) + TIE / max(min(rate_one, rate_two), TINY), LONG)
     least = _lowest_of_stretch(before, teeth.fs, phase, design, ZERO, Least(HUGE, ZERO))
     least = _lowest_of_stretch(_stretch(earlier, later, one, two), teeth.fs, phase, design, shortest, least)
     least = _lowest_of_stretch(after, teeth.fs, phase, design, ZERO, least)
