@@ -68,15 +68,18 @@ def _crest(motion: RigidMotion[float], teeth: Teeth, design: Design, angle: Angl
     off = off * design.per_spacing
     off = (off - np.floor(off)) * design.spacing
     rate = design.advance + s * at.offset_slope
-    per_bend = ONE / max(teeth.fs * rate * rate - at.bend, TINY)
-    slope = at.slope - teeth.fs * rate * off
-    before = at.slope - teeth.fs * rate * (off - design.spacing)
+    stiffness = max(teeth.fs * rate * rate - at.bend, TINY)
+    per_stiffness = ONE / stiffness
     # The next phase is a spacing farther back.
-    gained = slope * slope * per_bend - teeth.fs * off * off
     back = off - design.spacing
-    gained_before = before * before * per_bend - teeth.fs * back * back
+    slope, before = at.slope - teeth.fs * rate * off, at.slope - teeth.fs * rate * back
+    # A branch that is flat to first order has no stiffness: the step ends somewhere all the same.
+    ahead = clipped(slope * per_stiffness, -FARTHEST, FARTHEST)
+    astern = clipped(before * per_stiffness, -FARTHEST, FARTHEST)
+    gained = ahead * (slope + slope - ahead * stiffness) - teeth.fs * off * off
+    gained_before = astern * (before + before - astern * stiffness) - teeth.fs * back * back
     other = gained_before > gained
-    step = clipped((before if other else slope) * per_bend, -FARTHEST, FARTHEST)
+    step = astern if other else ahead
     value = at.value + HALF * (gained_before if other else gained)
     return Crest(value, angle.cos, angle.sin, s, k, back if other else off, at.offset, step)
 
