@@ -3,7 +3,8 @@
 Blocks of 128 drives are laid out row by row, one drive a lane, and every step runs over all lanes without a branch:
 first-order candidates of the minimum, the least of them looked at, then in dense lists those that second order could
 still lower below it, then the crests. Phases are reduced in double precision, everything after is in single precision.
-A drive's value depends on nothing but its own errors: not on its lane, its block or the thread.
+A drive's value depends on nothing but its own errors: not on its lane, its block or the thread. Numba's cache looks at
+this file's date alone: touch it where a part of it, in `lanes`, changes.
 """
 
 from __future__ import annotations
