@@ -1,4 +1,4 @@
-"""The compiled kernel: converged peak-to-peak of many drives, each in some tens of nanoseconds.
+"""The compiled kernel: converged peak-to-peak of many drives, each in a fifth of a microsecond.
 
 Blocks of 128 drives are laid out row by row, one drive a lane, and every step runs over all lanes without a branch:
 first-order candidates of the minimum, the least of them looked at, then in dense lists those that second order could
