@@ -12,6 +12,9 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from tests.slow import slow_tests  # the path comes first
 
 ALLOWED_SKIPS = ("no recordings", "this machine has OSMesa", "asammdf is an extra of its own")
 """What a skip's reason may start with in CI: the recordings belong to others and are not part of the project."""
@@ -22,6 +25,14 @@ hundred times as long.
 """
 
 _skipped: list[tuple[str, str]] = []
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    listed = slow_tests()
+    for item in items:
+        if item.nodeid in listed:
+            item.add_marker(pytest.mark.slow)
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:

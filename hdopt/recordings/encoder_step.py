@@ -12,6 +12,8 @@ NEIGHBOURS = 0.05
 """Part of the usual distance between levels below which two are one, written with other digits."""
 ON_THE_GRID = 0.02
 """How far from the grid, in steps, a level may lie by its written digits."""
+ALL_ALIKE = 0.98
+"""Share of the samples that move alike from which their evenness, not an encoder, makes the grid."""
 PARTS = (1, 2, 3, 4, 5, 6)
 """Steps that the smallest distance between two levels may be."""
 NEARLY_ALL = 0.99
@@ -30,7 +32,14 @@ def encoder_step(angle: Array) -> float:
     if len(levels) < FEWEST_LEVELS:
         return 0.0
     least = float(apart[apart > NEIGHBOURS * np.median(apart)].min())
-    return next((step for part in PARTS if (step := _refined(levels, least / part)) > 0), 0.0)
+    step = next((step for part in PARTS if (step := _refined(levels, least / part)) > 0), 0.0)
+    return step if step > 0 and not _is_sampled_evenly(angle, step) else 0.0
+
+
+def _is_sampled_evenly(angle: Array, step: float) -> bool:
+    """Whether nearly every sample moves on by the same number of steps: then the grid is that of the sampling."""
+    moves = np.abs(np.round(np.diff(angle) / step))
+    return bool(np.unique(moves, return_counts=True)[1].max() > ALL_ALIKE * len(moves))
 
 
 def _refined(levels: Array, step: float) -> float:

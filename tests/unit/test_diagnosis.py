@@ -114,6 +114,7 @@ HIDDEN = {
     "circular_spline_lobing": lambda s: 0.12 * np.sin(6 * s["theta"] + 0.3),
     "lost_motion": lambda s: 0.15 * s["direction"],
     "channel_delay": lambda s: 2e-3 * s["speed"] / 80 * 10800 / math.pi,
+    "torsional_windup": lambda s: s["torque"] / 31000 * 10800 / math.pi,
     "output_coupling": lambda s: 0.12 * np.sin(2 * s["theta"] / 80 + 0.5),
     "hysteresis": lambda s: 0.15 * s["direction"] * (1 - 2 * np.exp(-np.degrees(s["since"]) / 80 / 1.5)),
     "thermal_drift": lambda s: 0.5 * (1 - np.exp(-s["time"] / 100)),

@@ -36,6 +36,14 @@ def test_angles_off_every_grid_have_no_step():
     assert encoder_step(np.zeros(100)) == 0
 
 
+def test_even_sampling_is_no_encoder():
+    """Would catch a drive without error, sampled evenly: its output lies on an even grid as well."""
+    even = np.arange(720) * 0.6
+    assert encoder_step(even + np.random.default_rng(3).normal(0, 3e-4, len(even))) == 0
+    there_and_back = np.r_[even, even[::-1]]
+    assert encoder_step(there_and_back) == 0
+
+
 def recorded(error_arcmin, theta, step_deg=STEP):
     """A recording whose output encoder reads the nearest of its steps."""
     output = np.degrees(theta) / RATIO - error_arcmin / 60
@@ -87,6 +95,9 @@ def test_steps_stay_where_something_else_is_larger_or_none_is_there():
     (kept,) = without_output_steps([loud], smooth(), SETTINGS)
     assert kept.output_step_arcmin == 0
     np.testing.assert_array_equal(kept.error_arcmin, loud.error_arcmin)
+    # Steps that would scatter far more than what is left are none.
+    (kept,) = without_output_steps([replace(recorded(KE, THETA, 0), output_step_arcmin=36.0)], smooth(), SETTINGS)
+    assert kept.output_step_arcmin == 0
     fine = replace(recorded(KE, THETA), output_step_arcmin=0.0)
     (kept,) = without_output_steps([fine], smooth(), SETTINGS)
     np.testing.assert_array_equal(kept.error_arcmin, fine.error_arcmin)

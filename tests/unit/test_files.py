@@ -139,7 +139,8 @@ def test_json_that_is_none(tmp_path, text, message):
 
 
 SLOW_WRITER = """
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background work begins with it ignored
 from pathlib import Path
 from hdopt.cli import _sigterm_raises, Terminated
 from hdopt.files import replacing

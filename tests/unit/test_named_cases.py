@@ -18,7 +18,6 @@ SIZE = 0.05
 WRONG_YET = {
     "hysteresis 0.5": "friction over 0.09 deg of output is called a delay or play",
     "cs_tooth_harmonics 1.0": "teeth cut in segments: the ramps' ends are called a defect as well",
-    "nothing 2011": "structure is seen where nothing is",
     "mains 1.0": "50 Hz, folded to few samples a turn, is taken as noise",
     "slow wave 1.0": "a slow wave in time is called a coupling",
 }

@@ -21,7 +21,12 @@ from hdopt.files import SPREADSHEET_FORMULA, to_csv, to_xlsx
 
 WILD = ["=SUM(A1:A9)", "+1+cmd|' /C calc'!A0", "-2+3", "@SUM(1)", '=HYPERLINK("x")']
 """Names that a spreadsheet would run, which a study or a file may give."""
-WITHOUT = {"new": "writes a study", "run": "writes its tables into its folder", "studies": "names and titles"}
+WITHOUT = {
+    "new": "writes a study",
+    "run": "writes its tables into its folder",
+    "studies": "names and titles",
+    "explore": "writes a page",
+}
 """Commands without table options, and why."""
 
 
@@ -199,8 +204,11 @@ def test_tables_from_python(tmp_path):
     assert sorted(file.name for file in tmp_path.iterdir()) == ["ke.csv", "ke.xlsx"]
 
 
+LARGEST = 9.99e307
+"""What a cell of Excel holds at most, by its specifications and limits; an infinite one is told apart."""
+FLOATS = st.floats(-LARGEST, LARGEST) | st.sampled_from([float("inf"), float("-inf"), float("nan")])
 CELL = st.one_of(
-    st.text(max_size=12), st.sampled_from(WILD), st.floats(), st.integers(-(2**40), 2**40), st.booleans(), st.none()
+    st.text(max_size=12), st.sampled_from(WILD), FLOATS, st.integers(-(2**40), 2**40), st.booleans(), st.none()
 )
 
 

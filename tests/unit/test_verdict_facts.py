@@ -38,8 +38,9 @@ def candidate(powers, log_bayes_factor=100.0, outside=False, residual=1.0):
 
 
 def evidence(*candidates, base=3.0, extended=1.0, **more):
-    rows = SimpleNamespace(locked=False, blocks=20, span_turns=20.0, rows_per_turn=60.0)
-    known = {"settings": DEFAULT, "rows": rows, "high": None, "false_alarm_p": 0.002, "below_detection": {}}
+    rows = SimpleNamespace(locked=False, blocks=20, span_turns=20.0, rows_per_turn=60.0, output_step=0.0)
+    known = {"settings": DEFAULT, "rows": rows, "neighbours_arcmin": 0.0, "sensor_arcmin": 0.0}
+    known |= {"high": None, "false_alarm_p": 0.002, "below_detection": {}}
     return SimpleNamespace(
         base_held_out=held(20, base),
         extended_held_out=held(20, extended),

@@ -123,11 +123,15 @@ def test_a_placebo_that_predicts_as_well_is_another_explanation(placebo, apart, 
 
 def test_resolution_is_that_of_the_model_or_of_the_sensors():
     base = SimpleNamespace(base_value=np.array([-1.0, 1.0]))
-    known = {"settings": DEFAULT, "selection": SimpleNamespace(base=base)}
+    known = {"settings": DEFAULT, "selection": SimpleNamespace(base=base), "rows": SimpleNamespace(output_step=0.0)}
     quiet = SimpleNamespace(neighbours_arcmin=1e-4, sensor_arcmin=0.0, **known)
     coarse = SimpleNamespace(neighbours_arcmin=0.01, sensor_arcmin=0.5, **known)
     assert resolution(quiet) == pytest.approx(DEFAULT.verdict.model_resolution)
     assert resolution(coarse) == pytest.approx(0.5 * DEFAULT.verdict.sensor_resolution)
+    # Where an encoder's steps were taken out, what they left counts, not their height.
+    coarse.rows = SimpleNamespace(output_step=0.5)
+    coarse.extended_held_out = SimpleNamespace(rms=0.1)
+    assert resolution(coarse) == pytest.approx(0.1 * DEFAULT.verdict.stepped_resolution)
 
 
 @pytest.mark.parametrize(("delay", "warned"), [(2.5, True), (0.01, False)])

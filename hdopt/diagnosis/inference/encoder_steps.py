@@ -37,9 +37,8 @@ def without_output_steps(
     """
     step = max(one.output_step_arcmin for one in recordings)
     fine = tuple(replace(one, output_step_arcmin=0.0) for one in recordings)
-    if any(one.input_locked for one in recordings) or not _is_most(
-        step, noise_between_neighbours(recordings), settings
-    ):
+    neighbours = noise_between_neighbours(recordings)
+    if any(one.input_locked for one in recordings) or step <= settings.share_of_scatter * neighbours:
         return fine
     recordings = tuple(replace(one, output_step_arcmin=step) for one in recordings)
     found, scatter = recordings, math.inf
@@ -59,8 +58,9 @@ def without_output_steps(
 
 
 def _is_most(step: float, scatter: float, settings: EncoderStepSettings) -> bool:
-    """Whether what a `step` adds is most of a `scatter`, both arcmin."""
-    return settings.share_of_scatter * scatter < EVEN * step
+    """Whether what a `step` adds is there and most of a `scatter`, both arcmin."""
+    added = EVEN * step
+    return settings.share_of_scatter * scatter < added < scatter / settings.share_of_scatter
 
 
 def on_samples(recordings: Sequence[Recording], values: Array) -> list[Array]:
