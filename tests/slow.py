@@ -3,7 +3,8 @@
     make test PYTEST_ARGS=--junitxml=$PWD/build/tests.xml
     python -m tests.slow build/tests.xml
 
-A test on the list is marked `slow` beside those that say so themselves; one that is new is quick until the list is
+Where many tests wait for one compilation, the first pays for all: of those the list may name one more by hand. A test
+on the list is marked `slow` beside those that say so themselves; one that is new is quick until the list is
 written anew.
 """
 
