@@ -74,8 +74,8 @@ def checked_recording(channels: Mapping[str, Array], ratio: float, name: str) ->
             "cut the file to its sound part"
         )
     smooth_clock(checks)
-    output_step = encoder_step(checks.channels["output"]) / ARCMIN if "output" in checks.channels else 0.0
-    quantum = max(quantisation(checks), output_step if output_step > SMALLEST_STEP_ARCMIN else 0.0)
+    output_step = output_step_arcmin(checks)
+    quantum = max(quantisation(checks), output_step)
     error = error_arcmin(checks)
     turns = float(np.ptp(checks.channels["input"])) / TURN
     if 0.02 <= turns < 2:
@@ -90,7 +90,7 @@ def checked_recording(channels: Mapping[str, Array], ratio: float, name: str) ->
         temperature=checks.get("temperature"),
         segment=segment,
         quantum_arcmin=quantum,
-        output_step_arcmin=output_step if output_step > SMALLEST_STEP_ARCMIN else 0.0,
+        output_step_arcmin=output_step,
         warnings=tuple(checks.warnings),
         understood=tuple(checks.said),
         output_reversed=reversed_output,
@@ -166,6 +166,13 @@ def smooth_clock(checks: Checks) -> None:
             f"the clock jitters by {jitter:.0%} of a sample interval; speeds are taken over several samples; a delay "
             "between channels is known only to that"
         )
+
+
+def output_step_arcmin(checks: Checks) -> float:
+    """Step of the output's encoder in arcmin, 0 where none shows that matters. `checks` holds the rows so far."""
+    output = checks.get("output")
+    step = 0.0 if output is None else encoder_step(output) / ARCMIN
+    return step if step > SMALLEST_STEP_ARCMIN else 0.0
 
 
 def quantisation(checks: Checks) -> float:
