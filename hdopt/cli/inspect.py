@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import functools
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any  # Any: what the command's other options give
+from typing import TYPE_CHECKING, Any, TypeVar  # Any: what the command's other options give
 
 import click
 
@@ -14,36 +16,108 @@ from hdopt.cli.recorded import RecordingOptions, recording_options
 if TYPE_CHECKING:
     from hdopt.recordings.sheet import Batch, Inspection
 
+R = TypeVar("R")
+
 UNITS = {"slope": "arcmin/deg"}
+
+
+@dataclass(frozen=True)
+class SheetOptions:
+    """What is asked of a sheet: `limits` by name (arcmin; None for those of the study), `speed_rpm` of the input for
+    the slope in time, the `mountings` of the files, `serial` number and `conditions` in words, and the `files` to write
+    ("report", "bench" -> path)."""
+
+    limits: Mapping[str, float] | None
+    speed_rpm: float | None
+    mountings: tuple[str, ...]
+    serial: str
+    conditions: str
+    files: Mapping[str, Path]
+
+    def of_one_drive(self) -> tuple[str, ...]:
+        """The options given that say something of a single drive only."""
+        given = {
+            "--mounting": self.mountings,
+            "--speed-rpm": self.speed_rpm,
+            "--serial": self.serial,
+            "--conditions": self.conditions,
+            "--write-bench": "bench" in self.files,
+        }
+        return tuple(name for name, value in given.items() if value)
+
+
+def sheet_options(command: Callable[..., R]) -> Callable[..., R]:
+    """What is asked of a sheet, as options of a `command`, which gets them as its second argument, a `SheetOptions`."""
+
+    @functools.wraps(command)
+    def bundled(
+        given: RecordingOptions,
+        *,
+        limits: str | None,
+        speed_rpm: float | None,
+        mountings: str | None,
+        serial: str,
+        conditions: str,
+        report_file: Path | None,
+        bench_out: Path | None,
+        **others: Any,  # what the command's own options give
+    ) -> R:
+        from hdopt.recordings.decision import parse_limits
+
+        wanted = {"report": report_file, "bench": bench_out}
+        asked = SheetOptions(
+            parse_limits(limits) or None,
+            speed_rpm,
+            tuple(name.strip() for name in (mountings or "").split(",") if name.strip()),
+            serial,
+            conditions,
+            {kind: path for kind, path in wanted.items() if path is not None},
+        )
+        return command(given, asked, **others)
+
+    options = (
+        click.option(
+            "--limit", "limits", metavar="NAME=VALUEarcmin,...", help="Limits, such as peak_to_peak=1.0arcmin."
+        ),
+        click.option("--mounting", "mountings", metavar="A,A,B,...", help="The mounting of each file: gauge study."),
+        click.option("--speed-rpm", type=float, help="Input speed for the slope in time."),
+        click.option("--serial", default="", help="Serial number, for the sheet."),
+        click.option("--conditions", default="", help="Conditions in words, for the sheet."),
+        click.option(
+            "--report", "report_file", metavar="FILE", type=OutputFile(), help="Write a one-page HTML report."
+        ),
+        click.option(
+            "--write-bench", "bench_out", metavar="FILE", type=OutputFile(), help="Write what was understood."
+        ),
+    )
+    decorated: Callable[..., R] = bundled
+    for option in reversed(options):
+        decorated = option(decorated)
+    return decorated
 
 
 @click.command()
 @table_options
 @recording_options
-@click.option("--limit", "limits", metavar="NAME=VALUEarcmin,...", help="Limits, such as peak_to_peak=1.0arcmin.")
+@sheet_options
 @click.option("--each", is_flag=True, help="Each file is a drive of its own: one table, one plot, Ppk.")
-@click.option("--mounting", "mountings", metavar="A,A,B,...", help="The mounting of each file: gauge study.")
-@click.option("--speed-rpm", type=float, help="Input speed for the slope in time.")
-@click.option("--serial", default="", help="Serial number, for the sheet.")
-@click.option("--conditions", default="", help="Conditions in words, for the sheet.")
 @click.option("--check", is_flag=True, help="End with status 1 where a limit is missed (not where it is undecided).")
-@click.option("--report", "report_file", metavar="FILE", type=OutputFile(), help="Write a one-page HTML report.")
-@click.option("--write-bench", "bench_out", metavar="FILE", type=OutputFile(), help="Write what was understood.")
 @engine_option
 @answer_options
-def command(given: RecordingOptions, **options: Any) -> int:
+def command(
+    given: RecordingOptions, asked: SheetOptions, each: bool, check: bool, json_file: Path | None, seed: int
+) -> int:
     """The acceptance sheet of a drive: peak-to-peak, return error, repeatability, slope, orders, checks, limits.
 
     REC are files of one drive (with --each, of one drive each): .csv and other text, .parquet, .mat, .h5, .tdms, .mcap,
     ROS bags, PHD2 guide logs, .mf4. Exit status 1 with --check where a limit is missed.
     """
-    from hdopt.recordings.decision import parse_limits
-
-    limits = parse_limits(options["limits"]) or None
-    return (_each if options["each"] else _one)(given, limits, options)
+    missed = _each(given, asked, json_file, seed) if each else _one(given, asked, json_file, seed)
+    return 1 if check and missed else 0
 
 
-def _one(given: RecordingOptions, limits: dict[str, float] | None, options: dict[str, Any]) -> int:
+def _one(given: RecordingOptions, asked: SheetOptions, json_file: Path | None, seed: int) -> bool:
+    """The sheet of one drive, said and written; whether a limit is missed."""
     from hdopt.workflow.acceptance_sheet import SheetLabel
     from hdopt.workflow.inspect import inspect, write_inspection
 
@@ -51,33 +125,31 @@ def _one(given: RecordingOptions, limits: dict[str, float] | None, options: dict
     found = inspect(
         given.recordings,
         source,
-        limits,
-        speed_rpm=options["speed_rpm"],
-        mountings=[name.strip() for name in (options["mountings"] or "").split(",") if name.strip()],
-        label=SheetLabel(options["serial"], options["conditions"]),
-        seed=options["seed"],
+        asked.limits,
+        speed_rpm=asked.speed_rpm,
+        mountings=asked.mountings,
+        label=SheetLabel(asked.serial, asked.conditions),
+        seed=seed,
     )
     try:
-        write_inspection(found, _files(options), given.recordings, source)
+        write_inspection(found, asked.files, given.recordings, source)
     finally:
-        emit(found.to_dict(), options["json_file"], _lines(found), tables=found)
-    return 1 if options["check"] and found.missed else 0
+        emit(found.to_dict(), json_file, _lines(found), tables=found)
+    return found.missed
 
 
-def _files(options: dict[str, Any]) -> dict[str, Path]:
-    wanted = {"report": options["report_file"], "bench": options["bench_out"]}
-    return {kind: path for kind, path in wanted.items() if path is not None}
-
-
-def _each(given: RecordingOptions, limits: dict[str, float] | None, options: dict[str, Any]) -> int:
+def _each(given: RecordingOptions, asked: SheetOptions, json_file: Path | None, seed: int) -> bool:
+    """The table of many drives, said and written; whether one of them misses a limit."""
     from hdopt.workflow.inspect_many import inspect_many, write_batch
 
-    batch = inspect_many(given.recordings, given.source(), limits, options["seed"])
+    if names := asked.of_one_drive():
+        raise click.UsageError(f"{', '.join(names)}: said of one drive; leave it out with --each")
+    batch = inspect_many(given.recordings, given.source(), asked.limits, seed)
     try:
-        write_batch(batch, _files(options))
+        write_batch(batch, asked.files)
     finally:
-        emit(batch.to_dict(), options["json_file"], _batch_lines(batch), tables=batch)
-    return 1 if options["check"] and batch.missed else 0
+        emit(batch.to_dict(), json_file, _batch_lines(batch), tables=batch)
+    return batch.missed
 
 
 def _lines(found: Inspection) -> Iterator[str]:

@@ -238,3 +238,14 @@ def test_many_drives_name_the_outlier(tmp_path, capsys):
     assert content["outliers"] == ["d7.csv"]
     assert content["drives"][-1]["error"].startswith("broken.csv")
     assert content["performance"]["n"] == 8
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--mounting", "A"), ("--speed-rpm", "60"), ("--serial", "7"), ("--write-bench", "b.toml")]
+)
+def test_what_is_said_of_one_drive_is_refused_for_many(tmp_path, capsys, monkeypatch, option, value):
+    """Would catch an option that is taken and forgotten: before, the bench file was silently not written."""
+    monkeypatch.chdir(tmp_path)
+    path = write(tmp_path, "a.csv", recorded(wave))
+    assert run("inspect", path, "--each", "--drive", "none", "--ratio", "80", option, value) == 2
+    assert f"{option}: said of one drive" in capsys.readouterr().err
