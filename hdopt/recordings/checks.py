@@ -38,6 +38,8 @@ ARE_THE_SAME = 0.999
 """Correlation from which an error column is the input angle itself."""
 SMALLEST_STEP_ARCMIN = 0.02
 """A finer grid is that of the digits written, or of an encoder that no drive can tell from a line."""
+HIDDEN_BY_NOISE = 0.3
+"""Steps below this share of the usual change between samples are lost in it."""
 LARGEST_ERROR_ARCMIN = 600.0
 SMALLEST_ERROR_ARCMIN = 1e-3
 """An error beyond these is in another unit than stated, or no error: drives have 0.1 to 60 arcmin."""
@@ -74,8 +76,9 @@ def checked_recording(channels: Mapping[str, Array], ratio: float, name: str) ->
             "cut the file to its sound part"
         )
     smooth_clock(checks)
-    output_step = output_step_arcmin(checks)
-    quantum = max(quantisation(checks), output_step)
+    steps = steps_arcmin(checks)
+    quantum = max(steps.values())
+    warn_of_steps(checks, quantum)
     error = error_arcmin(checks)
     turns = float(np.ptp(checks.channels["input"])) / TURN
     if 0.02 <= turns < 2:
@@ -90,7 +93,7 @@ def checked_recording(channels: Mapping[str, Array], ratio: float, name: str) ->
         temperature=checks.get("temperature"),
         segment=segment,
         quantum_arcmin=quantum,
-        output_step_arcmin=output_step,
+        output_step_arcmin=steps["output"],
         warnings=tuple(checks.warnings),
         understood=tuple(checks.said),
         output_reversed=reversed_output,
@@ -168,33 +171,24 @@ def smooth_clock(checks: Checks) -> None:
         )
 
 
-def output_step_arcmin(checks: Checks) -> float:
-    """Step of the output's encoder in arcmin, 0 where none shows that matters. `checks` holds the rows so far."""
-    output = checks.get("output")
-    step = 0.0 if output is None else encoder_step(output) / ARCMIN
-    return step if step > SMALLEST_STEP_ARCMIN else 0.0
+def steps_arcmin(checks: Checks) -> dict[str, float]:
+    """Step of each channel's encoder in arcmin at the output, 0 where none shows that matters. `checks` holds the rows
+    so far."""
+    found = {}
+    for channel, gain in (("input", 1 / checks.ratio), ("output", 1.0), ("error", 1.0)):
+        angle = checks.get(channel)
+        step = 0.0 if angle is None else encoder_step(angle, checks.get("time")) * gain / ARCMIN
+        found[channel] = step if step > SMALLEST_STEP_ARCMIN else 0.0
+    return found
 
 
-def quantisation(checks: Checks) -> float:
-    """Step of the coarser encoder in arcmin at the output, 0 where none shows.
+def warn_of_steps(checks: Checks, quantum: float) -> None:
+    """Say that the angles move in steps of `quantum` (arcmin at the output) where the noise does not hide them.
 
     `checks` holds the rows so far.
     """
-    quantum = 0.0
-    channels = {"input": 1 / checks.ratio, "output": 1.0, "error": 1.0}
-    for channel, gain in channels.items():
-        angle = checks.get(channel)
-        if angle is None:
-            continue
-        levels = np.unique(angle)
-        # Steps show where the angle stands still for a sample or more while it should move.
-        if len(levels) < 3 or np.mean(np.diff(angle) == 0) < 0.1:
-            continue
-        step = float(np.median(np.diff(levels))) * gain / ARCMIN
-        quantum = max(quantum, step)
     noise = np.median(np.abs(np.diff(error_arcmin(checks))))
-    if quantum > 0.02 and quantum > 0.3 * noise:
+    if quantum > HIDDEN_BY_NOISE * noise:
         checks.warn(
             f"the angles move in steps of {quantum:.2g} arcmin at the output; smaller effects hide between them"
         )
-    return quantum

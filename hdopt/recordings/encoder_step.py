@@ -14,6 +14,8 @@ ON_THE_GRID = 0.02
 """How far from the grid, in steps, a level may lie by its written digits."""
 ALL_ALIKE = 0.98
 """Share of the samples that move alike from which their evenness, not an encoder, makes the grid."""
+ROW_LOST = 1.5
+"""Usual time steps above which a row was lost in between: its move is that of two samples."""
 PARTS = (1, 2, 3, 4, 5, 6)
 """Steps that the smallest distance between two levels may be."""
 NEARLY_ALL = 0.99
@@ -21,11 +23,12 @@ NEARLY_ALL = 0.99
 (2 x 0.02)^20 puts them all on it."""
 
 
-def encoder_step(angle: Array) -> float:
+def encoder_step(angle: Array, time: Array | None = None) -> float:
     """Step of the even grid on which the values of `angle` (n,) lie, in their unit; 0 where there is none.
 
     Levels may be left out, as where the output moves by several steps from sample to sample. The step is the smallest
-    distance between levels, or a whole part of it, made precise over ever more of them.
+    distance between levels, or a whole part of it, made precise over ever more of them. `time` (n,) s, where it is
+    known, tells where rows were lost: samples taken at even angles are then still seen to be even.
     """
     levels = np.unique(angle)
     apart = np.diff(levels)
@@ -33,13 +36,20 @@ def encoder_step(angle: Array) -> float:
         return 0.0
     least = float(apart[apart > NEIGHBOURS * np.median(apart)].min())
     step = next((step for part in PARTS if (step := _refined(levels, least / part)) > 0), 0.0)
-    return step if step > 0 and not _is_sampled_evenly(angle, step) else 0.0
+    return step if step > 0 and not _is_sampled_evenly(angle, step, time) else 0.0
 
 
-def _is_sampled_evenly(angle: Array, step: float) -> bool:
-    """Whether nearly every sample moves on by the same number of steps: then the grid is that of the sampling."""
+def _is_sampled_evenly(angle: Array, step: float, time: Array | None) -> bool:
+    """Whether nearly every sample moves on by the same number of steps: then the grid is that of the sampling. One that
+    mostly stands still is an encoder's that is slower than its samples."""
     moves = np.abs(np.round(np.diff(angle) / step))
-    return bool(np.unique(moves, return_counts=True)[1].max() > ALL_ALIKE * len(moves))
+    if time is not None:
+        between = np.diff(time)
+        moves = moves[between < ROW_LOST * np.median(between)]
+    if not len(moves):
+        return False
+    found, counts = np.unique(moves, return_counts=True)
+    return bool(found[np.argmax(counts)] > 0 and counts.max() > ALL_ALIKE * len(moves))
 
 
 def _refined(levels: Array, step: float) -> float:

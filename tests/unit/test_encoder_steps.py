@@ -44,6 +44,29 @@ def test_even_sampling_is_no_encoder():
     assert encoder_step(there_and_back) == 0
 
 
+def test_even_angles_with_lost_rows_are_no_encoder():
+    """Would catch samples taken every degree of the input, some of them lost, called an encoder of 1 deg."""
+    kept = np.random.default_rng(4).random(2000) > 0.1
+    angle, time = np.arange(2000.0)[kept], 0.01 * np.arange(2000)[kept]
+    assert encoder_step(angle, time) == 0
+    assert encoder_step(angle) == 1  # without a clock nobody can tell
+
+
+def test_an_encoder_slower_than_its_samples_has_a_step():
+    """Would catch standing still on a step, for 100 samples each, called even sampling."""
+    assert encoder_step(np.floor(np.arange(6000) / 100) * STEP) == pytest.approx(STEP, rel=1e-9)
+
+
+def test_a_fast_input_on_a_coarse_encoder_has_a_step():
+    """1 deg of the input, 60/80 arcmin at the output, though no reading comes twice: 3.7 deg a sample."""
+    theta = 3.7 * np.arange(4000)
+    output = theta / RATIO + 1e-3 * np.random.default_rng(5).normal(size=4000)
+    table = pd.DataFrame({"time_s": theta, "input_angle_deg": np.floor(theta), "output_angle_deg": output})
+    found = recording_from_table(table, RATIO)
+    assert found.quantum_arcmin == pytest.approx(0.75, rel=1e-6)
+    assert any("move in steps of 0.75 arcmin" in said for said in found.warnings)
+
+
 def recorded(error_arcmin, theta, step_deg=STEP):
     """A recording whose output encoder reads the nearest of its steps."""
     output = np.degrees(theta) / RATIO - error_arcmin / 60
