@@ -166,6 +166,11 @@ class Circle:
     def least_radius(self) -> float:
         return self.radius - abs(self.offset)
 
+    def points(self, phi: ArrayLike) -> Array:
+        """Points (x, y) of the circle, mm: shape (n, 2) for n angles about its own centre, rad."""
+        phi = np.atleast_1d(np.asarray(phi, float))
+        return np.stack([self.radius * np.sin(phi), self.offset + self.radius * np.cos(phi)], 1)
+
     def inward(self, distance: float) -> Circle:
         if distance >= self.radius:
             raise HdoptError(

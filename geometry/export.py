@@ -5,13 +5,17 @@ A file that has not passed its check never bears its name; a file of an earlier 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, MissingLibrary, unknown_name
+from hdopt.figures import drawn
 from hdopt.files import JsonReady, replacing_all
 from hdopt.geometry.budget import CalloutTables
 from hdopt.geometry.dimensions import Dimension
@@ -25,6 +29,8 @@ from hdopt.geometry.step import Identity
 
 if TYPE_CHECKING:
     import pandas as pd
+    import plotly.graph_objects as go
+    from matplotlib.figure import Figure as MatplotlibFigure
 
 
 @dataclass(frozen=True)
@@ -70,6 +76,18 @@ class ExportResult:
             "notes": list(self.model.notes),
             "fingerprint": self.identity.fingerprint,
         }
+
+    def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
+        """The outlines that carry the flexible bearing, the major axis upwards. `backend` is "plotly" or
+        "matplotlib"."""
+        import plotly.graph_objects as go
+
+        lines = []
+        for part in self.model.profiled:
+            x, y = part.contour.points(np.linspace(0, 2 * math.pi, 721)).T
+            lines.append(go.Scatter(x=x, y=y, mode="lines", name=part.name))
+        layout = {"title": self.identity.study, "xaxis_title": "x, mm", "yaxis_title": "y, mm, along the major axis"}
+        return drawn(go.Figure(lines, layout).update_yaxes(scaleanchor="x"), backend)
 
     def to_frame(self) -> pd.DataFrame:
         """The inspection plan, one row a check."""

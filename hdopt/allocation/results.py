@@ -11,11 +11,13 @@ from hdopt.allocation.convex import Item, Solution
 from hdopt.allocation.cost import GradeTable
 from hdopt.allocation.rules import Allocation
 from hdopt.errors import HdoptError
+from hdopt.figures import drawn
 from hdopt.tolerance.intervals import IntervalEstimate
 
 if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
+    from matplotlib.figure import Figure as MatplotlibFigure
 
 
 @dataclass(frozen=True)
@@ -134,15 +136,15 @@ class AllocateResult:
         columns = ["error", "unit", "present tolerance", "tolerance", "grade", "present cost", "cost"]
         return pd.DataFrame(rows, columns=columns).set_index("error")
 
-    def plot(self) -> go.Figure:
-        """Each tolerance as a share of the present one."""
+    def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
+        """Each tolerance as a share of the present one. `backend` is "plotly" or "matplotlib"."""
         import plotly.graph_objects as go
 
         shares = [row.tolerance / row.present if row.present else math.nan for row in self.errors.values()]
         bars = go.Bar(y=list(self.errors), x=shares, orientation="h")
         title = f"{self.study}: cost {self.total_cost:.4g}, now {self.present_cost:.4g}"
         layout = {"title": title, "xaxis_title": "tolerance over the present one", "yaxis_title": "error"}
-        return go.Figure(bars, layout).add_vline(1.0, line_dash="dash")
+        return drawn(go.Figure(bars, layout).add_vline(1.0, line_dash="dash"), backend)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet: tolerances, the rules side by side, cost over the limit."""

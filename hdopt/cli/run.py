@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import StudyOptions, emit, progress, resume_option, status, study_options, work_options
+from hdopt.cli.common import (
+    StudyOptions,
+    emit,
+    progress,
+    resume_option,
+    status,
+    study_options,
+    table_options,
+    work_options,
+)
 
 if TYPE_CHECKING:
     from hdopt.workflow.run import RunResult
@@ -19,6 +28,7 @@ if TYPE_CHECKING:
 @click.option("-o", "--output", "folder", metavar="DIR", help="Folder to write to; out/STUDY if omitted.")
 @resume_option
 @click.option("--verify", is_flag=True, help="Do the run in the folder STUDY (or -o DIR) again and compare every file.")
+@table_options
 @work_options
 def command(
     asked: StudyOptions, folder: str | None, resume: bool, verify: bool, json_file: Path | None, seed: int
@@ -37,7 +47,7 @@ def command(
     place = Path(folder) if folder else Path("out") / loaded.name
     result = run_study(loaded, place, seed, lambda names: progress(names, loaded.name), resume)
     verdict = of_run(loaded, result.found)
-    emit(result.to_dict(), json_file, _lines(result), verdict)
+    emit(result.to_dict(), json_file, _lines(result), verdict, result)
     return status(result.answer, verdict)
 
 
@@ -45,12 +55,14 @@ def _verify(folder: Path, json_file: Path | None) -> int:
     from hdopt.workflow.verify import lines, verify_run
 
     result = verify_run(folder, lambda names: progress(names, str(folder)))
-    emit(result.to_dict(), json_file, lines(result))
+    emit(result.to_dict(), json_file, lines(result), tables=result)
     return 0 if result.repeated else 1
 
 
 def _lines(result: RunResult) -> Iterator[str]:
+    from hdopt.workflow.run import left_out
+
     for name, step in result.steps.items():
-        for line in step.says or ((f"left out: {step.results['left_out']}",) if "left_out" in step.results else ()):
+        for line in step.says or filter(None, (left_out(step),)):
             yield f"{name.replace('_', ' ')}: {line}"
     yield f"report: {result.report}"

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
+from hdopt.figures import drawn
 from hdopt.optimize.setup import Setup
 from hdopt.optimize.solve import Solution
 
 if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
+    from matplotlib.figure import Figure as MatplotlibFigure
 
 
 @dataclass(frozen=True)
@@ -117,8 +119,9 @@ class SearchResult:
         """The front as a table; the best design of each combination where no front was traced."""
         return _designs(self.front or self.combinations)
 
-    def plot(self) -> go.Figure:
-        """The front between the two objectives, or the best of each combination where none was traced."""
+    def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
+        """The front between the two objectives, or the best of each combination where none was traced.
+        `backend` is "plotly" or "matplotlib"."""
         import plotly.graph_objects as go
 
         designs = [d for d in self.front or self.combinations if self.objective in d.quantities]
@@ -129,7 +132,8 @@ class SearchResult:
             text=[d.name for d in designs],
             mode="markers",
         )
-        return go.Figure(points, {"title": self.study, "xaxis_title": self.objective, "yaxis_title": second})
+        layout = {"title": self.study, "xaxis_title": self.objective, "yaxis_title": second}
+        return drawn(go.Figure(points, layout), backend)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet: the front if any, the best design and the present one, the best of each

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 from hdopt.arrays import Array
+from hdopt.figures import drawn
 from hdopt.recordings.capability import Gauge, Performance
 from hdopt.recordings.decision import Decision
 from hdopt.recordings.figures import Cells, Return
@@ -15,6 +16,7 @@ from hdopt.recordings.stiffness import Torsion
 if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
+    from matplotlib.figure import Figure as MatplotlibFigure
 
 
 @dataclass(frozen=True)
@@ -143,13 +145,14 @@ class Inspection:
         rows += [(f"order_{line.symbol}", line.amplitude_arcmin, "arcmin") for line in self.orders]
         return pd.DataFrame(rows, columns=["figure", "value", "unit"])
 
-    def plot(self) -> go.Figure:
-        """The amplitude of every order."""
+    def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
+        """The amplitude of every order. `backend` is "plotly" or "matplotlib"."""
         import plotly.graph_objects as go
 
         bars = go.Bar(x=[line.symbol for line in self.orders], y=[line.amplitude_arcmin for line in self.orders])
         title = ", ".join(self.names)
-        return go.Figure(bars, {"title": title, "xaxis_title": "order", "yaxis_title": "amplitude, arcmin"})
+        layout = {"title": title, "xaxis_title": "order", "yaxis_title": "amplitude, arcmin"}
+        return drawn(go.Figure(bars, layout), backend)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet: figures, orders, limits, checks."""
@@ -216,14 +219,14 @@ class Batch:
 
         return pd.DataFrame([vars(drive) for drive in self.drives])
 
-    def plot(self) -> go.Figure:
-        """The peak-to-peak of every drive, with the limit."""
+    def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
+        """The peak-to-peak of every drive, with the limit. `backend` is "plotly" or "matplotlib"."""
         import plotly.graph_objects as go
 
         read = [drive for drive in self.drives if not drive.error]
         points = go.Scatter(x=[d.name for d in read], y=[d.peak_to_peak for d in read], mode="markers")
         figure = go.Figure(points, {"xaxis_title": "drive", "yaxis_title": "peak-to-peak, arcmin"})
-        return figure if self.limit is None else figure.add_hline(self.limit, line_dash="dash")
+        return drawn(figure if self.limit is None else figure.add_hline(self.limit, line_dash="dash"), backend)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet: the drives, and Ppk where there is one."""

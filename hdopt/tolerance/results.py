@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
+from hdopt.figures import drawn
 from hdopt.kinematics.model_error import ModelError
 from hdopt.tolerance.sensitivity import Shapley, Sobol
 from hdopt.tolerance.stack import Stack
@@ -15,6 +16,7 @@ from hdopt.tolerance.worst_case import WorstCase
 if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
+    from matplotlib.figure import Figure as MatplotlibFigure
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,8 @@ class StackResult:
         """One row a figure, with its interval."""
         return self.stack.to_frame()
 
-    def plot(self) -> go.Figure:
-        """The distribution of the drives, with the limit."""
+    def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
+        """The distribution of the drives, with the limit. `backend` is "plotly" or "matplotlib"."""
         import plotly.graph_objects as go
 
         stack = self.stack
@@ -59,7 +61,7 @@ class StackResult:
         bars = go.Bar(x=(edges[1:] + edges[:-1]) / 2, y=counts, width=edges[1:] - edges[:-1], name="drives")
         title = f"{self.study}: {100 * stack.conforming.value:.4g} % within {stack.limit:g} {stack.unit}"
         figure = go.Figure(bars, {"title": title, "xaxis_title": f"response, {stack.unit}", "yaxis_title": "drives"})
-        return figure.add_vline(stack.limit, line_dash="dash", annotation_text="limit")
+        return drawn(figure.add_vline(stack.limit, line_dash="dash", annotation_text="limit"), backend)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet: figures with intervals, contributions; tail and worst case where asked for."""
@@ -103,8 +105,9 @@ class SobolResult:
         assert table is not None, "a result holds indices, effects, or both"
         return table.to_frame()
 
-    def plot(self) -> go.Figure:
-        """First-order and total index of every input, or its Shapley effect, with intervals."""
+    def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
+        """First-order and total index of every input, or its Shapley effect, with intervals.
+        `backend` is "plotly" or "matplotlib"."""
         import plotly.graph_objects as go
 
         table = self.to_frame()
@@ -117,7 +120,8 @@ class SobolResult:
             value = table[name]
             ends = {"type": "data", "array": table[high] - value, "arrayminus": value - table[low]}
             bars.append(go.Bar(y=table.index, x=value, error_x=ends, orientation="h", name=name))
-        return go.Figure(bars, {"title": self.study, "xaxis_title": "share of the variance", "yaxis_title": "input"})
+        layout = {"title": self.study, "xaxis_title": "share of the variance", "yaxis_title": "input"}
+        return drawn(go.Figure(bars, layout), backend)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet: indices, those of pairs, Shapley effects, as far as there are any."""

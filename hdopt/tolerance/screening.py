@@ -17,6 +17,7 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError, unknown_name
+from hdopt.figures import drawn
 from hdopt.parallel.engine import Engine, engine_from
 from hdopt.tolerance.response import Response, evaluate
 from hdopt.tolerance.sampling import ScrambledSobol
@@ -25,6 +26,7 @@ from hdopt.tolerance.space import InputSpace
 if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
+    from matplotlib.figure import Figure as MatplotlibFigure
 
 
 EDGE = 1e-3
@@ -87,15 +89,15 @@ class Screening:
 
         return pd.DataFrame.from_dict(self.inputs, orient="index").rename_axis("name")
 
-    def plot(self) -> go.Figure:
-        """The method's first measure of every input."""
+    def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
+        """The method's first measure of every input. `backend` is "plotly" or "matplotlib"."""
         import plotly.graph_objects as go
 
         table = self.to_frame()
         measure = str(table.columns[0])
         bars = go.Bar(y=table.index, x=table[measure], orientation="h")
         title = f"{self.study}: {self.method}"
-        return go.Figure(bars, {"title": title, "xaxis_title": measure, "yaxis_title": "input"})
+        return drawn(go.Figure(bars, {"title": title, "xaxis_title": measure, "yaxis_title": "input"}), backend)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet."""

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal  # Any: values of JSON
 
 from hdopt.errors import HdoptError, unknown_name
+from hdopt.figures import drawn
 from hdopt.files import replacing_all, write_text
 from hdopt.geometry.compare import CamFit, fit_cam, read_cam, table_of
 from hdopt.geometry.contour import Contour
@@ -23,6 +24,7 @@ from hdopt.workflow.output_files import Files, checked_files, write_table_files
 if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
+    from matplotlib.figure import Figure as MatplotlibFigure
 
 Surface = Literal["cam", "bearing"]
 FILES = ("csv", "xlsx", "plot", "study")
@@ -81,15 +83,17 @@ class CompareResult:
 
         return pd.DataFrame(table_of(self.fit))
 
-    def plot(self) -> go.Figure:
-        """The deviation of every point over the angle, with the profile's zone."""
+    def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
+        """The deviation of every point over the angle, with the profile's zone.
+        `backend` is "plotly" or "matplotlib"."""
         import plotly.graph_objects as go
 
         table = self.to_frame()
         points = go.Scatter(x=table["angle_deg"], y=table["deviation_um"], mode="lines")
         layout = {"title": self.study, "xaxis_title": "angle, deg", "yaxis_title": "deviation, um"}
         figure = go.Figure(points, layout)
-        return figure.add_hline(500 * self.zone, line_dash="dash").add_hline(-500 * self.zone, line_dash="dash")
+        figure = figure.add_hline(500 * self.zone, line_dash="dash").add_hline(-500 * self.zone, line_dash="dash")
+        return drawn(figure, backend)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet."""

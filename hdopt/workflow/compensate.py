@@ -16,6 +16,7 @@ from hdopt.compensation.surface import Harmonics, Surface, grid_angles, surface_
 from hdopt.compensation.writers import FORMATS, homing_arcmin, written
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
+from hdopt.figures import drawn
 from hdopt.files import write_text
 from hdopt.recordings.recording import TURN, Recording
 from hdopt.recordings.rows import Rows, gather, neighbours_for
@@ -26,6 +27,7 @@ from hdopt.workflow.waveform_fit import WaveformFit, fit_rows
 if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
+    from matplotlib.figure import Figure as MatplotlibFigure
 
 Found = Harmonics | Surface
 
@@ -121,13 +123,15 @@ class Compensated:
         columns = ["recording", "speed_rpm", "before_arcmin", "after_arcmin"]
         return pd.DataFrame(rows, columns=columns)
 
-    def plot(self) -> go.Figure:
-        """Held-out peak-to-peak of every recording, without and with the compensation."""
+    def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
+        """Held-out peak-to-peak of every recording, without and with the compensation.
+        `backend` is "plotly" or "matplotlib"."""
         import plotly.graph_objects as go
 
         table = self.to_frame()
         bars = [go.Bar(x=table["recording"], y=table[f"{when}_arcmin"], name=when) for when in ("before", "after")]
-        return go.Figure(bars, {"xaxis_title": "recording", "yaxis_title": "held-out peak-to-peak, arcmin"})
+        layout = {"xaxis_title": "recording", "yaxis_title": "held-out peak-to-peak, arcmin"}
+        return drawn(go.Figure(bars, layout), backend)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet: recordings, directions, the methods that were tried."""

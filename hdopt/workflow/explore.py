@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any  # Any: the JSON of the page, as `hdopt.files.to_json` takes it
+from typing import TYPE_CHECKING, Any  # Any: the JSON of the page, as `hdopt.files.to_json` takes it
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from hdopt.study.write import study_toml
 from hdopt.tolerance.sampling import SAMPLINGS
 from hdopt.workflow.stack import drive_problem_of
 from hdopt.workflow.steps.profiles import alternatives
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 EXPLORER_FILE = "explorer.html"
 CLOUD_N = 2048
@@ -52,16 +55,38 @@ PREFIXES = ("Axis ", "WG ", "CS tooth ", "FS tooth ")
 @dataclass(frozen=True)
 class ExploreResult:
     """The page that was written: its `file`, how many `drives` of the tolerances its cloud has, and `notes` of what it
-    leaves out."""
+    leaves out. `cloud` are their errors in the units of a study file with their peak-to-peak (arcmin) in the last
+    column, shape (drives, 13)."""
 
     study: str
     file: Path
     drives: int
     notes: tuple[str, ...]
+    cloud: Array = field(default_factory=lambda: np.empty((0, len(ERROR_NAMES) + 1)), compare=False, repr=False)
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-ready, with the file as text."""
-        return asdict(self) | {"file": str(self.file), "notes": list(self.notes)}
+        """JSON-ready, with the file as text and without the cloud."""
+        return {"study": self.study, "file": str(self.file), "drives": self.drives, "notes": list(self.notes)}
+
+    def to_frame(self) -> pd.DataFrame:
+        """The cloud, one row a drive: its errors by their study keys, and its peak-to-peak."""
+        import pandas as pd
+
+        columns = [*(study_key(name) for name in ERROR_NAMES), "peak_to_peak_arcmin"]
+        return pd.DataFrame(self.cloud, columns=columns)
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet."""
+        return {"cloud": self.to_frame()}
+
+
+@dataclass(frozen=True)
+class ExplorerPage:
+    """The explorer as text, with `notes` of what it leaves out and its `cloud`, shape (drives, 13)."""
+
+    html: str
+    notes: tuple[str, ...]
+    cloud: Array
 
 
 def explore(
@@ -77,22 +102,23 @@ def explore(
     """
     study, file = as_study(study), Path(file)
     claim_output(file)
-    page, drives, notes = explorer_page(study, n, seed)
-    write_text(file, page)
-    return ExploreResult(study.name, file, drives, notes)
+    page = explorer_page(study, n, seed)
+    write_text(file, page.html)
+    return ExploreResult(study.name, file, len(page.cloud), page.notes, page.cloud)
 
 
-def explorer_page(study: Study, n: int = CLOUD_N, seed: int = 1) -> tuple[str, int, tuple[str, ...]]:
-    """The HTML of the explorer of `study`, the number of drives in its cloud, and notes of what it leaves out; `n` and
-    `seed` as in `explore`."""
+def explorer_page(study: Study, n: int = CLOUD_N, seed: int = 1) -> ExplorerPage:
+    """The explorer of `study`; `n` and `seed` as in `explore`."""
     if not 1 <= n <= MOST_CLOUD:
         raise HdoptError(f"the cloud has {n} drives; give 1 to {MOST_CLOUD}")
     drive, errors = study.drive, _errors(study)
     _check(drive)
     notes = _notes(study)
     matrix = cloud = None
+    table = np.empty((0, len(ERROR_NAMES) + 1))
     if "tolerances" in study.sections and "requirement" in study.sections:
         matrix, peaks = _cloud(study, n, seed)
+        table = np.column_stack([_in_study_units(matrix), peaks])
         cloud = {"errors": _rounded(_in_study_units(matrix)), "peak_to_peak": _rounded(peaks)}
     data = {
         "study": study.name,
@@ -105,7 +131,7 @@ def explorer_page(study: Study, n: int = CLOUD_N, seed: int = 1) -> tuple[str, i
         "orders": [asdict(order) for order in model_orders(drive.geometry.ratio)],
         "toml": _toml(study),
     }
-    return render_explorer(study.title, data, notes), 0 if matrix is None else n, notes
+    return ExplorerPage(render_explorer(study.title, data, notes), notes, table)
 
 
 def _errors(study: Study) -> DriveErrors:

@@ -14,10 +14,11 @@ from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.drive.profiles import perimeter_error, tip_radius_of_curvature
 from hdopt.errors import HdoptError, MissingValue
+from hdopt.figures import drawn
 from hdopt.kinematics.extremes import extremes_arcmin, walked_peak_to_peak_arcmin
 from hdopt.kinematics.load_sharing import misalignment_share
 from hdopt.kinematics.waveform import DEFAULT_METHOD, geometry_for
-from hdopt.mechanics.bending import max_bending_stress, max_curvature_change
+from hdopt.mechanics.bending import curvature_change, max_bending_stress, max_curvature_change
 from hdopt.mechanics.contact import contact_angle, homogenization_coefficient, mean_flank_pressure, meshing_teeth
 from hdopt.mechanics.lag import lag
 from hdopt.recordings.orders import OrderSpectrum, order_spectrum
@@ -31,8 +32,12 @@ from hdopt.workflow.waveform import WaveformResult, converged_extremes_arcmin, h
 if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
+    from matplotlib.figure import Figure as MatplotlibFigure
 
 T = TypeVar("T")
+
+POINTS_OF_A_PROFILE = 721
+"""Every half degree of a turn, both ends."""
 
 
 @dataclass(frozen=True)
@@ -79,14 +84,15 @@ class KinematicErrorResult:
         values = asdict(self)
         return {key: value for key, value in values.items() if key not in ("theta", "waveform_arcmin")}
 
-    def plot(self) -> go.Figure:
-        """The waveform over one relative turn."""
+    def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
+        """The waveform over one relative turn. `backend` is "plotly" or "matplotlib"."""
         import plotly.graph_objects as go
 
         turns = self.theta / (2 * math.pi)
         line = go.Scattergl(x=turns, y=self.waveform_arcmin, mode="lines", line={"width": 1}, name=self.study)
         layout = {"xaxis_title": "input turns", "yaxis_title": "kinematic error, arcmin"}
-        return go.Figure(line, {"title": f"{self.study}: {self.peak_to_peak_arcmin:.4g} arcmin peak to peak", **layout})
+        layout = {"title": f"{self.study}: {self.peak_to_peak_arcmin:.4g} arcmin peak to peak", **layout}
+        return drawn(go.Figure(line, layout), backend)
 
     def to_frame(self) -> pd.DataFrame:
         """The order table."""
@@ -121,13 +127,39 @@ class ProfileResult:
     max_bending_stress_plate_mpa: float | None
     mean_flank_pressure_mpa: float | None
     notes: tuple[str, ...]
+    phi: Array = field(default_factory=lambda: np.empty(0), compare=False, repr=False)
+    """Angles from the major axis over one turn, rad, shape (n,)."""
+    deflection_mm: Array = field(default_factory=lambda: np.empty(0), compare=False, repr=False)
+    """Of the flexspline's inner wall there, mm, shape (n,)."""
+    curvature_change_per_mm: Array | None = field(default=None, compare=False, repr=False)
+    """Of the ring's neutral line there, 1/mm, shape (n,)."""
 
     def to_dict(self) -> dict[str, Any]:
-        return asdict(self)
+        """JSON-ready: every field but the curves."""
+        curves = ("phi", "deflection_mm", "curvature_change_per_mm")
+        return {key: value for key, value in asdict(self).items() if key not in curves}
+
+    def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
+        """Deflection and change of curvature over the angle. `backend` is "plotly" or "matplotlib"."""
+        import plotly.graph_objects as go
+
+        angle = np.degrees(self.phi)
+        layout: dict[str, Any] = {
+            "title": f"{self.study}: {self.profile}",
+            "xaxis_title": "angle from the major axis, deg",
+            "yaxis_title": "deflection, mm",
+            "showlegend": False,
+        }
+        lines = [go.Scatter(x=angle, y=self.deflection_mm, mode="lines")]
+        if self.curvature_change_per_mm is not None:
+            lines.append(go.Scatter(x=angle, y=self.curvature_change_per_mm, mode="lines", yaxis="y2"))
+            lower = {"domain": [0, 0.46], "title": "change of curvature, 1/mm"}
+            layout |= {"yaxis_domain": [0.54, 1], "yaxis2": lower, "xaxis_anchor": "y2"}
+        return drawn(go.Figure(lines, layout), backend)
 
     def to_frame(self) -> pd.DataFrame:
         """One row a figure."""
-        return figures(asdict(self))
+        return figures(self.to_dict())
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What goes into a spreadsheet."""
@@ -358,6 +390,7 @@ def profile(study: AnyStudy = None) -> ProfileResult:
     notes = _Notes()
     angle = notes.value(contact_angle, gear, curve)
     teeth = None if angle is None else meshing_teeth(gear, angle)
+    phi = np.linspace(0, 2 * math.pi, POINTS_OF_A_PROFILE)
     return ProfileResult(
         study=study.name,
         profile=curve.name,
@@ -372,5 +405,8 @@ def profile(study: AnyStudy = None) -> ProfileResult:
         max_bending_stress_mpa=notes.value(max_bending_stress, drive),
         max_bending_stress_plate_mpa=notes.value(max_bending_stress, drive, True),
         mean_flank_pressure_mpa=notes.value(mean_flank_pressure, drive),
+        phi=phi,
+        deflection_mm=curve.radius(phi) - gear.flexspline_inner_radius,
+        curvature_change_per_mm=notes.value(curvature_change, gear, curve, phi),
         notes=tuple(notes.notes),
     )

@@ -6,17 +6,19 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
-from typing import Any, cast  # Any: values of JSON
+from typing import TYPE_CHECKING, Any, cast  # Any: values of JSON
 
-from hdopt.errors import HdoptError, MissingLibrary, MissingValue
+from hdopt.errors import HdoptError, MissingLibrary, MissingValue, unknown_name
+from hdopt.figures import drawn
 from hdopt.files import make_folder, to_json, write_bytes, write_text
 from hdopt.parallel.engine import engine_from, engine_in_force
 from hdopt.parallel.kept import Kept
-from hdopt.report import REPORT_FILE, RESULTS_FILE, Report, Section, Text
+from hdopt.report import REPORT_FILE, RESULTS_FILE, Figure, Item, Report, Section, Table, Text
+from hdopt.report.cells import index_has_meaning
 from hdopt.report.sections.inputs import inputs_section
 from hdopt.study import AnyStudy, Study, as_study
 from hdopt.study.defaults import defaults_taken
@@ -27,6 +29,11 @@ from hdopt.workflow.requirement import of_run
 from hdopt.workflow.run_folder import RunFolder, finish, run_folder
 from hdopt.workflow.run_verdict import section_of_run
 from hdopt.workflow.steps import STEPS, Context, Step, StepResult, find_step
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import plotly.graph_objects as go
+    from matplotlib.figure import Figure as MatplotlibFigure
 
 Progress = Callable[[Iterable[str]], Iterable[str]]
 
@@ -49,6 +56,39 @@ class RunResult:
         """The results of each step."""
         return {name: step.results for name, step in self.steps.items()}
 
+    @property
+    def figures(self) -> dict[str, go.Figure]:
+        """The figures of the page by their keys, in its order."""
+        return {item.key: item.figure for item in self._items() if isinstance(item, Figure)}
+
+    def plot(self, figure: str | None = None, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
+        """The page's `figure` of this key, the first one if None. `backend` is "plotly" or "matplotlib", which draws
+        lines, points and bars. Raises `HdoptError` for a key that the page does not have."""
+        found = self.figures
+        if not found:
+            raise HdoptError(f"the report of {self.study} has no figure; its tables are in tables()")
+        if figure is not None and figure not in found:
+            raise HdoptError(unknown_name("figure", figure, found))
+        return drawn(found[figure or next(iter(found))], backend)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a step: whether its answer is yes, and what it says."""
+        import pandas as pd
+
+        rows = [(name, step.answer, "; ".join(step.says) or left_out(step)) for name, step in self.steps.items()]
+        return pd.DataFrame(rows, columns=["step", "answer", "says"])
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet: the steps, and every table of the page by its key."""
+        tables = {item.key: item.frame for item in self._items() if isinstance(item, Table)}
+        framed = {key: frame.reset_index() if index_has_meaning(frame) else frame for key, frame in tables.items()}
+        return {"steps": self.to_frame(), **framed}
+
+    def _items(self) -> Iterator[Item]:
+        for step in self.steps.values():
+            for section in step.sections:
+                yield from section.items
+
     def to_dict(self) -> dict[str, Any]:
         return {
             "study": self.study,
@@ -56,6 +96,11 @@ class RunResult:
             "files": [str(file) for step in self.steps.values() for file in step.files],
             "steps": {name: dict(step.results) for name, step in self.steps.items()},
         }
+
+
+def left_out(step: StepResult) -> str:
+    """Why a `step` was left out; "" where it was not."""
+    return f"left out: {step.results['left_out']}" if "left_out" in step.results else ""
 
 
 def run_study(

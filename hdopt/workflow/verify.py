@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any  # Any: values of JSON
+from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 from hdopt.errors import HdoptError
 from hdopt.files import read_json
@@ -16,6 +16,9 @@ from hdopt.report import REPORT_FILE, RESULTS_FILE
 from hdopt.study import load_study
 from hdopt.workflow.provenance import provenance
 from hdopt.workflow.run import Progress, run_study
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MOST_TOLD = 5
 """Numbers that differ, of which the answer tells."""
@@ -46,6 +49,20 @@ class Verification:
             "numbers": [{"place": place, "then": then, "now": now} for place, then, now in self.numbers],
             "changes": list(self.changes),
         }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a file: whether it came out with the same bytes."""
+        import pandas as pd
+
+        rows = [(name, name in self.same) for name in sorted((*self.same, *self.differing))]
+        return pd.DataFrame(rows, columns=["file", "same"])
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What goes into a spreadsheet: the files, and the numbers that differ."""
+        import pandas as pd
+
+        numbers = pd.DataFrame(list(self.numbers), columns=["place", "then", "now"])
+        return {"files": self.to_frame(), "numbers": numbers}
 
 
 def verify_run(folder: str | Path, progress: Progress = iter) -> Verification:

@@ -23,7 +23,7 @@ def data_of(page):
 
 @pytest.fixture(scope="module")
 def shipped():
-    return data_of(explorer_page(load_study("csf-25-80"), 64)[0])
+    return data_of(explorer_page(load_study("csf-25-80"), 64).html)
 
 
 def test_every_error_has_a_slider_that_starts_at_the_study(shipped):
@@ -56,7 +56,7 @@ def test_the_cloud_is_the_stack_of_the_tolerances(shipped):
 
 def test_the_same_seed_gives_the_same_page_and_another_a_different_one():
     study = load_study("csf-25-80")
-    pages = [explorer_page(study, 16, seed)[0] for seed in (0, 0, 1)]
+    pages = [explorer_page(study, 16, seed).html for seed in (0, 0, 1)]
     assert pages[0] == pages[1] != pages[2]
 
 

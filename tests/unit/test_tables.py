@@ -23,9 +23,7 @@ WILD = ["=SUM(A1:A9)", "+1+cmd|' /C calc'!A0", "-2+3", "@SUM(1)", '=HYPERLINK("x
 """Names that a spreadsheet would run, which a study or a file may give."""
 WITHOUT = {
     "new": "writes a study",
-    "run": "writes its tables into its folder",
     "studies": "names and titles",
-    "explore": "writes a page",
 }
 """Commands without table options, and why."""
 
@@ -99,6 +97,7 @@ def stack_study(tmp_path):
     return file
 
 
+OF_STRUCTURES = 'drive = "csf-25-80"\n[study]\nsteps = ["structures"]\n'
 COMMAND_LINES = {
     "ke": ("ke", "csf-25-80"),
     "profile": ("profile", "csf-25-80"),
@@ -106,11 +105,15 @@ COMMAND_LINES = {
     "export": ("export", "csf-25-80"),
     "stack": ("stack", "csf-25-80", "-n", "2048"),
     "sobol": ("sobol", "csf-25-80", "-n", "256"),
+    "explore": ("explore", "csf-25-80", "-n", "64", "-o", "explorer.html"),
+    "run": ("run", "own.toml", "-o", "out"),
 }
 
 
 @pytest.mark.parametrize("name", COMMAND_LINES)
-def test_tables_of_the_shipped_drive(name, tmp_path, capsys):
+def test_tables_of_the_shipped_drive(name, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.toml").write_text(OF_STRUCTURES)
     assert_fit_for_a_spreadsheet(capsys, tmp_path, *COMMAND_LINES[name])
 
 
@@ -202,6 +205,29 @@ def test_tables_from_python(tmp_path):
     with pytest.raises(HdoptError, match=r"give one of these endings"):
         hdopt.write_tables(result, tmp_path / "ke.ods")
     assert sorted(file.name for file in tmp_path.iterdir()) == ["ke.csv", "ke.xlsx"]
+
+
+def test_the_cloud_of_the_explorer_is_in_study_units(tmp_path):
+    """Would catch radians under a heading in deg, and a peak-to-peak of another drive."""
+    from dataclasses import fields
+
+    cloud = hdopt.explore("csf-25-80", tmp_path / "explorer.html", 16).to_frame()
+    assert len(cloud) == 16 and len(cloud.columns) == len(fields(hdopt.DriveErrors)) + 1
+    for _, row in cloud.head(3).iterrows():
+        drive = hdopt.load_study("csf-25-80").with_({"errors": dict(row.drop("peak_to_peak_arcmin"))})
+        assert hdopt.kinematic_error(drive, method="closed form").peak_to_peak_arcmin == pytest.approx(
+            row["peak_to_peak_arcmin"], abs=1e-6  # the kernel's own promise
+        )
+
+
+def test_the_tables_of_a_run_are_those_of_its_page(tmp_path):
+    (tmp_path / "own.toml").write_text(OF_STRUCTURES)
+    result = hdopt.run_study(tmp_path / "own.toml", tmp_path / "out")
+    tables = result.tables()
+    assert list(tables["steps"]["step"]) == ["structures"] and tables["steps"]["answer"].all()
+    (written,) = [pd.read_csv(file) for file in (tmp_path / "out").glob("structures-table.csv")]
+    assert len(tables["structures-table"]) == len(written)
+    assert hdopt.verify_run(tmp_path / "out").to_frame()["same"].all()
 
 
 LARGEST = 9.99e307

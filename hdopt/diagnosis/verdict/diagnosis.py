@@ -13,9 +13,12 @@ from hdopt.diagnosis.inference.base_fit import BaseEstimate
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.diagnosis.verdict.where import Where
 from hdopt.effects.estimate import Parameter
+from hdopt.figures import drawn
 
 if TYPE_CHECKING:
     import pandas as pd
+    import plotly.graph_objects as go
+    from matplotlib.figure import Figure as MatplotlibFigure
 
 
 class FitNumbers(TypedDict):
@@ -89,6 +92,22 @@ class Diagnosis:
         if self.where is not None:
             result["where"] = self.where
         return result
+
+    def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
+        """What each model leaves of turns that it did not see, with the noise floor. `backend` is "plotly" or
+        "matplotlib"."""
+        import plotly.graph_objects as go
+
+        left = {
+            "base": self.fit["heldout_rms_base_arcmin"],
+            "extended": self.fit["heldout_rms_extended_arcmin"],
+            "generic": self.fit["heldout_rms_generic_arcmin"],
+            "placebo": self.fit["heldout_rms_placebo_arcmin"],
+        }
+        bars = go.Bar(x=list(left), y=list(left.values()))
+        layout = {"title": self.verdict, "xaxis_title": "model", "yaxis_title": "held-out error, arcmin rms"}
+        floor = {"y": self.fit["noise_floor_arcmin"], "line_dash": "dash", "annotation_text": "noise floor"}
+        return drawn(go.Figure(bars, layout).add_hline(**floor), backend)
 
     def to_frame(self) -> pd.DataFrame:
         """One row a parameter, of the effects that were named and of the base model, with its interval."""

@@ -15,17 +15,17 @@ def explorer(study: Study, context: Context) -> StepResult:
     that opens it; a word of why where the closed form does not know the drive."""
     title = "Explorer"
     try:
-        page, drives, notes = explorer_page(study, seed=context.seed)
+        page = explorer_page(study, seed=context.seed)
     except HdoptError as error:
         section = Section("explorer", title, (Text(f"Left out: {error}."),))
         return StepResult((section,), {"left_out": str(error)})
     place = context.folder / EXPLORER_FILE
-    write_text(place, page)
-    held = Download(EXPLORER_FILE, page, "Opens in a new tab; saved, it opens from disk.", opens=True)
+    write_text(place, page.html)
+    held = Download(EXPLORER_FILE, page.html, "Opens in a new tab; saved, it opens from disk.", opens=True)
     section = Section(
         "explorer",
         title,
-        (held, *map(Text, notes)),
+        (held, *map(Text, page.notes)),
         "The drive under sliders: move an error, the pressure angle or the width, and see what the error becomes.",
     )
-    return StepResult((section,), {"drives": drives}, (place,))
+    return StepResult((section,), {"drives": len(page.cloud)}, (place,))
