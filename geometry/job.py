@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from enum import Enum
 from functools import cached_property
@@ -12,6 +12,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any  # Any: whatever records hold, on its way into JSON
 
 from hdopt.drive.geometry import Drive
+from hdopt.files import JsonReady
 from hdopt.geometry.assembly import wave_generator_model
 from hdopt.geometry.budget import CalloutTables, bounds_from
 from hdopt.geometry.dimensions import Dimension, key_dimensions
@@ -34,17 +35,14 @@ class Job:
     options: ExportOptions
     dimensions: tuple[Dimension, ...]
     identity: Identity
+    mating: tuple[MatingRow, ...]
+    """What the parts around the wave generator must keep."""
     bounds: Mapping[str, float]
     contributors: CalloutTables
 
     @cached_property
     def solids(self) -> tuple[tuple[Part, cq.Solid], ...]:
         return tuple((part, part.build()) for part in self.model.parts)
-
-    @property
-    def mating(self) -> tuple[MatingRow, ...]:
-        """What the parts around the wave generator must keep."""
-        return mating_rows(self.drive, self.model, self.bounds, self.contributors)
 
     @property
     def made(self) -> tuple[tuple[Part, cq.Solid], ...]:
@@ -67,18 +65,23 @@ def make_job(
     """
     bounds, contributors = bounds or {}, contributors or {}
     model = wave_generator_model(drive, options, bounds_from(bounds, contributors))
-    identity = Identity(f"wave generator {name}", name, fingerprint(drive, options), version("hdopt"))
     table = key_dimensions(model, drive.wave_generator.width, bounds, contributors)
-    return Job(drive, model, options, table, identity, bounds, contributors)
+    mating = mating_rows(drive, model, bounds, contributors)
+    budgets = [budget.to_dict() for budget in model.plan.budgets]
+    tolerances = [*budgets, *(row.to_dict() for row in table), *(row.to_dict() for row in mating)]
+    identity = Identity(f"wave generator {name}", name, fingerprint(drive, options, tolerances), version("hdopt"))
+    return Job(drive, model, options, table, identity, mating, bounds, contributors)
 
 
-def fingerprint(drive: Drive, options: ExportOptions) -> str:
-    """Twelve hexadecimal digits that change with the wave generator and the clearances of a `drive` and with the
-    `options`.
+def fingerprint(drive: Drive, options: ExportOptions, tolerances: Sequence[JsonReady] = ()) -> str:
+    """Twelve hexadecimal digits that change with all that the sheets and the tolerances in STEP files say.
 
-    What follows from tolerances is not among them: the fits, and the axial gap of slides where no option gives it.
+    That is the wave generator and the clearances of a `drive`, the `options`, and the `tolerances`: the rows of key
+    dimensions, budgets and mating parts. A tolerance of which none of them speaks, as the teeth's, changes nothing.
     """
-    plain = json.dumps([_plain(drive.wave_generator), _plain(drive.clearances), asdict(options)], sort_keys=True)
+    plain = json.dumps(
+        [_plain(drive.wave_generator), _plain(drive.clearances), asdict(options), list(tolerances)], sort_keys=True
+    )
     return hashlib.sha256(plain.encode()).hexdigest()[:12]
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import datetime
 import math
-import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -12,6 +10,7 @@ import numpy as np
 
 from hdopt.geometry.callouts import Callout, callouts_of
 from hdopt.geometry.contour import Circle
+from hdopt.geometry.day import moment
 from hdopt.geometry.drawing import (
     FROM_LEFT,
     FRONT,
@@ -90,14 +89,6 @@ def product_data(job: Job) -> dict[str, ProductData]:
         part.name: ProductData(part_number(job, number), *material(part), callouts_of(part, job.model))
         for number, part in enumerate((part for part in job.model.parts if not part.context), 1)
     }
-
-
-def _date() -> str:
-    """Today, or the day that SOURCE_DATE_EPOCH names."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
-    if epoch.isdigit():
-        return datetime.datetime.fromtimestamp(int(epoch), datetime.UTC).date().isoformat()
-    return datetime.datetime.now(datetime.UTC).date().isoformat()
 
 
 def _part_sheet(job: Job, part: Part, solid: cq.Solid, number: int) -> Sheet:
@@ -289,7 +280,9 @@ def _title(sheet: Sheet, job: Job, name: str, number: str, scale: float, part: P
     ratio = f"{scale:g}:1" if scale >= 1 else f"1:{1 / scale:g}"
     sheet.text((x + 4, y + 8), name, 5.2, bold=True)
     sheet.text((x + 4, y + 14.5), job.identity.title, 3.4)
-    lines = [f"number {number}   revision {job.identity.fingerprint}   date {_date()}   scale {ratio}"]
+    lines = [
+        f"number {number}   revision {job.identity.fingerprint}   date {moment().date().isoformat()}   scale {ratio}"
+    ]
     if part is not None:
         lines.append(f"material (assumed): {material(part)[0]}")
         lines.append(f"mass {1e3 * mass(part):.4g} g   volume {part.volume:.2f} mm³")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any  # Any: objects of OCP whose types it does not name
 
 from hdopt.errors import HdoptError
+from hdopt.geometry.day import moment
 
 if TYPE_CHECKING:
     import cadquery as cq
@@ -103,18 +104,48 @@ def write_step(
     # Curves on surfaces repeat what the surfaces say and double the file; readers make them anew.
     if not Interface_Static.SetIVal_s("write.surfacecurve.mode", 0):
         raise RuntimeError("Open CASCADE does not know the parameter write.surfacecurve.mode")
-    writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
-    writer.SetColorMode(True)
+    session = XSControl_WorkSession()
+    writer = STEPCAFControl_Writer(session, False)
+    # Open CASCADE writes colours in the order of addresses in memory, which no two processes share.
+    writer.SetColorMode(False)
     writer.SetNameMode(True)
     writer.SetDimTolMode(bool(products))
     writer.SetMaterialMode(bool(products))
     if not writer.Transfer(document, STEPControl_StepModelType.STEPControl_AsIs):
         raise RuntimeError("Open CASCADE could not translate the parts to STEP")
 
+    _add_colours(session, document, [part for part, _ in parts])
     _number_products(writer.ChangeWriter().Model(), products or {})
     _write_header(writer.ChangeWriter().Model(), identity)
     if writer.Write(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise HdoptError(f"cannot write {path}; give a file in a folder that can be written")
+
+
+def _add_colours(session: Any, document: TDocStd_Document, parts: Sequence[Part]) -> None:
+    """The colours of the `parts`, in their order, each as a style of its solid in the model of the `session`."""
+    import cadquery as cq
+    from OCP.STEPConstruct import STEPConstruct_Styles
+    from OCP.StepRepr import StepRepr_HArray1OfRepresentationItem
+    from OCP.StepVisual import StepVisual_MechanicalDesignGeometricPresentationRepresentation
+    from OCP.TCollection import TCollection_HAsciiString
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+    from hdopt.geometry.semantic import shape_label
+
+    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    for part in parts:
+        shape = shapes.GetShape_s(shape_label(document, part.name))
+        styles = STEPConstruct_Styles(session)
+        colour = styles.EncodeColor_s(cq.Color(*part.colour).wrapped.GetRGB())
+        seen_through = 1.0 - part.colour[3]
+        style = styles.MakeColorPSA(None, colour, None, colour if seen_through else None, seen_through)
+        solids = cq.Shape.cast(shape).Solids()
+        items = StepRepr_HArray1OfRepresentationItem(1, len(solids))
+        for index, solid in enumerate(solids, 1):
+            items.SetValue(index, styles.AddStyle(solid.wrapped, style, None))
+        presentation = StepVisual_MechanicalDesignGeometricPresentationRepresentation()
+        presentation.Init(TCollection_HAsciiString(""), items, styles.FindContext(shape))
+        session.Model().AddWithRefs(presentation)
 
 
 def _write_header(model: Any, identity: Identity) -> None:
@@ -128,6 +159,7 @@ def _write_header(model: Any, identity: Identity) -> None:
         return TCollection_HAsciiString(_ascii(value))
 
     header.SetName(text(identity.title))
+    header.SetTimeStamp(text(moment().strftime("%Y-%m-%dT%H:%M:%S")))
     header.SetDescriptionValue(1, text(identity.description))
     header.SetAuthorValue(1, text("hdopt"))
     header.SetOrganizationValue(1, text(""))

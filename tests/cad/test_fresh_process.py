@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -32,3 +33,16 @@ def test_earlier_file_is_replaced_with_a_word(tmp_path):
     first, second = (subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(2))
     assert "in place of an earlier file" not in first
     assert f"wrote and checked {target} (dxf), in place of an earlier file" in second
+
+
+def test_two_processes_write_the_same_bytes(tmp_path):
+    """Five parts have colours, the context's are seen through: the order of none may hang on addresses in memory."""
+    kept = {}
+    for run in ("first", "second"):
+        target = tmp_path / f"{run}.step"
+        command = [*HDOPT, "export", "--context", "--set", "export.step_schema=AP242", "--step", str(target)]
+        moment = {**os.environ, "SOURCE_DATE_EPOCH": "1790000000"}
+        subprocess.run(command, env=moment, capture_output=True, check=True)
+        kept[run] = target.read_bytes()
+    assert kept["first"] == kept["second"]
+    assert b"'2026-09-21T14:13:20'" in kept["first"]
