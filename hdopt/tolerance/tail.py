@@ -9,7 +9,9 @@ spread gives the interval: the coefficient of variation that one run reports lea
 from __future__ import annotations
 
 import math
+import threading
 from dataclasses import dataclass
+from functools import partial
 from typing import Any  # Any: values of JSON
 
 import numpy as np
@@ -18,6 +20,7 @@ from scipy import special
 
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError
+from hdopt.parallel.engine import Engine, engine_from, for_large_items
 from hdopt.tolerance.intervals import CONFIDENCE, clopper_pearson
 from hdopt.tolerance.response import Response, evaluate, proven_bound
 from hdopt.tolerance.space import InputSpace
@@ -29,6 +32,8 @@ PROPOSAL_RANGE = 2.0
 CHAIN_BLOCK = 1000
 MAX_LEVELS = 16
 """Levels of a tenth: probabilities below 1e-16 are not told from zero."""
+_one_at_a_time = threading.Lock()
+"""OpenTURNS draws from one stream a process: two simulations at once would take numbers from each other."""
 
 
 @dataclass(frozen=True)
@@ -64,12 +69,14 @@ def tail_probability(
     seed: int = 1,
     replicates: int = REPLICATES,
     level_size: int = LEVEL_SIZE,
+    engine: Engine | str | None = None,
 ) -> Tail:
     """P(`response` > `limit`) over `space`, with a 95 % interval over `replicates` independent subset simulations.
 
-    Each simulation has a stream of its own from `seed` and takes `level_size` points a level (Au and Beck 2001).
-    Exactly zero where a proven bound of the response over its bounded inputs does not exceed the limit. Raises
-    `HdoptError` for a limit that is not finite.
+    Each simulation has a stream of its own from `seed` and takes `level_size` points a level (Au and Beck 2001). They
+    run on `engine` (by default the one in force): each in a process of its own where it has any, else one after another
+    on all threads; the answer is the same. Exactly zero where a proven bound of the response over its bounded inputs
+    does not exceed the limit. Raises `HdoptError` for a limit that is not finite.
     """
     if not math.isfinite(limit):
         raise HdoptError(f"the tail's limit is {limit!r}; it must be a finite number")
@@ -80,11 +87,10 @@ def tail_probability(
             f"which the limit {limit:g} is not below"
         )
         return Tail(limit, 0.0, 0.0, 0.0, "proven bound", 0, note)
-    runs, evaluations = [], 0
-    for child in np.random.SeedSequence(seed).spawn(replicates):
-        probability, used = _subset_simulation(response, space, limit, int(child.generate_state(1)[0]), level_size)
-        runs.append(probability)
-        evaluations += used
+    seeds = [int(child.generate_state(1)[0]) for child in np.random.SeedSequence(seed).spawn(replicates)]
+    simulate = partial(_subset_simulation, response, space, limit, level_size)
+    found = list(for_large_items(engine_from(engine)).map(simulate, seeds))
+    runs, evaluations = [probability for probability, _ in found], sum(used for _, used in found)
     if not any(runs):
         ceiling = clopper_pearson(0, replicates * level_size).high * LEVEL_PROBABILITY ** (MAX_LEVELS - 1)
         note = f"no response above {limit:g} was found; where inputs are bounded the probability may be exactly zero"
@@ -113,9 +119,14 @@ def _proven_bound(response: Response, space: InputSpace) -> float | None:
 
 
 def _subset_simulation(
-    response: Response, space: InputSpace, limit: float, seed: int, level_size: int
+    response: Response, space: InputSpace, limit: float, level_size: int, seed: int
 ) -> tuple[float, int]:
     """One run in the space of independent standard normal numbers; returns the probability and the responses used."""
+    with _one_at_a_time:
+        return _simulated(response, space, limit, level_size, seed)
+
+
+def _simulated(response: Response, space: InputSpace, limit: float, level_size: int, seed: int) -> tuple[float, int]:
     import openturns as ot
 
     correlations = space.copula

@@ -249,7 +249,7 @@ def stack(
     if tail is not None:
         from hdopt.tolerance.tail import tail_probability
 
-        rare = tail_probability(problem.response, problem.space, tail, seed=seed)
+        rare = tail_probability(problem.response, problem.space, tail, seed=seed, engine=engine)
     if worst is not None:
         notes += _exact_at(problem, worst)
     method, distance = _method(problem, seed)

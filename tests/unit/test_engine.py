@@ -19,6 +19,7 @@ from hdopt.parallel.workers import cores, in_a_worker
 from hdopt.tolerance.distributions import Normal
 from hdopt.tolerance.space import InputSpace, Tolerance
 from hdopt.tolerance.stack import StackRequest, run_stack
+from hdopt.tolerance.tail import tail_probability
 
 
 def total(x):
@@ -50,6 +51,7 @@ def test_results_come_in_order(engine):
 def test_processes_keep_order_and_bytes():
     assert list(Processes(2).map(lambda i: i * i, range(20))) == [i * i for i in range(20)]
     assert stacked(Processes(2)) == stacked("process")
+    assert tail(Processes(2)) == tail("process") == tail("threads:3")
 
 
 def test_threads_give_the_bytes_of_one_process():
@@ -155,6 +157,42 @@ def test_dask_cluster_gives_the_same_numbers():
         assert stacked(engine) == stacked("process")
 
 
+def tail(engine):
+    """Of the sum of two normals, slow enough that two simulations at once would overlap."""
+
+    def response(x):
+        time.sleep(1e-4)
+        return x.sum(axis=1)
+
+    return tail_probability(response, SPACE, 4.0, seed=0, replicates=6, level_size=1000, engine=engine)
+
+
+class Elsewhere(ThisProcess):
+    """An engine that says it leaves this process, and counts what it gets."""
+
+    elsewhere = True
+    got = 0
+
+    def map(self, function, items):
+        items = list(items)
+        Elsewhere.got = len(items)
+        return super().map(function, items)
+
+
+def test_a_tail_gives_each_of_its_simulations_to_the_engine():
+    assert tail(Elsewhere()) == tail("process")
+    assert Elsewhere.got == 6
+
+
+def test_a_tail_has_the_same_numbers_on_two_threads_of_one_dask_worker():
+    """Would catch two simulations that draw from OpenTURNS' one stream a process at the same time."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, protocol="tcp://", dashboard_address=None
+    ) as cluster:
+        assert tail(Dask(cluster.scheduler_address.removeprefix("tcp://"))) == tail("process")
+
+
 def test_no_scheduler_is_one_sentence():
     with pytest.raises(HdoptError, match=r"no Dask scheduler answers at 127\.0\.0\.1:1"):
         list(Dask("127.0.0.1:1", timeout_s=0.5).map(total, [1]))
@@ -174,6 +212,7 @@ from hdopt.tolerance.distributions import Uniform
 from hdopt.tolerance.space import InputSpace, Tolerance
 from hdopt.tolerance.sampling import PlainMonteCarlo
 from hdopt.tolerance.stack import StackRequest, run_stack
+from hdopt.tolerance.tail import tail_probability
 space = InputSpace({"x": Tolerance(Uniform(lower=0.0, upper=1.0))})
 request = StackRequest(limit=0.9, n=COUNT, seed=0, engine="process", sampling=PlainMonteCarlo())
 run_stack(lambda x: x[:, 0], space, request)
