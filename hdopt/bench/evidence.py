@@ -193,9 +193,7 @@ class Witness:
         if len(self.setups) > 1:
             top = 2 * max(np.abs(s.run.speed).max() for s in self.setups) / TURN
             rivals["resonance"] = [
-                self._swing(Resonance(z, False, top, scale=r))
-                for r in (0.02, 0.1, 0.3, 0.6, 0.9)
-                for z in (0.03, 0.1)
+                self._swing(Resonance(z, False, top, scale=r)) for r in (0.02, 0.1, 0.3, 0.6, 0.9) for z in (0.03, 0.1)
             ]
         return rivals
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from typing import Protocol
 
@@ -146,6 +146,10 @@ class DesignSpace:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_meshes", lru_cache(maxsize=512)(self._mesh))
+
+    def __reduce__(self) -> tuple[type[DesignSpace], tuple[object, ...]]:
+        """What goes to another process: all but the meshes that are kept, which are made anew there."""
+        return type(self), tuple(getattr(self, given.name) for given in fields(self) if given.init)
 
     @cached_property
     def baseline_values(self) -> dict[str, float]:

@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import partial
+
 from hdopt.optimize.evaluation import record, record_of
 from hdopt.optimize.fronts import Progress, front_objectives, trace_front
 from hdopt.optimize.minimax import GLOBAL, LOCAL
 from hdopt.optimize.multipliers import prices
 from hdopt.optimize.nlopt_adapter import INTERRUPTED, Effort, find_algorithm
+from hdopt.optimize.problem import DesignProblem
 from hdopt.optimize.records import Front, SearchResult, choose
 from hdopt.optimize.setup import Setup
 from hdopt.optimize.solve import Method, Solution, solve
+from hdopt.parallel.engine import engine_from, for_large_items
+
+
+class Interrupted(Exception):
+    """Ctrl-C came while a combination was being solved; `solution` is the best of it so far. It is raised, not
+    returned, so that no engine keeps it for a finished part."""
+
+    def __init__(self, solution: Solution) -> None:
+        super().__init__(solution)
+        self.solution = solution
 
 
 def search_designs(
@@ -23,9 +37,10 @@ def search_designs(
 ) -> SearchResult:
     """Search the designs of `setup` for the best, and for `fronts` between its two objectives.
 
-    Every combination of profile and structure gets a global start and a local search; the best of all is chosen. An
-    interrupt (Ctrl-C) ends the search with the best so far. `seed` is that of the algorithms, `progress` is told what
-    comes next, `study` and `notes` are passed on to the result.
+    Every combination of profile and structure gets a global start and a local search, on the engine in force and with
+    the same answer on each; the best of all is chosen. An interrupt (Ctrl-C) ends the search with the best so far.
+    `seed` is that of the algorithms, `progress` is told what comes next, with `fronts` those between two objectives are
+    traced as well, `study` and `notes` are passed on to the result.
     """
     method = method_of(setup, seed)
     solved: list[Solution] = []
@@ -33,13 +48,15 @@ def search_designs(
     interrupted = False
     evaluations = 0
     try:
-        for combination in setup.space.combinations:
-            progress(str(combination))
-            solution = solve(setup.problem(combination), method)
-            evaluations += solution.evaluations
-            solved.append(solution)
-            if solution.outcome.interrupted:
-                raise KeyboardInterrupt
+        engine = for_large_items(engine_from(None))
+        try:
+            for solution in engine.map(partial(_solved, method), _problems(setup, progress)):
+                evaluations += solution.evaluations
+                solved.append(solution)
+        except Interrupted as cut:
+            evaluations += cut.solution.evaluations
+            solved.append(cut.solution)
+            raise KeyboardInterrupt from cut
         if fronts and setup.settings.second_objective:
             for objective in front_objectives(setup):
                 found, spent = trace_front(setup, method, objective, solved, progress)
@@ -72,6 +89,19 @@ def search_designs(
         solutions=tuple(solved),
         notes=notes,
     )
+
+
+def _problems(setup: Setup, progress: Progress) -> Iterator[DesignProblem]:
+    for combination in setup.space.combinations:
+        progress(str(combination))
+        yield setup.problem(combination)
+
+
+def _solved(method: Method, problem: DesignProblem) -> Solution:
+    solution = solve(problem, method)
+    if solution.outcome.interrupted:
+        raise Interrupted(solution)
+    return solution
 
 
 def method_of(setup: Setup, seed: int) -> Method:

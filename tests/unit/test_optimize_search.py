@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +17,11 @@ from hdopt.optimize.minimax import minimise
 from hdopt.optimize.multipliers import prices
 from hdopt.optimize.nlopt_adapter import INTERRUPTED
 from hdopt.optimize.objectives import QUANTITIES
+from hdopt.optimize.search import search_designs
 from hdopt.optimize.solve import Method, solve
+from hdopt.parallel.cluster import Dask
+from hdopt.parallel.engine import engine_in_force
+from hdopt.parallel.local import ThisProcess
 from hdopt.study import load_study
 from hdopt.workflow.search_setup import setup_of
 
@@ -197,3 +203,55 @@ def test_an_interrupt_ends_with_the_best_so_far(monkeypatch):
 def test_what_cannot_be_searched_is_said(override, message):
     with pytest.raises(HdoptError, match=message):
         hdopt.search(load_study("csf-25-80", (override,)), fronts=False)
+
+
+def test_a_problem_that_went_to_another_process_is_the_same(setup):
+    """Would catch the kept meshes of a design space going along, which cannot be pickled."""
+    problem = setup.problem(TWO_DISK)
+    u = np.full(problem.n, 0.4)
+    here, there = problem.evaluate(u), pickle.loads(pickle.dumps(problem)).evaluate(u)
+    np.testing.assert_array_equal(there.pieces, here.pieces)
+    np.testing.assert_array_equal(there.constraint_slopes, here.constraint_slopes)
+
+
+def test_an_interrupted_combination_is_no_finished_part_and_still_counts(setup, monkeypatch):
+    """Would catch a search cut short that is kept as finished: --resume would take it."""
+    finished = []
+
+    class Keeping(ThisProcess):
+        elsewhere = True  # else the drives' own threads would come first
+
+        def map(self, function, items):
+            for item in items:
+                result = function(item)
+                finished.append(result)
+                yield result
+
+    whole = solve(setup.problem(ELLIPSE), Method())
+
+    def cut_at_the_second(problem, method):
+        return replace(whole, problem=problem, outcome=replace(whole.outcome, interrupted=len(asked) > 1))
+
+    asked = []
+    monkeypatch.setattr("hdopt.optimize.search.solve", cut_at_the_second)
+    three = replace(setup, space=replace(setup.space, combinations=(ELLIPSE, ELLIPSE, ELLIPSE)))
+    with engine_in_force(Keeping()):
+        result = search_designs(three, progress=asked.append, fronts=False)
+    assert result.interrupted
+    assert (len(finished), len(result.solutions)) == (1, 2)
+
+
+@pytest.mark.slow
+def test_a_search_with_random_numbers_is_the_same_on_two_threads_of_a_dask_worker():
+    """NLopt's random numbers are a stream a thread, seeded in each."""
+    distributed = pytest.importorskip("distributed")
+    words = ('search.profiles=["ellipse"]', 'search.structures=["automatic", "integral"]')
+    study = load_study("csf-25-80", (*words, 'search.global_algorithm="GN_CRS2_LM"'))
+    found = {}
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, protocol="tcp://", dashboard_address=None
+    ) as cluster:
+        for engine in ("process", Dask(cluster.scheduler_address.removeprefix("tcp://"))):
+            with engine_in_force(engine):
+                found[engine] = json.dumps(hdopt.search(study, fronts=False).to_dict())
+    assert len(set(found.values())) == 1
