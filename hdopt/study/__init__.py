@@ -264,11 +264,11 @@ def study_document(source: str | Path | None = None, drive: str | None = None) -
         document, folder, name = _document(source)
         if drive is not None:
             shipped = {key: value for key, value in _shipped_drive(drive).data.items() if key in DRIVE_SECTIONS}
-            document = Document({**document.data, **shipped}, document.source, document.lines)
+            document = replace(document, data={**document.data, **shipped}, texts=())
     if isinstance(document.data.get("drive"), str):
         own = {key: value for key, value in document.data.items() if key != "drive"}
-        base = _shipped_drive(document.data["drive"], document.where(("drive",))).data
-        document = Document(merge(base, own), document.source, document.lines)
+        base = _shipped_drive(document.data["drive"], document.where(("drive",)))
+        document = replace(document, data=merge(base.data, own), texts=(*base.texts, *document.texts))
     return document, name, folder
 
 
@@ -330,7 +330,7 @@ def with_values(document: Document, values: Iterable[tuple[str, Any]], place: st
         path = (key,) if key in SECTIONS and isinstance(value, Mapping) else _resolve(key, data, place)
         set_value(data, path, value)
         lines[path] = SET_ON_COMMAND_LINE
-    return Document(data, document.source, lines)
+    return replace(document, data=data, lines=lines)
 
 
 def _resolve(key: str, data: Mapping[str, Any], place: str) -> tuple[str, ...]:

@@ -33,11 +33,13 @@ _KEY = re.compile(r"^\s*((?:\"[^\"]*\"|'[^']*'|[A-Za-z0-9_.-])+)\s*=")
 
 @dataclass(frozen=True)
 class Document:
-    """A parsed study file: its nested `data`, and the `source` and `lines` that messages point to."""
+    """A parsed study file: its nested `data`, and the `source` and `lines` that messages point to; `texts` are those of
+    the files that it was read from, what lies below first."""
 
     data: Mapping[str, Any]
     source: str
     lines: Mapping[Keys, int]
+    texts: tuple[str, ...] = ()
 
     def where(self, path: Keys) -> str:
         """'FILE, line N, a.b': the closest place in the file to the key `path`."""
@@ -64,7 +66,7 @@ def parse_document(text: str, source: str) -> Document:
         raise HdoptError(f"{source} is nested too deeply; a study has {DEEPEST} levels at most") from error
     except ValueError as error:  # Python refuses integers of more than 4300 digits
         raise HdoptError(f"{source} holds an integer of more than 4300 digits; TOML allows 64 bits") from error
-    document = Document(data, source, _key_lines(text))
+    document = Document(data, source, _key_lines(text), (text,))
     _check_size(document)
     return document
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
@@ -16,13 +17,19 @@ PATH_KEY = "file"
 Comments = Mapping[tuple[str, ...], Iterable[str]]
 
 
-def study_toml(data: Mapping[str, Any], head: Iterable[str] = (), comments: Comments | None = None) -> str:
+def study_toml(
+    data: Mapping[str, Any],
+    head: Iterable[str] = (),
+    comments: Comments | None = None,
+    above: Comments | None = None,
+) -> str:
     """Text of a study file with the sections and keys of `data`; keys whose value is None are left out.
 
     `head` are comment lines at the beginning. `comments` are lines by place: under the header of a table, or at the end
-    of a key's line, and at the end of the file under (). Line breaks in comments become blanks.
+    of a key's line, and at the end of the file under (); those of `above` stand in lines before a key, or under the
+    header. Line breaks in comments become blanks.
     """
-    comments = comments or {}
+    notes = _Notes(comments or {}, above or {})
     document = tomlkit.document()
     for line in head:
         document.add(tomlkit.comment(_one_line(line)))
@@ -31,29 +38,53 @@ def study_toml(data: Mapping[str, Any], head: Iterable[str] = (), comments: Comm
             document.add(key, tomlkit.item(value))
     for key, value in data.items():
         if isinstance(value, Mapping):
-            document.add(key, _table(value, (key,), comments))
-    for line in comments.get((), ()):
+            document.add(key, _table(value, (key,), notes))
+    for line in (*notes.beside.get((), ()), *notes.above.get((), ())):
         document.add(tomlkit.nl())
         document.add(tomlkit.comment(_one_line(line)))
     return tomlkit.dumps(document)
 
 
-def _table(content: Mapping[str, Any], path: tuple[str, ...], comments: Comments) -> Table:
+@dataclass(frozen=True)
+class _Notes:
+    """Comments by place, `beside` and `above` it."""
+
+    beside: Comments
+    above: Comments
+
+
+def _add_lines(place: Table, lines: Iterable[str]) -> None:
+    for line in lines:
+        place.add(tomlkit.comment(_one_line(line)))
+
+
+def _table(content: Mapping[str, Any], path: tuple[str, ...], notes: _Notes) -> Table:
     """A section; in [effects], each effect is a table of its own, elsewhere inner tables stand on one line."""
     table = tomlkit.table(is_super_table=path == ("effects",))
-    for line in comments.get(path, ()):
-        table.add(tomlkit.comment(_one_line(line)))
+    _add_lines(table, (*notes.above.get(path, ()), *notes.beside.get(path, ())))
     for key, value in content.items():
         if value is None:
             continue
+        place = (*path, key)
         if path == ("effects",) and isinstance(value, Mapping):
-            table.add(key, _table(value, (*path, key), comments))
+            table.add(key, _table(value, place, notes))
             continue
+        _add_lines(table, notes.above.get(place, ()))
         item = _item(value)
-        for line in comments.get((*path, key), ()):
-            item.comment(_one_line(line))
+        if beside := _within(notes.beside, place):
+            item.comment(_one_line("; ".join(beside)))
         table.add(key, item)
     return table
+
+
+def _within(comments: Comments, place: tuple[str, ...]) -> list[str]:
+    """The comments at `place` and, as it stands on one line, those of what lies inside it, with its name."""
+    found = []
+    for path, lines in comments.items():
+        if path[: len(place)] == place:
+            inside = ".".join(path[len(place) :])
+            found += [f"{inside}: {line}" if inside else line for line in lines]
+    return found
 
 
 def _item(value: Any) -> Item:

@@ -21,6 +21,7 @@ from hdopt.report import REPORT_FILE, RESULTS_FILE, Figure, Item, Report, Sectio
 from hdopt.report.cells import index_has_meaning
 from hdopt.report.sections.inputs import inputs_section
 from hdopt.study import AnyStudy, Study, as_study
+from hdopt.study.comments import comments_of
 from hdopt.study.defaults import defaults_taken
 from hdopt.study.drive import StudySection
 from hdopt.study.write import study_toml
@@ -171,12 +172,7 @@ def _write(study: Study, found: Mapping[str, StepResult], run: RunFolder, seed: 
     sections = (
         *((first,) if first else ()),
         *(section for step in found.values() for section in step.sections),
-        inputs_section(
-            study.data,
-            study_toml(study.data, (study.title,)),
-            study.name,
-            defaults_taken(study.sections, tuple(study.sections)),
-        ),
+        _inputs(study),
     )
     # The page travels: what it says of files is their names, not the folder they were written to.
     results = {"study": study.name, "steps": _without_folder(by_step, folder)}
@@ -190,6 +186,14 @@ def _write(study: Study, found: Mapping[str, StepResult], run: RunFolder, seed: 
         "provenance": provenance(study, seed, "run") | known,
     }
     write_text(run.new / RESULTS_FILE, to_json(results) + "\n")
+
+
+def _inputs(study: Study) -> Section:
+    """The appendix of the page: what went in, with what the study file says of it."""
+    comments = comments_of(study.document)
+    text = study_toml(study.data, comments.head or (study.title,), comments.beside, comments.above)
+    defaults = defaults_taken(study.sections, tuple(study.sections))
+    return inputs_section(study.data, text, study.name, defaults, comments.beside)
 
 
 def _without_folder(value: Any, folder: Path) -> Any:

@@ -71,7 +71,8 @@ def headings(page: str) -> list[str]:
 def test_the_page_begins_with_the_verdict_and_ends_with_the_inputs(tmp_path):
     """And tells nothing of the folder that it was written to: it is handed round."""
     steps = 'steps = ["waveform", "structures", "explorer"]'
-    (tmp_path / "mine.toml").write_text(f'drive = "csf-25-80"\n[study]\n{steps}\n')
+    own = "[load] # see [[mine]]\n[wave_generator]\nwidth_mm = 9.0 # by caliper\n"
+    (tmp_path / "mine.toml").write_text(f'drive = "csf-25-80"\n{own}[study]\n{steps}\n')
     study = load_study(tmp_path / "mine.toml")
     page = run_study(study, tmp_path / "out").report.read_text()
     shown = headings(page)
@@ -83,6 +84,10 @@ def test_the_page_begins_with_the_verdict_and_ends_with_the_inputs(tmp_path):
     inside = files_in(page)
     (tmp_path / "again.toml").write_bytes(inside["mine.toml"])
     assert load_study(tmp_path / "again.toml").data == study.data
+    # what the study file says of its numbers, and what ships says of the others
+    assert b"width_mm = 9.0 # by caliper\n" in inside["mine.toml"] and b"# assumed" in inside["mine.toml"]
+    assert "by caliper</td>" in page and "The base case of Table 2." in page
+    assert "See [ [mine]]." in page, "a comment is no reference to a figure of the page"
     assert inside["explorer.html"] == (tmp_path / "out" / "explorer.html").read_bytes()
     assert not any(str(tmp_path).encode() in content for content in inside.values())
     assert str(tmp_path) not in page

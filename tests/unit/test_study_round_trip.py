@@ -67,3 +67,75 @@ def test_files_are_found_from_where_the_study_went(name, tmp_path):
             assert ((folder or Path("/")) / file).resolve() == (old / name).resolve()
     absolute = {"wave_generator": {"file": "/data/cam.csv"}}
     assert with_moved_paths(absolute, old, new) == absolute
+
+
+OWN = """\
+# Drive of the mill.
+# Second line.
+
+drive = "csf-25-80"
+
+# measured on 3 May
+# at 21 deg
+[wave_generator]
+width_mm = 8.5 # by caliper
+# not sure of this one
+structure = "automatic"
+
+[tolerances.axis_eccentricity_mm] # of the lathe
+distribution = "rayleigh"
+scale = 0.004 # as 2024
+upper = 0.01
+
+# the end
+"""
+
+
+def test_comments_stand_where_they_stood():
+    """Would catch a comment that is lost, one at another key, and what ships said of a number that the study gave."""
+    from hdopt.study.comments import comments_of_text
+
+    found = comments_of_text(OWN)
+    assert found.head == ("Drive of the mill.", "Second line.")
+    assert found.beside == {
+        ("wave_generator", "width_mm"): ("by caliper",),
+        ("tolerances", "axis_eccentricity_mm"): ("of the lathe",),
+        ("tolerances", "axis_eccentricity_mm", "scale"): ("as 2024",),
+    }
+    assert found.above == {
+        ("wave_generator",): ("measured on 3 May", "at 21 deg"),
+        ("wave_generator", "structure"): ("not sure of this one",),
+        (): ("the end",),
+    }
+
+
+def test_comments_of_what_ships_go_with_its_numbers(tmp_path):
+    from hdopt.study.comments import SET, comments_of
+
+    (tmp_path / "own.toml").write_text(OWN + "[load]\ntorque_nm = 50\n")
+    study = load_study(tmp_path / "own.toml", ["semi_minor_mm=30.3", "flexspline_wall_mm=0.7"])
+    found = comments_of(study.document)
+    assert found.beside["load", "input_speed_rpm"] == ("the speed makers rate at",)
+    assert ("load", "torque_nm") not in found.beside, "what ships says of 63 N m does not hold for 50"
+    assert found.beside["wave_generator", "semi_minor_mm"] == found.beside["drive", "flexspline_wall_mm"] == (SET,)
+    text = study_toml(study.data, found.head, found.beside, found.above)
+    assert tomllib.loads(text) == study.data
+    for line in (
+        "[wave_generator]\n# measured on 3 May\n# at 21 deg\n",
+        "width_mm = 8.5 # by caliper",
+        "upper = 0.01} # of the lathe; scale: as 2024",
+    ):
+        assert line in text
+
+
+@pytest.mark.parametrize("name", shipped_studies())
+def test_no_comment_of_a_shipped_study_is_lost(name):
+    from hdopt.study.comments import comments_of
+
+    study = load_study(name)
+    found = comments_of(study.document)
+    text = study_toml(study.data, found.head, found.beside, found.above)
+    assert tomllib.loads(text) == study.data
+    own = study.document.texts[-1]
+    bare = [line.partition("#")[2].strip() for line in own.splitlines() if "#" in line]
+    assert [comment for comment in bare if comment not in text] == []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any  # Any: values of TOML
 
 import pandas as pd
@@ -27,27 +27,51 @@ SPREAD = {"tolerances": "Tolerances", "contributors": "Callouts"}
 """Sections with a distribution a key."""
 
 
+Comments = Mapping[tuple[str, ...], Iterable[str]]
+
+
 def inputs_section(
-    data: Mapping[str, Any], toml: str, name: str, assumptions: Sequence[str] = (), key: str = "inputs"
+    data: Mapping[str, Any], toml: str, name: str, assumptions: Sequence[str] = (), comments: Comments | None = None
 ) -> Section:
     """The inputs of a study: its merged `data` by section, and its whole text `toml`, to be saved as `name`.toml.
 
-    `assumptions` are sentences about what was taken where the study says nothing. `key` begins the keys of the tables.
+    `assumptions` are sentences about what was taken where the study says nothing. `comments` are what the study file
+    says beside its keys.
     """
     items: list[Item] = []
+    key, said = "inputs", comments or {}
     for section, title in SHOWN.items():
         rows = list(_leaves(data.get(section, {})))
         if rows:
             frame = pd.DataFrame(rows, columns=["what", "value", "unit", "key in the study file"])
-            items.append(Table(f"{key}-{section.replace('_', '-')}", title, frame, in_file=False))
+            frame = _remarked(frame, [_remark(said, (section, *row[-1].split("."))) for row in rows])
+            about = _caption(said, section)
+            items.append(Table(f"{key}-{section.replace('_', '-')}", title, frame, about, in_file=False))
     for section, title in SPREAD.items():
-        spread = [_spread(name, row) for name, row in data.get(section, {}).items() if isinstance(row, Mapping)]
-        if spread:
-            frame = pd.DataFrame(spread).dropna(axis="columns", how="all")
-            items.append(Table(f"{key}-{section}", title, frame, in_file=False))
+        given = {name: row for name, row in data.get(section, {}).items() if isinstance(row, Mapping)}
+        if given:
+            frame = pd.DataFrame([_spread(name, row) for name, row in given.items()])
+            frame = frame.dropna(axis="columns", how="all")
+            frame = _remarked(frame, [_remark(said, (section, name)) for name in given])
+            items.append(Table(f"{key}-{section}", title, frame, _caption(said, section), in_file=False))
     items += [Text(f"{sentence[:1].upper()}{sentence[1:]}.") for sentence in assumptions]
     items.append(Download(f"{name}.toml", toml, "The whole study file, everything that ships merged in."))
     return Section(key, "Inputs", tuple(items), "Everything that this page was computed from.")
+
+
+def _caption(comments: Comments, section: str) -> str:
+    """What the study file says beside the header of a section, as a sentence that refers to nothing of the page."""
+    says = _remark(comments, (section,)).replace("[[", "[ [")
+    return f"{says[:1].upper()}{says[1:].rstrip('.')}." if says else ""
+
+
+def _remark(comments: Comments, place: tuple[str, ...]) -> str:
+    return "; ".join(comments.get(place, ()))
+
+
+def _remarked(frame: pd.DataFrame, remarks: Sequence[str]) -> pd.DataFrame:
+    """`frame` with what the study file says beside its rows, where it says anything."""
+    return frame.assign(remark=list(remarks)) if any(remarks) else frame
 
 
 def _leaves(content: object, path: tuple[str, ...] = ()) -> Any:  # rows of text, a leaf each
