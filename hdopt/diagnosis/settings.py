@@ -286,7 +286,15 @@ class HeldOutSettings:
         0.2, "1", "choice: share of the turns that a whole diagnosis never sees, as in one of five folds"
     )
     nested_training: int = threshold(6, "input turns", "choice: turns that are left to it at least")
-    flips: int = threshold(499, "1", "theorem: resolves a chance of 1 in 500")
+    flips: int = threshold(99, "1", "theorem: resolves a chance of 1 in 100")
+    enough_reached: int = threshold(
+        3, "1", "choice: flips that reach a score until their share is told; Besag, Clifford 1991 take any number"
+    )
+    fewest_flips: int = threshold(5, "1", "choice: flips from which the spread of the best scores is taken")
+    tail_safety: float = threshold(
+        3.0, "1", "measured: five scores of five times the least spread call a chance of 2 % below 0.2 % in 0.5 %"
+    )
+    least_chance: float = threshold(0.002, "1", "choice: chance of a false alarm below which no smaller one is told")
     locate_flips: int = threshold(199, "1", "theorem: resolves a chance of 1 in 200")
     remainder_orders: int = threshold(3, "1", "choice: orders listed of what is left")
 

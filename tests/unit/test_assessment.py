@@ -75,22 +75,27 @@ def test_floor_and_placebo_of_what_was_not_searched(hidden):
     assert hidden.false_alarm_p <= 0.01
 
 
-def test_the_chance_is_that_of_all_that_was_looked_at(monkeypatch):
-    """Every term of the search stands against the sign flips, each with its own penalty."""
+def test_the_chance_is_that_of_a_whole_search_made_anew(monkeypatch):
+    """Under flipped signs shapes are looked for again, in all of the catalogue, each with its own penalty."""
     asked = []
 
-    def family(probe, terms, penalties, rng, observed, inflation):
-        asked.append((terms, penalties))
+    def chance(probe, score, rng, observed):
+        other = probe.flipped(np.where(probe.rows.block % 2, 1.0, -1.0))
+        asked.append((other, score(other), observed))
         return 0.5
 
-    monkeypatch.setattr(assessment, "family_wise_p", family)
-    last = state(np.zeros_like(THETA))
+    monkeypatch.setattr(assessment, "false_alarm_chance", chance)
+    last = state(np.random.default_rng(2).normal(0, 0.02, len(THETA)))
     assert assess(last).false_alarm_p == 0.5
-    ((terms, penalties),) = asked
-    searched = search_terms(FitProbe(last.base), skip=last.ruled_out)
-    assert [term.effect for term in terms] == [term.effect for term in searched]
-    scale = penalty_scale(last.base.problem, last.inflation)
-    assert penalties == [penalty([term], 0.0, scale) for term in terms]
+    ((other, again, observed),) = asked
+    scale = penalty_scale(last.selection.base.problem, last.inflation)
+
+    def best(probe):
+        found = search_terms(probe, skip=last.ruled_out)
+        return max(probe.gain(t) / 2 / last.inflation - penalty([t], 0.0, scale) for t in found)
+
+    assert again == best(other)
+    assert observed == max(last.selection.best.log_bayes_factor, best(FitProbe(last.selection.base)))
 
 
 def test_noise_is_held_against_the_larger_of_neighbours_and_sensors(hidden):

@@ -1,16 +1,14 @@
-"""Held-out errors, paired t and family-wise chance against what is computed by hand."""
+"""Held-out errors and paired t against what is computed by hand."""
 
 import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
 
-from hdopt.diagnosis.inference.cross_validation import family_wise_p, held_out, paired_t
+from hdopt.diagnosis.inference.cross_validation import held_out, paired_t
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
-from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.settings import DEFAULT
-from hdopt.effects.term import Term
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.rows import gather
@@ -70,34 +68,3 @@ def test_paired_t_is_the_text_books():
     assert paired_t(worse, better) == pytest.approx(stats.ttest_rel(worse, better).statistic, rel=1e-12)
     assert paired_t(worse[:2], better[:2]) == 0.0
     assert paired_t(worse, worse) == 0.0
-
-
-def chance(fit, columns, observed, penalty=0.0, inflation=1.0):
-    terms = [Term("output_coupling", {}, columns=columns)]
-    return family_wise_p(FitProbe(fit), terms, [penalty], np.random.default_rng(0), observed, inflation)
-
-
-def test_scores_of_the_family_are_log_evidence_less_their_penalty():
-    """A penalty of 2 asks as much as 2 more to be reached; noise twice as rough halves every score."""
-    fit = without_base(noisy(30))
-    wave = np.sin(4.3 * fit.problem.rows.theta)[:, None]
-    plain = [chance(fit, wave, observed) for observed in (0.5, 1.0, 2.0)]
-    assert plain == sorted(plain, reverse=True) and plain[0] > 1.5 * plain[2]
-    assert chance(fit, wave, -1.0, penalty=2.0) == plain[1]
-    assert chance(fit, wave, 0.5, inflation=2.0) == plain[1]
-
-
-def test_signs_are_those_of_whole_turns():
-    """What cancels within every turn has no score at all, however its rows are large."""
-    sign = np.tile([1.0, -1.0], 15 * RATE)
-    fit = without_base(rows_of(0.1 * sign * np.random.default_rng(5).choice([1.0, -1.0], 30).repeat(RATE)))
-    column = (sign * np.tile([1.0, 1.0, -1.0, -1.0], len(sign) // 4))[:, None]
-    assert chance(fit, column, 1.0) == 1 / (1 + DEFAULT.held_out.flips)
-
-
-@pytest.mark.parametrize("turns", [4, 7])
-def test_a_few_turns_cannot_show_a_small_chance(turns):
-    """Of b turns there are 2^(b - 1) patterns of signs whose scores differ."""
-    fit = without_base(noisy(turns))
-    assert fit.problem.rows.blocks == turns
-    assert chance(fit, np.sin(2.3 * fit.problem.rows.theta)[:, None], 1e9) == 2.0 ** (1 - turns)

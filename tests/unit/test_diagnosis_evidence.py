@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from hdopt.diagnosis.checks.assessment import best_placebo, placebo_error
-from hdopt.diagnosis.inference.cross_validation import family_wise_p, held_out, turn_folds
+from hdopt.diagnosis.inference.cross_validation import held_out, turn_folds
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.search.penalty import Scale, penalty
 from hdopt.diagnosis.settings import DEFAULT
@@ -93,23 +93,6 @@ def test_the_seed_of_a_diagnosis_reaches_its_draws():
     first, second = (state(np.zeros_like(THETA), seed).draws().random(4) for seed in (1, 2))
     assert not np.array_equal(first, second)
     assert np.array_equal(first, state(np.zeros_like(THETA), 1).draws().random(4))
-
-
-def test_looking_at_many_candidates_is_paid_for(clean):
-    """The chance that the best of many reaches a score is larger than that one does: of thirty unlike candidates it is
-    near 1 - (1 - p)^30."""
-    probe = FitProbe(clean)
-    terms = [wave(clean, order) for order in 3.0 + 0.37 * np.arange(30)]
-
-    def chance(some, observed):
-        return family_wise_p(probe, some, [0.0] * len(some), np.random.default_rng(0), observed, 1.0)
-
-    observed = 4.0  # exp(-4) = 1.8 % for two columns of known noise
-    single = [chance([term], observed) for term in terms]
-    assert np.mean(single) == pytest.approx(np.exp(-observed), abs=0.02)
-    together = chance(terms, observed)
-    assert together == pytest.approx(1 - np.prod(1 - np.array(single)), abs=0.12)
-    assert together > 5 * np.mean(single)
 
 
 def test_significance_is_strict():

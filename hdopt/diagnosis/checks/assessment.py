@@ -9,12 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdopt.arrays import Array, Index
+from hdopt.diagnosis.checks.false_alarm import best_score, false_alarm_chance
 from hdopt.diagnosis.checks.scale import Scale, fitted_scale
 from hdopt.diagnosis.checks.slow_wander import SlowWave, slow_wave
 from hdopt.diagnosis.checks.step_detection import Steps, sudden_steps
 from hdopt.diagnosis.inference.catalogue import STRAIN_WAVE_ONLY
 from hdopt.diagnosis.inference.conditions import AcrossConditions, across_conditions
-from hdopt.diagnosis.inference.cross_validation import HeldOut, family_wise_p, held_out, paired_t, turn_folds
+from hdopt.diagnosis.inference.cross_validation import HeldOut, held_out, paired_t, turn_folds
 from hdopt.diagnosis.inference.fit import Fit, term_columns
 from hdopt.diagnosis.inference.generic_basis import useful_columns
 from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut
@@ -95,14 +96,12 @@ def assess(state: State) -> Evidence:
     strange = STRAIN_WAVE_ONLY if base.problem.base is None else ()
     pool = search_terms(probe, skip=state.ruled_out)
     scale = penalty_scale(base.problem, inflation)
-    penalties = [penalty([term], 0.0, scale) for term in pool]
-    observed = max(
-        [
-            *(probe.gain(t) / 2 / inflation - paid for t, paid in zip(pool, penalties, strict=True)),
-            selection.best.log_bayes_factor if best is not base else -np.inf,
-        ],
-        default=-np.inf,
-    )
+    found = -np.inf if best is base else selection.best.log_bayes_factor
+    observed = max(best_score(probe, pool, scale), found)
+
+    def searched_anew(flipped: FitProbe) -> float:
+        return best_score(flipped, search_terms(flipped, skip=state.ruled_out), scale)
+
     placebo = best_placebo(probe, pool, best)
     return Evidence(
         rows=state.problem.rows,
@@ -117,7 +116,7 @@ def assess(state: State) -> Evidence:
         across_conditions=across_conditions(base, best),
         remainder=remainder,
         noise_floor=float(np.sqrt(min(remainder.held_out.variance, best_out.variance))),
-        false_alarm_p=family_wise_p(probe, pool, penalties, rng, observed, inflation) if pool else 1.0,
+        false_alarm_p=false_alarm_chance(probe, searched_anew, rng, observed),
         inflation=inflation,
         lacking=lacking_effects(state, strange),
         below_detection=detection_limits(FitProbe(best), pool, scale),

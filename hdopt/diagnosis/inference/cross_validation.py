@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hdopt.arrays import Array, Index
 from hdopt.diagnosis.inference.fit import Fit
-from hdopt.diagnosis.inference.residual_gains import FitProbe
-from hdopt.diagnosis.numerical import SMALL_RIDGE, TINY
+from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.settings import DEFAULT, HeldOutSettings
-from hdopt.effects.term import Term
 
 
 @dataclass(frozen=True)
@@ -89,36 +86,3 @@ def paired_t(worse: Array, better: Array, settings: HeldOutSettings = DEFAULT.he
         return 0.0
     spread = difference.std(ddof=1) / np.sqrt(len(difference))
     return float(difference.mean() / spread) if spread > 0 else 0.0
-
-
-def family_wise_p(
-    probe: FitProbe,
-    terms: Sequence[Term],
-    penalties: Sequence[float],
-    rng: np.random.Generator,
-    observed: float,
-    inflation: float,
-) -> float:
-    """Share of random sign flips of whole turns whose best score over ALL `terms`, less their `penalties`, reaches
-    `observed` (log evidence), where the noise is rougher by `inflation`.
-
-    Under no effect the turns' scores are as likely with one sign as with the other, whatever the noise's colour
-    within a turn; the maximum over the whole catalogue pays for having looked at all of it (Westfall, Young
-    1993). A few turns have few sign patterns: of b turns no chance below 1 in 2^(b - 1) can be shown. `probe`
-    looks at the base alone. `rng` draws what is random.
-    """
-    block = probe.rows.block
-    blocks, flips = int(block[-1]) + 1, probe.fit.problem.settings.held_out.flips
-    signs = rng.choice([-1.0, 1.0], size=(flips, blocks))
-    best = np.full(flips, -np.inf)
-    sigma2 = probe.noise.sigma**2
-    for term, penalty in zip(terms, penalties, strict=True):
-        columns = probe.columns(term)
-        scores = np.zeros((blocks, columns.shape[1]))
-        np.add.at(scores, block, columns * probe.white_residual[:, None])
-        gram = columns.T @ columns
-        gram += SMALL_RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram))
-        flipped = signs @ scores
-        gain = np.einsum("ri,ri->r", flipped, np.linalg.solve(gram, flipped.T).T) / sigma2
-        best = np.maximum(best, gain / 2 / inflation - penalty)
-    return max(float((1 + np.sum(best >= observed)) / (1 + flips)), 2.0 ** (1 - blocks))

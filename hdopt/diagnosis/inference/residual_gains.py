@@ -4,6 +4,7 @@ spectrum.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -46,6 +47,17 @@ class FitProbe:
         rank = int(np.sum(size > RANK * size[0]))
         self.basis = np.asfortranarray(basis[: len(white), :rank])
         self.white_residual = self.project(self.noise.whiten(self.residual))
+
+    def flipped(self, signs: Array) -> FitProbe:
+        """The same with what is left times `signs` (n,), one of each row: noise that is as likely as what was seen,
+        where the rows of a turn share one.
+        """
+        other = copy.copy(self)
+        for name in ("_by_input", "_by_output"):
+            other.__dict__.pop(name, None)
+        other.residual = signs * self.residual
+        other.white_residual = self.project(signs * self.white_residual)
+        return other
 
     @property
     def has_base(self) -> bool:
