@@ -10,13 +10,15 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
+from typeset import setup_math  # noqa: E402
 from write_pages import write_pages  # noqa: E402
 
 project = "hdopt"
 author = "The hdopt developers"
 version = release = installed("hdopt")
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_gallery.gen_gallery"]
-myst_enable_extensions = ["deflist"]
+myst_enable_extensions = ["deflist", "dollarmath"]
+html_math_renderer = "mathtext"
 myst_heading_anchors = 4
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["gallery/*", "_build"]
@@ -54,6 +56,18 @@ def as_text(app, what, name, obj, options, lines):
         )
 
 
+FUNCTION = re.compile(r"^`(hdopt(?:\.\w+)+)` · `(tests/[\w/.]+)`$", re.M)
+"""Under an equation on the page on theory."""
+
+
+def linked(app, docname, source):
+    """Functions and tests under the equations as links, which they are not where the page is read as a file."""
+    if docname == "theory":
+        source[0] = FUNCTION.sub(r"{py:obj}`\1` · {download}`\2 <../\2>`", source[0])
+
+
 def setup(app):
     write_pages(HERE / "generated")
+    setup_math(app)
+    app.connect("source-read", linked)
     app.connect("autodoc-process-docstring", as_text)

@@ -18,6 +18,7 @@ ROOMS = {
         "hdopt.kinematics.extremes",
         "hdopt.kinematics.peak_to_peak",
         "hdopt.kinematics.gradients",
+        "hdopt.kinematics.load_sharing",
     ),
     "Mechanics": (
         "hdopt.mechanics.contact",
@@ -34,6 +35,7 @@ ROOMS = {
         "hdopt.tolerance.worst_case",
         "hdopt.tolerance.sensitivity",
         "hdopt.tolerance.contributors",
+        "hdopt.tolerance.capability",
     ),
     "Allocation": ("hdopt.allocation.cost", "hdopt.allocation.grades", "hdopt.allocation.results"),
     "Simulation": ("hdopt.simulation.model", "hdopt.simulation.operation", "hdopt.simulation.effect_values"),

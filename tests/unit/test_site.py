@@ -36,6 +36,10 @@ def test_the_site_builds_without_a_warning(tmp_path):
     for page in ("index", "tutorial", "generated/study-file", "generated/api", "examples/index", "verification"):
         assert (tmp_path / "site" / f"{page}.html").exists()
     assert broken_links(tmp_path / "site") == []
+    theory = (tmp_path / "site" / "theory.html").read_text(encoding="utf-8")
+    assert [name for name, _ in equations() if f'href="generated/api.html#{name}"' not in theory
+            and f'href="generated/api.html#module-{name}"' not in theory] == []  # fmt: skip
+    assert theory.count('<svg class="math"') >= len(equations())
 
 
 def broken_links(site: Path) -> list[str]:
@@ -88,17 +92,22 @@ def test_every_command_has_its_paragraph(command):
     assert f"\n## hdopt {command}\n" in text
 
 
+FUNCTION_AND_TEST = re.compile(r"`(hdopt\.[\w.]+)` · `(tests/[\w/.]+)`")
+
+
 def equations() -> list[tuple[str, str]]:
     """(function, test) of every equation on the page on theory."""
     text = (DOCS / "theory.md").read_text(encoding="utf-8")
-    return re.findall(r"\| `(hdopt\.[\w.]+)` \| `(tests/[\w/.]+)` \|", text)
+    return re.findall(r"^`(hdopt\.[\w.]+)` · `(tests/[\w/.]+)`$", text, re.M)
 
 
 def test_every_equation_has_its_function_and_its_test():
     """Would catch a function that was renamed and a test file that moved."""
     found = equations()
-    rows = (DOCS / "theory.md").read_text(encoding="utf-8").count("\n| ") - 1
-    assert len(found) == rows >= 20
+    text = (DOCS / "theory.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"\$\$(.+?)\$\$((?:\n\n\$\$.+?\$\$)*)\n\n(.*)", text)
+    assert len(blocks) == len(found) >= 28
+    assert all(FUNCTION_AND_TEST.fullmatch(line) for *_, line in blocks), "an equation without its function and test"
     for function, test in found:
         assert (ROOT / test).exists(), test
         module, _, name = function.rpartition(".")
