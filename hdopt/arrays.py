@@ -18,3 +18,6 @@ Index: TypeAlias = NDArray[np.int64]
 
 Mask: TypeAlias = NDArray[np.bool_]
 """True or false for each element, such as which rows count."""
+
+Bits: TypeAlias = NDArray[np.uint32]
+"""Numbers whose binary digits count, such as those of Sobol' points."""

@@ -90,7 +90,7 @@ class Truncated:
         return max(self.lower, self.natural[0]), min(self.upper, self.natural[1])
 
     @cached_property
-    def _tails(self) -> tuple[float, float]:
+    def tails(self) -> tuple[float, float]:
         """P(X > lower) and P(X > upper) before truncation."""
         lower, upper = self.support
         above_lower = 1.0 if lower <= self.natural[0] else float(self._tail(lower))
@@ -99,10 +99,10 @@ class Truncated:
 
     @cached_property
     def _mass(self) -> float:
-        return self._tails[0] - self._tails[1]
+        return self.tails[0] - self.tails[1]
 
     def quantile(self, u: ArrayLike) -> Array:
-        above_lower, above_upper = self._tails
+        above_lower, above_upper = self.tails
         tail = above_lower - np.asarray(u, float) * (above_lower - above_upper)
         lower, upper = self.support
         return np.clip(self._inverse_tail(tail), lower, upper)

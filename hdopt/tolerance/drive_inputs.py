@@ -54,15 +54,15 @@ class Direct:
 
     def fill(self, inputs: Array, errors: dict[str, Array]) -> None:
         values = inputs[:, self.column]
-        errors[self.error] = values if self._is_length else values * (math.pi / 180)
+        errors[self.error] = values if self.per_unit == 1 else values * self.per_unit
 
     def widest(self, largest: Array, errors: dict[str, float]) -> None:
-        value = float(largest[self.column])
-        errors[self.error] = value if self._is_length else value * (math.pi / 180)
+        errors[self.error] = float(largest[self.column]) * self.per_unit
 
     @property
-    def _is_length(self) -> bool:
-        return study_key(self.error).endswith("_mm")
+    def per_unit(self) -> float:
+        """The error, mm or rad, for one unit of the column, mm or deg."""
+        return 1.0 if study_key(self.error).endswith("_mm") else math.pi / 180
 
 
 @dataclass(frozen=True)

@@ -155,17 +155,20 @@ class CountInBins:
         self._above: list[Array] = []
 
     def add(self, values: Array) -> None:
-        index = np.floor((values - self._bins.low) / self._bins.width)
-        below, above = index < 0, index >= self._bins.count
-        self._below.append(values[below])
-        self._above.append(values[above])
-        inside = index[~(below | above)].astype(np.int64)
-        self._counts += np.bincount(inside, minlength=self._bins.count)
+        from hdopt.tolerance.count_kernel import count_in_bins
+
+        low, width = self._bins.low, self._bins.width
+        if count_in_bins(values, low, width, self._counts) < len(values):
+            index = np.floor((values - low) / width)
+            self._below.append(values[index < 0])
+            self._above.append(values[index >= self._bins.count])
 
     def finish(self) -> BinnedValues:
-        return BinnedValues(
-            self._bins, self._counts, np.sort(np.concatenate(self._below)), np.sort(np.concatenate(self._above))
-        )
+        return BinnedValues(self._bins, self._counts, _sorted(self._below), _sorted(self._above))
+
+
+def _sorted(blocks: Sequence[Array]) -> Array:
+    return np.sort(np.concatenate([np.empty(0), *blocks]))
 
 
 def merge(parts: Iterable[Empirical]) -> Empirical:

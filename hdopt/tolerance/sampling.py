@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from hdopt.arrays import Array
+from hdopt.arrays import Array, Bits
 from hdopt.errors import HdoptError
+
+if TYPE_CHECKING:
+    from scipy.stats import qmc
 
 BLOCK = 2**16
 """Points made at a time: 12 inputs of them fit in 6 MB, so that the sample's size does not bound memory."""
@@ -51,6 +54,13 @@ def replicate_sizes(n: int, replicates: int) -> list[int]:
     return [n // replicates + (index < n % replicates) for index in range(replicates)]
 
 
+class Scrambling(NamedTuple):
+    """One scrambling of Sobol' points: its digital `shift` (d,) and direction `numbers` (d, SOBOL_BITS)."""
+
+    shift: Bits
+    numbers: Bits
+
+
 @dataclass(frozen=True)
 class ScrambledSobol:
     """Independent scramblings of Sobol' points (scipy.stats.qmc: linear matrix scramble and digital shift).
@@ -63,7 +73,16 @@ class ScrambledSobol:
     name: str = "scrambled Sobol' points"
     independent_points = False
 
-    def blocks(self, seed: int, replicate: int, n: int, dimension: int, start: int = 0) -> Iterator[Array]:
+    def scrambling(self, seed: int, replicate: int, n: int, dimension: int) -> Scrambling:
+        """What makes the first `n` points of `blocks` in `dimension` inputs, for `replicate` under `seed`.
+
+        scipy has no public way to it; a test holds the points made of it to those of `blocks`. Raises `HdoptError`
+        where there are fewer points than `n`.
+        """
+        engine = self._engine(seed, replicate, n, dimension)
+        return Scrambling(engine._shift, engine._sv)  # type: ignore[attr-defined]  # not public
+
+    def _engine(self, seed: int, replicate: int, n: int, dimension: int) -> qmc.Sobol:
         from scipy.stats import qmc
 
         if n > 2**SOBOL_BITS:
@@ -71,8 +90,10 @@ class ScrambledSobol:
                 f"{n} points a scrambling are asked for; Sobol' points of {SOBOL_BITS} bits end at {2**SOBOL_BITS}; "
                 "use more scramblings or plain Monte Carlo"
             )
-        rng = replicate_generator(seed, replicate)
-        engine = qmc.Sobol(dimension, scramble=True, bits=SOBOL_BITS, rng=rng)
+        return qmc.Sobol(dimension, scramble=True, bits=SOBOL_BITS, rng=replicate_generator(seed, replicate))
+
+    def blocks(self, seed: int, replicate: int, n: int, dimension: int, start: int = 0) -> Iterator[Array]:
+        engine = self._engine(seed, replicate, n, dimension)
         half_step = 0.5**SOBOL_BITS / 2  # the points lie on a grid that holds 0: move them to the middle of its cells
         if start:
             engine.fast_forward(start)

@@ -6,7 +6,7 @@ block, so memory does not grow with the sample. Every figure carries the interva
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
@@ -18,6 +18,7 @@ from hdopt.errors import HdoptError
 from hdopt.parallel.engine import Engine, engine_from
 from hdopt.tolerance import capability
 from hdopt.tolerance.empirical import Bins, Collector, CountInBins, Empirical, KeepAll, merge
+from hdopt.tolerance.fused import FusedPass, fused_pass
 from hdopt.tolerance.intervals import (
     IntervalEstimate,
     clopper_pearson,
@@ -61,6 +62,16 @@ class ReplicateTask:
     bins: Bins | None
     start: int = 0
     """The first point of this task; `n` is the point after its last. A long replicate is several."""
+    fused: FusedPass | None = None
+    """The compiled pass that makes the values; None on the general path."""
+
+    def general(self, u: Array, start: int) -> Array:
+        """The responses at the points `u` (k, d) of the unit cube, of which the first is point `start`, shape (k,).
+
+        Raises `HdoptError` where one is not finite.
+        """
+        where = f"replicate {self.replicate} of seed {self.seed}, counted from {start}"
+        return evaluate(self.response, self.space.sample(u), self.space.names, where)
 
 
 @dataclass(frozen=True)
@@ -81,13 +92,7 @@ def run_replicate(task: ReplicateTask) -> Replicate:
     """
     collector: Collector = KeepAll() if task.bins is None else CountInBins(task.bins)
     count, mean, squares, above = 0, 0.0, 0.0, 0
-    for u in task.sampling.blocks(task.seed, task.replicate, task.n, task.space.dimension, task.start):
-        values = evaluate(
-            task.response,
-            task.space.sample(u),
-            task.space.names,
-            f"replicate {task.replicate} of seed {task.seed}, counted from {task.start + count}",
-        )
+    for values in _values(task):
         collector.add(values)
         above += int(np.count_nonzero(values > task.limit))
         block_mean = float(values.mean())
@@ -97,6 +102,30 @@ def run_replicate(task: ReplicateTask) -> Replicate:
         mean += shift * len(values) / total
         count = total
     return Replicate(count, mean, squares / count, above, collector.finish())
+
+
+def _values(task: ReplicateTask) -> Iterator[Array]:
+    """The responses of a task, block by block."""
+    if task.fused is not None and isinstance(task.sampling, ScrambledSobol):
+        yield from _values_of_sobol(task, task.sampling, task.fused)
+        return
+    start = task.start
+    for u in task.sampling.blocks(task.seed, task.replicate, task.n, task.space.dimension, start):
+        values = None if task.fused is None else task.fused.of_points(u)
+        yield task.general(u, start) if values is None else values
+        start += len(u)
+
+
+def _values_of_sobol(task: ReplicateTask, sampling: ScrambledSobol, fused: FusedPass) -> Iterator[Array]:
+    """The same where the compiled pass makes the points too."""
+    dimension = task.space.dimension
+    scrambling = sampling.scrambling(task.seed, task.replicate, task.n, dimension)
+    for start in range(task.start, task.n, BLOCK):
+        stop = min(start + BLOCK, task.n)
+        values = fused.of_sobol(scrambling, start, stop)
+        if values is None:
+            values = task.general(next(sampling.blocks(task.seed, task.replicate, stop, dimension, start)), start)
+        yield values
 
 
 def _replicates(tasks: Sequence[ReplicateTask], engine: Engine) -> list[Replicate]:
@@ -129,12 +158,15 @@ def _together(one: Replicate, two: Replicate) -> Replicate:
 class Stack:
     """The distribution of a response under its tolerances. `unit` names the response's unit ('arcmin', 'mm', ...).
 
+    `path` is 'fused' where one compiled pass made every drive from its point, 'general' where inputs and responses
+    were made one after the other; figures agree to the rounding of single precision.
     `quantiles` by probability; `ppk` is None where the sample is too small for X99.865, and `notes` says so.
     `linearisation` with `rss`, its value at the quantile of the required yield.
     """
 
     n: int
     sampling: str
+    path: str
     seed: int
     unit: str
     limit: float
@@ -164,6 +196,7 @@ class Stack:
         return {
             "n": self.n,
             "sampling": self.sampling,
+            "path": self.path,
             "seed": self.seed,
             f"limit_{unit}": self.limit,
             "required_yield": self.required_yield,
@@ -220,7 +253,8 @@ class StackRequest:
     """What is asked of a stack.
 
     `limit` is the upper limit in `unit`, `required_yield` the share that must keep it, `n` the samples in all, drawn by
-    `sampling` with `seed`; `quantiles` are reported beside the usual ones; `engine` computes the replicates.
+    `sampling` with `seed`; `quantiles` are reported beside the usual ones; `engine` computes the replicates. `fused`:
+    one compiled pass makes the drives where it can.
     """
 
     limit: float
@@ -231,6 +265,7 @@ class StackRequest:
     engine: Engine | str | None = None
     quantiles: Sequence[float] = ()
     unit: str = "arcmin"
+    fused: bool = True
 
 
 def run_stack(response: Response, space: InputSpace, request: StackRequest) -> Stack:
@@ -245,9 +280,10 @@ def run_stack(response: Response, space: InputSpace, request: StackRequest) -> S
     asked = [q for q in sorted({required, *request.quantiles, *REPORTED_QUANTILES}) if n >= smallest_n(q)]
     sizes = replicate_sizes(n, sampling.replicates)
     bins = None if n <= KEPT_VALUES else Bins.around(_pilot(response, space, sampling, seed, sizes[0]))
+    fused = fused_pass(response, space) if request.fused else None
     parts = _replicates(
         [
-            ReplicateTask(response, space, sampling, seed, replicate, size, request.limit, bins)
+            ReplicateTask(response, space, sampling, seed, replicate, size, request.limit, bins, fused=fused)
             for replicate, size in enumerate(sizes)
         ],
         engine_from(request.engine),
@@ -260,6 +296,7 @@ def run_stack(response: Response, space: InputSpace, request: StackRequest) -> S
     return Stack(
         n=n,
         sampling=f"{sampling.replicates} x {sampling.name}" if not sampling.independent_points else sampling.name,
+        path="general" if fused is None else "fused",
         seed=seed,
         unit=request.unit,
         limit=request.limit,
