@@ -48,15 +48,9 @@ def search_designs(
     interrupted = False
     evaluations = 0
     try:
-        engine = for_large_items(engine_from(None))
-        try:
-            for solution in engine.map(partial(_solved, method), _problems(setup, progress)):
-                evaluations += solution.evaluations
-                solved.append(solution)
-        except Interrupted as cut:
-            evaluations += cut.solution.evaluations
-            solved.append(cut.solution)
-            raise KeyboardInterrupt from cut
+        for solution in _each_solved(setup, method, progress):
+            evaluations += solution.evaluations
+            solved.append(solution)
         if fronts and setup.settings.second_objective:
             for objective in front_objectives(setup):
                 found, spent = trace_front(setup, method, objective, solved, progress)
@@ -89,6 +83,15 @@ def search_designs(
         solutions=tuple(solved),
         notes=notes,
     )
+
+
+def _each_solved(setup: Setup, method: Method, progress: Progress) -> Iterator[Solution]:
+    """The solution of each combination, the interrupted one too before the interrupt goes on."""
+    try:
+        yield from for_large_items(engine_from(None)).map(partial(_solved, method), _problems(setup, progress))
+    except Interrupted as cut:
+        yield cut.solution
+        raise KeyboardInterrupt from cut
 
 
 def _problems(setup: Setup, progress: Progress) -> Iterator[DesignProblem]:
