@@ -1,4 +1,4 @@
-"""The JSON that `hdopt allocate` wrote, read back for the drawing."""
+"""The JSON that `hdopt allocate` wrote, read back."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ WANTED = "the file that `hdopt allocate --json FILE` wrote"
 
 
 def read_allocation(path: Path, study: Study) -> dict[str, float]:
-    """Tolerances by error (mm or deg) or contributor, as the file `path` gives them.
+    """Tolerances by error (mm or deg), contributor or dimension, as the file `path` gives them.
 
     Raises `HdoptError` for a file of another kind or another study, a name that `study` neither tolerances nor calls
-    out, and a tolerance that is not a finite number above 0.
+    out nor has as a dimension of a linear stack, and a tolerance that is not a finite number above 0.
     """
     result = read_json(path, WANTED)
     errors = result.get("errors") if isinstance(result, dict) else None
@@ -30,7 +30,7 @@ def read_allocation(path: Path, study: Study) -> dict[str, float]:
             f"{path}: is of the study {shown(str(result['study']))}, not of {study.name!r}; give the allocation of "
             "this study"
         )
-    known = {name for section in ("tolerances", "contributors") for name in study.data.get(section, {})}
+    known = _tolerances_of(study)
     found = {}
     for name, row in errors.items():
         value = row.get("tolerance") if isinstance(row, dict) else None
@@ -41,3 +41,13 @@ def read_allocation(path: Path, study: Study) -> dict[str, float]:
             raise HdoptError(f"{path}: the tolerance of {name} is {said}; it must be a finite number above 0")
         found[name] = float(value)
     return found
+
+
+def _tolerances_of(study: Study) -> set[str]:
+    """Names that `study` gives a tolerance each; what else stands in those sections (correlations) is a list."""
+    sections = (
+        study.data.get("tolerances", {}),
+        study.data.get("contributors", {}),
+        study.data.get("linear_stack", {}).get("dimensions", {}),
+    )
+    return {name for section in sections for name, row in section.items() if isinstance(row, dict)}

@@ -145,6 +145,31 @@ def test_allocations(name, tmp_path, capsys):
     assert not (tmp_path / "a.dxf").exists()
 
 
+def test_costs_that_a_solver_gives_up_on(capsys):
+    """A dimension a thousand million times as sensitive as the others: Clarabel ends with cvxpy's `SolverError`."""
+    stack = ("allocate", "chase-shaft-housing", "--no-compare", "--rule", "rss")
+    sensitive = ("--set", "linear_stack.dimensions.shaft.sensitivity=1e9")
+    ends_with_two(capsys, [*stack, *sensitive], "the solver CLARABEL gave up on these costs and tolerances; see")
+
+
+GRADES = (
+    "linear_stack.dimensions.shaft.cost={model='table', grades=[{grade='a', tolerance=0.004, cost=2.0}, "
+    "{grade='b', tolerance=0.009, cost=1.0}]}"
+)
+
+
+@pytest.mark.parametrize(("setting", "solver"), [("required_yield=0.99", "CLARABEL"), (GRADES, "HIGHS")])
+def test_a_solver_that_gives_up_is_one_message(setting, solver, capsys, monkeypatch):
+    import cvxpy
+
+    def gives_up(problem, solver, **options):
+        raise cvxpy.error.SolverError(f"Solver {solver!r} failed. Try another solver.\n" * 50)
+
+    monkeypatch.setattr(cvxpy.Problem, "solve", gives_up)
+    asked = ["allocate", "chase-shaft-housing", "--no-compare", "--set", setting]
+    ends_with_two(capsys, asked, f"the solver {solver} gave up")
+
+
 def test_messages_are_short_whatever_comes_in():
     assert in_brief("a\nb\nc\nd\ne") == "a\nb\nand 3 more faults of this kind"
     assert len(in_brief("x" * 10_000)) <= 600

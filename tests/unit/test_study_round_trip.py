@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hdopt.allocation.results import AllocatedError, AllocateResult
+from hdopt.errors import HdoptError
+from hdopt.files import to_json, write_text
 from hdopt.study import load_study, shipped_studies
 from hdopt.study.write import study_toml, with_moved_paths
+from hdopt.tolerance.intervals import IntervalEstimate
+from hdopt.workflow.allocation_file import read_allocation
 
 TEXT = st.text(st.characters(exclude_categories=("Cs",)), max_size=40)
 NUMBER = st.one_of(
@@ -139,3 +145,78 @@ def test_no_comment_of_a_shipped_study_is_lost(name):
     own = study.document.texts[-1]
     bare = [line.partition("#")[2].strip() for line in own.splitlines() if "#" in line]
     assert [comment for comment in bare if comment not in text] == []
+
+
+def toleranced(study):
+    """Names that have a tolerance, read off the shipped file itself."""
+    data = study.data
+    rows = {
+        **data.get("tolerances", {}),
+        **data.get("contributors", {}),
+        **data.get("linear_stack", {}).get("dimensions", {}),
+    }
+    return sorted(name for name in rows if name != "correlation")
+
+
+TOLERANCED = {name: names for name in shipped_studies() if (names := toleranced(load_study(name)))}
+POSITIVE = st.floats(0, exclude_min=True, allow_infinity=False, allow_nan=False)
+MAYBE = st.one_of(POSITIVE, st.just(float("nan")), st.none())
+
+
+def allocated(study, tolerances, cost, grade):
+    """What `hdopt allocate` would have found, with costs that are no numbers where a grade is too fine."""
+    found = IntervalEstimate(0.999, 0.998, 1.0)
+    return AllocateResult(
+        study=study,
+        rule="rss",
+        unit="arcmin",
+        limit=1.0,
+        required_yield=0.9973,
+        status="verified",
+        errors={
+            name: AllocatedError(value, value, cost or 0.0, float("nan"), "mm", grade)
+            for name, value in tolerances.items()
+        },
+        total_cost=1.0,
+        present_cost=float("nan"),
+        optimality_gap=None,
+        optimality_gap_reason=grade,
+        marginal_cost=cost,
+        marginal_cost_reason="",
+        slack=None,
+        verified_yield=found,
+        verify_n=1,
+        verify_seed=1,
+    )
+
+
+def test_all_studies_with_tolerances_are_asked():
+    assert {"csf-25-80", "csf-25-80-tolerances", "chase-shaft-housing", "paper-reproduction"} <= set(TOLERANCED)
+
+
+@pytest.mark.parametrize("name", TOLERANCED)
+def test_an_allocation_of_any_study_comes_back(name, tmp_path_factory):
+    """Would catch tolerances rounded on the way, and names that the writer knows and the reader refuses."""
+    study, path = load_study(name), tmp_path_factory.mktemp("allocation") / "a.json"
+    some = st.dictionaries(st.sampled_from(TOLERANCED[name]), POSITIVE, min_size=1)
+
+    @settings(max_examples=20, deadline=None, derandomize=True)
+    @given(some, TEXT, MAYBE, TEXT)
+    def check(tolerances, title, cost, grade):
+        called = replace(study, name=title)
+        write_text(path, to_json(allocated(title, tolerances, cost, grade).to_dict()))
+        assert read_allocation(path, called) == tolerances
+        with pytest.raises(HdoptError, match="is of the study"):
+            read_allocation(path, replace(study, name=title + "'"))
+
+    check()
+
+
+def test_what_is_no_tolerance_of_a_study_is_refused(tmp_path):
+    """Would catch an allocation that tolerances the study's correlations."""
+    study = load_study("csf-25-80")
+    rows = {**study.data["tolerances"], "correlation": [{"errors": ["axis_tilt_y_deg", "axis_tilt_x_deg"]}]}
+    correlated = replace(study, data={**study.data, "tolerances": rows})
+    write_text(tmp_path / "a.json", to_json(allocated(study.name, {"correlation": 0.01}, 1.0, "").to_dict()))
+    with pytest.raises(HdoptError, match="unknown tolerance 'correlation'"):
+        read_allocation(tmp_path / "a.json", correlated)
