@@ -112,7 +112,14 @@ def outline_of_bore(bore: Bore) -> Array:
         half, reach = bore.key.width / 2, bore.bottom
         angle = math.asin(half / bore.radius)
         round_part = _arc(bore.radius, math.pi / 2 + angle, 5 * math.pi / 2 - angle)
-        return _turned(np.vstack([round_part, [(half, reach, 0.0), (-half, reach, 0.0)]]), bore.direction)
+        r, quarter = bore.key.corner, math.tan(math.pi / 8)
+        bottom = [
+            (half, reach - r, quarter),
+            (half - r, reach, 0.0),
+            (r - half, reach, quarter),
+            (-half, reach - r, 0.0),
+        ]
+        return _turned(np.vstack([round_part, bottom]), bore.direction)
     if isinstance(bore, DBore):
         angle = math.acos(bore.flat / bore.radius)
         return _turned(_arc(bore.radius, math.pi / 2 + angle, 5 * math.pi / 2 - angle), bore.direction)
@@ -124,6 +131,15 @@ def outline_of_slot(slot: Slot) -> Array:
     end = np.array([0.0, slot.half_length, 0.0])
     ends = _arc(slot.width / 2, 0.0, math.pi) + end, _arc(slot.width / 2, math.pi, 2 * math.pi) - end
     return _turned(np.vstack(ends), slot.direction)
+
+
+def outline_of_strip(width: float, radius: float, direction: float) -> Array:
+    """The part of a disc of `radius` mm in a strip of `width` mm along `direction`, counter-clockwise; the direction in
+    rad, clockwise from the major axis."""
+    angle = math.asin(min(1.0, width / 2 / radius))
+    top = _arc(radius, math.pi / 2 - angle, math.pi / 2 + angle)
+    bottom = _arc(radius, 3 * math.pi / 2 - angle, 3 * math.pi / 2 + angle)
+    return _turned(np.vstack([top, bottom]), direction)
 
 
 def _turned(outline: Array, direction: float) -> Array:

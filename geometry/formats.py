@@ -64,7 +64,7 @@ class Step:
 
 
 class Dxf:
-    description = "DXF of the profile for wire cutting, with bore and tolerance zone"
+    description = "DXF of all parts for wire cutting: through and blind outlines, tolerance zone"
     suffixes = (".dxf",)
     needs_solids = False
 

@@ -19,7 +19,7 @@ R = TypeVar("R")
 
 FILES = {
     "step": "STEP assembly (AP214, or --set export.step_schema=AP242).",
-    "dxf": "DXF of the profile for wire cutting, with bore and tolerance zone.",
+    "dxf": "DXF of all parts for wire cutting: through and blind outlines, tolerance zone.",
     "stl": "STL mesh of all parts in their places.",
     "3mf": "3MF mesh with named, coloured parts.",
     "svg": "Drawing: front view with dimensions, section, key dimensions.",

@@ -138,9 +138,9 @@ def test_fault_in_a_dxf_file(old, new, message, monkeypatch, tmp_path):
 
 
 def test_coarse_arcs_fail_the_check_of_a_dxf(monkeypatch, tmp_path):
-    from hdopt.geometry import arcs, dxf
+    from hdopt.geometry import arcs, cut_outlines, dxf
 
-    coarse = dxf.outline_of
+    coarse = cut_outlines.outline_of
 
     def write_with_coarse_arcs(path, job):
         with monkeypatch.context() as patched:
@@ -151,7 +151,7 @@ def test_coarse_arcs_fail_the_check_of_a_dxf(monkeypatch, tmp_path):
     monkeypatch.setattr(dxf, "write_dxf", write_with_coarse_arcs)
     with pytest.raises(CheckFailed, match="um off the analytic curve"):
         export_drive(drive(), {"dxf": tmp_path / "wave.dxf"})
-    assert coarse is dxf.outline_of and _biarcs is arcs._biarcs
+    assert coarse is cut_outlines.outline_of and _biarcs is arcs._biarcs
 
 
 def test_hole_in_a_mesh(monkeypatch, tmp_path):

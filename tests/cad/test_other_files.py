@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import zipfile
 
 import ezdxf
@@ -19,9 +20,12 @@ from hdopt.geometry.contour import Circle, ParallelCurve
 from hdopt.geometry.din6885 import key_for_bore
 from hdopt.geometry.export import export_drive
 from hdopt.geometry.features import DBore, KeywayBore, Slot
+from hdopt.geometry.job import make_job
 from hdopt.geometry.options import ExportOptions
 
 pytestmark = pytest.mark.slow
+
+LAYERS = ("PROFILE", "OUTLINE", "BORE", "HOLES", "BLIND_SLOT", "BLIND_BLOCK", "BLIND_STEP", "SLOT")
 
 
 @pytest.mark.parametrize("profile", ["ellipse", "resal", "two_disk", "measured"])
@@ -43,6 +47,39 @@ def test_dxf_has_closed_outlines_on_layers_in_mm(profile, tmp_path):
     ring = carrier.contour.perimeter * 0.01
     assert area["TOLERANCE_OUTER"] - area["PROFILE"] == pytest.approx(ring, rel=2e-3)
     assert area["PROFILE"] - area["TOLERANCE_INNER"] == pytest.approx(ring, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("profile", "structure"), [("ellipse", s) for s in Structure] + [("two_disk", Structure.AUTOMATIC)]
+)
+def test_dxf_holds_every_part_and_marks_what_is_blind(profile, structure, tmp_path):
+    """A blind outline on a cutting layer, or a part that is left out or lies on another, is what a shop would cut."""
+    target = tmp_path / "wave.dxf"
+    job = make_job(drive(profile, structure), ExportOptions(), "x")
+    export_drive(drive(profile, structure), {"dxf": target})
+    document = ezdxf.readfile(target)
+    lines = list(document.modelspace().query("LWPOLYLINE"))
+    texts = [entity.dxf.text for entity in document.modelspace().query("TEXT")]
+    outside = {}
+    for part in job.model.parts:
+        end = "" if part.name == "cam" else f"_{part.name.upper()}"
+        own = {line.dxf.layer: line for line in lines if line.dxf.layer in {f"{w}{end}" for w in LAYERS}}
+        cut = own.get(f"PROFILE{end}") or own[f"OUTLINE{end}"]
+        x = np.array(cut.get_points("xy"))[:, 0]
+        outside[part.name] = (x.min(), x.max())
+        assert (f"BLIND_SLOT{end}" in own) == (part.slot is not None)
+        assert (f"BLIND_BLOCK{end}" in own) == (part.name in ("input_disc", "floating_disc"))
+        assert (f"BLIND_STEP{end}" in own) == (part.name in ("hub", "eccentric_hub"))
+        assert (f"BORE{end}" in own) and not any(layer.startswith("SLOT") for layer in own)
+        if part.slot is not None:
+            assert enclosed_area(np.array(own[f"BLIND_SLOT{end}"].get_points("xyb"))) == pytest.approx(part.slot.area)
+            note = f"BLIND_SLOT{end}: {part.slot.depth:g} deep from the back"
+            assert any(note in text for text in texts)
+    spans = sorted(outside.values())
+    assert all(before[1] < after[0] for before, after in itertools.pairwise(spans))
+    assert all(
+        document.layers.get(line.dxf.layer).dxf.linetype == "DASHED" for line in lines if "BLIND" in line.dxf.layer
+    )
 
 
 def test_arcs_of_a_profile_are_few_tangent_and_near():
