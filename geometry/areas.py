@@ -34,3 +34,10 @@ def slot_outside_disc(width: float, reach: float, radius: float) -> float:
 def obround(length: float, width: float) -> float:
     """Area of a slot with round ends: straight over `length`, `width` across."""
     return length * width + math.pi * width**2 / 4
+
+
+def round_corner(radius: float, depth: float) -> float:
+    """Area between a square corner and the arc of `radius` that rounds it, over the first `depth` of its side counted
+    from where the arc begins."""
+    s = min(depth, radius)
+    return radius * s - (s * math.sqrt(radius**2 - s**2) + radius**2 * math.asin(s / radius)) / 2

@@ -8,25 +8,23 @@ coaxiality.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from hdopt.geometry.contour import Circle, ParallelCurve
+from hdopt.geometry.din471 import ring_of
 from hdopt.geometry.features import BoltCircle, DBore, KeywayBore, polar
 from hdopt.geometry.iso286 import deviations
 from hdopt.geometry.model import WaveGeneratorModel
 from hdopt.geometry.part import Part, Prism, Tongue
 from hdopt.geometry.threads import THREADS
+from hdopt.geometry.undercut import AT_SHOULDER, Undercut
 
 GENERAL_POSITION = 0.1
 """Diameter of the position zone of bolt holes, mm: half the play of a bolt in a medium clearance hole (ISO 273)."""
 
 LETTERS = "ABCDEFGHJKLMNPRSTUVWXYZ"
 """Letters for datums; I, O and Q are left out (ISO 5459)."""
-
-UNDERCUT = "undercut DIN 509-E0.2×0.1 at the shoulder"
-
-KEYWAY_RADII = ((8.0, 0.08, 0.16), (17.0, 0.16, 0.25), (30.0, 0.16, 0.25), (44.0, 0.25, 0.40), (130.0, 0.40, 0.60))
-"""Largest bore -> least and largest radius at a keyway's bottom, mm (DIN 6885-1, column r2)."""
 
 
 @dataclass(frozen=True)
@@ -216,7 +214,7 @@ def _limits(limits: tuple[float, float]) -> str:
 def _keyway(part: Part) -> Callout | None:
     bore = part.bore
     if isinstance(bore, KeywayBore):
-        radii = next((low, high) for limit, low, high in KEYWAY_RADII if 2 * bore.radius <= limit)
+        radii = bore.key.corner_radii
         lines = (
             f"keyway {bore.key.width:g} JS9, DIN 6885-1",
             f"d + t2 = {2 * bore.radius + bore.key.hub_depth:g} +{bore.key.hub_depth_tolerance:g}/0",
@@ -296,6 +294,7 @@ def _seat(part: Part, model: WaveGeneratorModel) -> Callout | None:
     circle = rounds[0].outline
     zone = model.plan.zone(part.name, "wg_eccentricity")
     size = f"Ø{2 * circle.radius:g} {fit.shaft} {_limits(fit.shaft_limits)}; Ra 0.8"
+    reliefs = _reliefs(rounds)
     at = polar(circle.radius, math.radians(60))
     limits = (2 * circle.radius, *fit.shaft_limits)
     if circle.offset:
@@ -303,9 +302,26 @@ def _seat(part: Part, model: WaveGeneratorModel) -> Callout | None:
         boxed = (f"±{circle.offset:.4f} off the axis",)
         faces = tuple(Cylinder(circle.radius, (0.0, sign * circle.offset)) for sign in (1, -1))
         tip = (at[0], at[1] + circle.offset)
-        return Callout(tip, (f"2 journals {size}", UNDERCUT), frames, boxed, faces=faces, size=limits)
+        return Callout(tip, (f"2 journals {size}", *reliefs), frames, boxed, faces=faces, size=limits)
     frames = (Frame("coaxiality", zone, True, "A"),) if zone else ()
-    return Callout(at, (f"seat {size}", UNDERCUT), frames, faces=(Cylinder(circle.radius),), size=limits)
+    return Callout(at, (f"seat {size}", *reliefs), frames, faces=(Cylinder(circle.radius),), size=limits)
+
+
+def _reliefs(rounds: Sequence[Prism]) -> list[str]:
+    """What is turned into seat or journals, in words."""
+    lines = []
+    for recess in dict.fromkeys(recess for piece in rounds for recess in piece.recesses):
+        if recess == AT_SHOULDER:
+            lines.append("undercut DIN 509-E0.2×0.1 at the shoulder")
+        elif isinstance(recess, Undercut):
+            lines.append(f"relief {recess.length:g} × {recess.depth:g} deep, R{recess.radius:g}, 15° out, at each step")
+        else:
+            ring = ring_of(rounds[-1].outline.perimeter / math.pi)
+            assert ring is not None
+            lines.append(
+                f"groove Ø{ring.groove:g} {ring.groove_class} × {ring.groove_width:g} H13 for ring {ring.name}"
+            )
+    return lines
 
 
 def _face(part: Part, model: WaveGeneratorModel) -> Callout | None:

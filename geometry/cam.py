@@ -13,6 +13,7 @@ from hdopt.geometry.contour import Circle, ParallelCurve
 from hdopt.geometry.features import BoltCircle, Bore, PlainBore, Slot
 from hdopt.geometry.part import Part, Prism, ProfiledPart
 from hdopt.geometry.threads import THREAD_FOR_RADIUS, THREADS
+from hdopt.geometry.undercut import AT_SHOULDER, IN_CORNER, Undercut
 
 
 class Cam(Carrier):
@@ -66,7 +67,7 @@ class Cam(Carrier):
         half, edge = self.width / 2, self.chamfer()
         body = (
             Prism(Circle(flange), -half - thickness, -half, bottom_edge=edge),
-            Prism(Circle(seat), -half, half, top_edge=edge),
+            Prism(Circle(seat), -half, half, top_edge=edge, foot=self._undercut(seat)),
         )
         tapped = BoltCircle(bolts.count, tap, bolts.radius) if bolts else None
         faces = ((-half - thickness, -1), (half, 1))
@@ -75,7 +76,12 @@ class Cam(Carrier):
 
     def _seat_for(self, bore: Bore) -> float:
         """Radius of the hub's seat that leaves a wall around the bore, a whole number of mm."""
-        return float(math.ceil(bore.reach + self.wall))
+        return float(math.ceil(bore.reach + self.wall + AT_SHOULDER.depth))
+
+    def _undercut(self, seat: float) -> Undercut:
+        """The undercut of a hub's `seat` (radius, mm) at its flange, over which the cam's countersink has to pass."""
+        clear = self.countersink(PlainBore(seat)) >= 1.5 * AT_SHOULDER.rise
+        return AT_SHOULDER if clear else IN_CORNER
 
     def _hub_fits(self, seat: float) -> bool:
         """Whether there is room between seat and rim for the usual circle of bolts."""

@@ -13,6 +13,7 @@ from hdopt.drive.geometry import Structure
 from hdopt.files import JsonReady
 from hdopt.geometry.budget import CalloutTables, Plan
 from hdopt.geometry.contour import Circle
+from hdopt.geometry.din471 import ring_of
 from hdopt.geometry.features import DBore, KeywayBore
 from hdopt.geometry.iso286 import deviations
 from hdopt.geometry.model import WaveGeneratorModel
@@ -137,6 +138,10 @@ def _fitted(rows: _Rows, part: Part, plan: Plan) -> None:
         if isinstance(piece, Prism) and isinstance(piece.outline, Circle) and shaft is not None:
             name = "seat" if not piece.outline.offset else "journals"
             rows.limits(name, 2 * piece.outline.radius, shaft.shaft_limits, shaft.shaft, "budget")
+            if piece.groove is not None and (ring := ring_of(2 * piece.outline.radius)) is not None:
+                cut, wide = ring.groove_class, ring.groove_width
+                rows.limits("ring groove, diameter", ring.groove, deviations(cut, ring.groove), cut, "DIN 471")
+                rows.limits("ring groove, width", wide, deviations("H13", wide), "H13", "DIN 471")
     if part.bore is None:
         return
     diameter = 2 * part.bore.radius

@@ -31,6 +31,20 @@ class Key:
         """Upper deviation of t2, mm; the lower one is 0."""
         return 0.1 if self.height <= 6 else 0.2
 
+    @property
+    def corner_radii(self) -> tuple[float, float]:
+        """Least and largest radius at the keyway's bottom, mm (column r2)."""
+        return next((low, high) for widest, low, high in CORNER_RADII if self.width <= widest)
+
+    @property
+    def corner(self) -> float:
+        """The radius that a solid gets at the keyway's bottom: the middle of both, mm."""
+        return sum(self.corner_radii) / 2
+
+
+CORNER_RADII = ((4.0, 0.08, 0.16), (8.0, 0.16, 0.25), (18.0, 0.25, 0.40), (32.0, 0.40, 0.60))
+"""Widest key, least and largest radius at the bottom of its keyway, mm."""
+
 
 SMALLEST_BORE = 6.0
 

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from hdopt.geometry.areas import obround, segment_of_disc, slot_outside_disc, strip_of_disc
+from hdopt.errors import HdoptError
+from hdopt.geometry.areas import obround, round_corner, segment_of_disc, slot_outside_disc, strip_of_disc
 from hdopt.geometry.din6885 import Key
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ class PlainBore:
 
 @dataclass(frozen=True)
 class KeywayBore:
-    """A bore with one keyway of DIN 6885-1."""
+    """A bore with one keyway of DIN 6885-1, whose bottom has round corners."""
 
     radius: float
     key: Key
@@ -101,7 +102,12 @@ class KeywayBore:
 
     @property
     def reach(self) -> float:
-        return math.hypot(self.bottom, self.key.width / 2)
+        return self._to_corner + self.key.corner
+
+    @property
+    def _to_corner(self) -> float:
+        """Distance of the middle of a round corner from the axis, mm."""
+        return math.hypot(self.bottom - self.key.corner, self.key.width / 2 - self.key.corner)
 
     @property
     def depth_of_countersink(self) -> float:
@@ -109,7 +115,15 @@ class KeywayBore:
 
     def area_with_disc(self, radius: float) -> float:
         radius = max(radius, self.radius)
-        return math.pi * radius**2 + slot_outside_disc(self.key.width, self.bottom, radius)
+        if radius >= self.reach:
+            return math.pi * radius**2
+        if radius > self._to_corner:
+            raise HdoptError(
+                f"a countersink of radius {radius:.4g} mm ends in the corners of the keyway, {self._to_corner:.4g} to "
+                f"{self.reach:.4g} mm from the axis; give a smaller export.bore_chamfer_mm"
+            )
+        corners = 2 * round_corner(self.key.corner, self.key.corner)
+        return math.pi * radius**2 + slot_outside_disc(self.key.width, self.bottom, radius) - corners
 
     def area_in_strip(self, width: float) -> float:
         start = math.sqrt(self.radius**2 - self.key.width**2 / 4)
@@ -118,13 +132,25 @@ class KeywayBore:
         if end > start:
             round_part = segment_of_disc(self.radius, start) - segment_of_disc(self.radius, end)
             area += self.key.width * (end - start) - round_part
-        return area
+        into = min(max(0.0, end - self.bottom + self.key.corner), self.key.corner)
+        return area - 2 * round_corner(self.key.corner, into)
 
     def tool(self, bottom: float, top: float) -> list[cq.Shape]:
         return [
             cylinder(self.radius, bottom, top),
-            bar(0.0, self.bottom, self.key.width, bottom, top, self.direction),
+            self._keyway(bottom, top),
         ]
+
+    def _keyway(self, bottom: float, top: float) -> cq.Solid:
+        """The broach's path, from the axis outward, with round corners."""
+        import cadquery as cq
+
+        slot = cq.Solid.makeBox(self.key.width, self.bottom, top - bottom, cq.Vector(-self.key.width / 2, 0.0, bottom))
+        edges = [
+            edge for edge in slot.Edges() if abs(edge.Center().y - self.bottom) < 1e-9 and abs(edge.Center().x) > 1e-9
+        ]
+        rounded = slot.fillet(self.key.corner, edges)
+        return rounded.rotate(cq.Vector(), cq.Vector(0, 0, 1), -math.degrees(self.direction)).Solids()[0]
 
 
 @dataclass(frozen=True)

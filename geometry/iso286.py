@@ -23,6 +23,12 @@ SHAFT_MICRONS: dict[str, tuple[float, ...]] = {
 }
 """Fundamental deviation, um: the upper one of g and h, the lower one of k (grades 4 to 7), m, n and p."""
 
+COARSE_MICRONS: dict[str, tuple[float, ...]] = {
+    "12": (100, 120, 150, 180, 210, 250, 300, 350, 400),
+    "13": (140, 180, 220, 270, 330, 390, 460, 540, 630),
+}
+"""Standard tolerances of grooves and clearances, um: the grades that an allocation does not choose from."""
+
 LADDER = ("H7/h6", "H6/h5", "H6/js5", "H6/k5", "H6/m5", "H6/n5", "H6/p5")
 """Fits to choose from, the loosest first."""
 
@@ -68,7 +74,7 @@ def deviations(tolerance_class: str, nominal: float) -> tuple[float, float]:
     """Lower and upper deviation, mm, of a `tolerance_class` such as 'H7', 'n5' or 'js9' at a `nominal` size, mm;
     `HdoptError` for one that the table does not have."""
     letter, grade = tolerance_class.rstrip("0123456789"), tolerance_class.lstrip("HJSabcdefghijklmnopqrstuvwxyz")
-    width = it_grade(f"IT{grade}", nominal).tolerance
+    width = _width(grade, nominal)
     if letter == "H":
         return 0.0, width
     if letter.lower() == "js":
@@ -81,6 +87,12 @@ def deviations(tolerance_class: str, nominal: float) -> tuple[float, float]:
     column = next(index for index, size in enumerate(SIZES_MM) if nominal <= size)
     fundamental = SHAFT_MICRONS[letter][column] / 1000
     return (fundamental - width, fundamental) if letter in "gh" else (fundamental, fundamental + width)
+
+
+def _width(grade: str, nominal: float) -> float:
+    if grade in COARSE_MICRONS and nominal <= SIZES_MM[-1]:
+        return COARSE_MICRONS[grade][next(index for index, size in enumerate(SIZES_MM) if nominal <= size)] / 1000
+    return it_grade(f"IT{grade}", nominal).tolerance
 
 
 def loosest_fit(nominal: float, play: float) -> Fit:

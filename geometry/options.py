@@ -74,7 +74,7 @@ RULES: dict[str, str] = {
     "cross_slide_travel_mm": "how far a slide may move from the middle",
     "disc_gap_mm": "axial gap between the two discs",
     "journal_clearance_mm": "none: the fit of disc and journal is chosen from the budget",
-    "journal_radius_mm": "bore or keyway, eccentricity and twice the least wall",
+    "journal_radius_mm": "bore or keyway, eccentricity and twice the least wall, next size of DIN 471's rings",
     "profile_tolerance_mm": "profile of a surface (ISO 1101), width of the zone; 10 um, at most what the budget gives",
     "cam_resolution_deg": "step of the cam's table",
     "wheel_radius_mm": "radius of the grinding wheel that the G-code is for",

@@ -18,7 +18,8 @@ from hdopt.geometry.features import (
     countersink_volume,
     cylinder,
 )
-from hdopt.geometry.solids import Station, loft
+from hdopt.geometry.solids import Station, loft, turn
+from hdopt.geometry.undercut import RingGroove, Stretch, Undercut
 
 if TYPE_CHECKING:
     import cadquery as cq
@@ -31,7 +32,10 @@ SHARP = BrokenEdge()
 
 @dataclass(frozen=True)
 class Prism:
-    """Material between z = `bottom` and `top` within `outline`, outside `inner`; either outer edge may be broken."""
+    """Material between z = `bottom` and `top` within `outline`, outside `inner`; either outer edge may be broken.
+
+    A round one may have undercuts at its `foot` and `head`, where shoulders stand, and a `groove` for a retaining ring.
+    """
 
     outline: Contour
     bottom: float
@@ -39,14 +43,24 @@ class Prism:
     bottom_edge: BrokenEdge = SHARP
     top_edge: BrokenEdge = SHARP
     inner: Contour | None = None
+    foot: Undercut | None = None
+    head: Undercut | None = None
+    groove: RingGroove | None = None
 
     @property
     def height(self) -> float:
         return self.top - self.bottom
 
     @property
+    def recesses(self) -> tuple[Undercut | RingGroove, ...]:
+        """What is turned into the outline."""
+        return tuple(recess for recess in (self.foot, self.head, self.groove) if recess is not None)
+
+    @property
     def volume(self) -> float:
         broken = sum(edge.removed_volume(self.outline.perimeter) for edge in (self.bottom_edge, self.top_edge))
+        if isinstance(self.outline, Circle):
+            broken += sum(recess.removed_volume(self.outline.radius) for recess in self.recesses)
         return (self.outline.area - (self.inner.area if self.inner else 0.0)) * self.height - broken
 
     def bore_area(self, bore: Bore) -> float:
@@ -67,7 +81,26 @@ class Prism:
         ]
         return [station for index, station in enumerate(stations) if index == 0 or station[0] > stations[index - 1][0]]
 
+    def _turned(self, outline: Circle) -> list[Stretch]:
+        """Its side from the bottom up, where something is turned into it."""
+        radius, side = outline.radius, []
+        if self.foot is not None:
+            side += self.foot.stretches(radius, self.bottom, 1)
+        else:
+            edge = self.bottom_edge
+            side.append(((radius - edge.radial, self.bottom), None, (radius, self.bottom + edge.axial)))
+        if self.groove is not None:
+            side += self.groove.stretches(radius)
+        if self.head is not None:
+            side += [(end, middle, start) for start, middle, end in self.head.stretches(radius, self.top, -1)[::-1]]
+        else:
+            edge = self.top_edge
+            side.append(((radius, self.top - edge.axial), None, (radius - edge.radial, self.top)))
+        return side
+
     def build(self) -> cq.Shape:
+        if isinstance(self.outline, Circle) and self.recesses:
+            return turn(self.outline, self._turned(self.outline))
         solid = loft(self.outline, self.stations())
         if self.inner is None:
             return solid

@@ -11,6 +11,7 @@ import numpy as np
 from hdopt.geometry.callouts import Callout, callouts_of
 from hdopt.geometry.contour import Circle
 from hdopt.geometry.day import moment
+from hdopt.geometry.din471 import ring_of
 from hdopt.geometry.drawing import (
     FROM_LEFT,
     FRONT,
@@ -353,9 +354,11 @@ def _parts_list(sheet: Sheet, job: Job) -> None:
     hub = next((part for part, _ in job.made if part.name == "hub" and part.bolts), None)
     if hub is not None and hub.bolts is not None:
         rows.append((f"{len(rows)}", f"screw, {hub.bolts.count} off", f"ISO 4762 {thread}", "steel 8.8", ""))
-    if any(part.name == "disc_1" for part, _ in job.made):
-        for name in ("end washer holding the discs", "retaining ring DIN 471"):
-            rows.append((f"{len(rows)}", name, "bought", "steel", ""))
+    for part, _ in job.made:
+        for piece in part.body:
+            if isinstance(piece, Prism) and piece.groove is not None:
+                ring = ring_of(piece.outline.perimeter / math.pi)
+                rows.append((f"{len(rows)}", "retaining ring", ring.name if ring else "", "spring steel", ""))
     top = TITLE_TOP + 2
     sheet.text((BORDER + 4, top - 2), "Parts list", TEXT, bold=True)
     sheet.table((BORDER + 4, top), (10, 50, 44, 88, 18), rows, min(4.7, 40.0 / len(rows)))

@@ -13,6 +13,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 from hdopt.geometry.contour import Circle, Contour, ParallelCurve
+from hdopt.geometry.undercut import Place, Stretch
 
 if TYPE_CHECKING:
     import cadquery as cq
@@ -60,6 +61,30 @@ def _(contour: ParallelCurve, stations: Sequence[Station]) -> cq.Solid:
         builder.AddWire(_wire(curve, z, spans))
     builder.Build()
     return cq.Solid(builder.Shape())
+
+
+def turn(circle: Circle, side: Sequence[Stretch]) -> cq.Solid:
+    """The solid that turns about the axis of a `circle`, whose `side` is given from the bottom up; neighbouring
+    stretches are joined by straight lines, and the ends by planes."""
+    import cadquery as cq
+
+    def at(place: Place) -> cq.Vector:
+        return cq.Vector(place[0], 0.0, place[1])
+
+    edges, last = [], (0.0, side[0][0][1])
+    for start, middle, end in side:
+        if math.dist(last, start) > 1e-9:
+            edges.append(cq.Edge.makeLine(at(last), at(start)))
+        if middle is not None:
+            edges.append(cq.Edge.makeThreePointArc(at(start), at(middle), at(end)))
+        elif math.dist(start, end) > 1e-9:
+            edges.append(cq.Edge.makeLine(at(start), at(end)))
+        last = end
+    top, bottom = (0.0, last[1]), (0.0, side[0][0][1])
+    edges += [cq.Edge.makeLine(at(last), at(top)), cq.Edge.makeLine(at(top), at(bottom))]
+    face = cq.Face.makeFromWires(cq.Wire.assembleEdges(edges))
+    solid = cq.Solid.revolve(face, 360, cq.Vector(), cq.Vector(0, 0, 1))
+    return solid.moved(cq.Location(cq.Vector(0, circle.offset, 0)))
 
 
 def spans_needed(curve: ParallelCurve) -> int:

@@ -13,8 +13,10 @@ from hdopt.geometry.carrier import MAJOR, Carrier
 from hdopt.geometry.choices import Choices
 from hdopt.geometry.colours import DARK_STEEL, LIGHT_STEEL, STEEL
 from hdopt.geometry.contour import Circle
-from hdopt.geometry.features import Bore, Slot
+from hdopt.geometry.din471 import ring_of, smallest_ring
+from hdopt.geometry.features import Bore, BrokenEdge, Slot
 from hdopt.geometry.part import SHARP, Part, Prism, ProfiledPart
+from hdopt.geometry.undercut import AT_SHOULDER, IN_CORNER, RingGroove
 
 
 class TwoDiscs(Carrier):
@@ -46,9 +48,16 @@ class TwoDiscs(Carrier):
         return self.disc.least_radius
 
     def _journal(self, bore: Bore) -> float:
-        rule = lambda: math.ceil(2 * (bore.reach + self.offset + 2 * self.wall)) / 2  # noqa: E731
+        inside = bore.reach + self.offset
+
+        def rule() -> float:
+            ring = smallest_ring(2 * (inside + 2 * self.wall), 2 * (inside + self.wall))
+            return ring.shaft / 2 if ring is not None else math.ceil(2 * (inside + 2 * self.wall)) / 2
+
         radius = self.take("journal_radius_mm", rule)
-        low, high = bore.reach + self.offset + self.wall, self.disc.radius - self.wall
+        ring = ring_of(2 * radius)
+        depth = IN_CORNER.depth if ring is None else ring.depth
+        low, high = inside + self.wall + depth, self.disc.radius - self.wall
         if not low <= radius <= high:
             raise HdoptError(
                 f"the eccentric hub's journals have a radius of {radius:.4g} mm; between bore and disc there is room "
@@ -60,14 +69,11 @@ class TwoDiscs(Carrier):
         """The eccentric hub, with a `bore`, a flange of radius `shoulder` and `thickness` mm and a `slot` in its back
         where it slides; and the two discs on it."""
         journal = self._journal(bore)
-        half, chamfer = self.width / 2, self.chamfer()
-        step = -half - self.gap
-        body = (
-            Prism(Circle(max(shoulder, journal + self.offset)), step - thickness, step, bottom_edge=chamfer),
-            Prism(Circle(journal, self.offset), step, 0.0),
-            Prism(Circle(journal, -self.offset), 0.0, half, top_edge=chamfer),
-        )
-        faces = ((half, 1),) if slot else ((step - thickness, -1), (half, 1))
+        half, step = self.width / 2, -self.width / 2 - self.gap
+        flange = Circle(max(shoulder, journal + self.offset))
+        body = (Prism(flange, step - thickness, step, bottom_edge=self.chamfer()), *self._journals(journal, step))
+        top = body[-1].top
+        faces = ((top, 1),) if slot else ((step - thickness, -1), (top, 1))
         sliding = slot is not None
         hub = Part("eccentric_hub", DARK_STEEL, body, bore, self.countersink(bore), faces, slot, clearance_hole=sliding)
         hole = journal + self.take("journal_clearance_mm", lambda: 0.0)
@@ -85,6 +91,26 @@ class TwoDiscs(Carrier):
             )
         )
         return (hub, *discs)
+
+    def _journals(self, radius: float, step: float) -> tuple[Prism, Prism]:
+        """Both journals of this `radius` on a flange that ends at z = `step`, with the groove of the ring that holds
+        the discs between itself and the flange."""
+        half, edge, ring = self.width / 2, self.chamfer(), ring_of(2 * radius)
+        top, groove = half, None
+        if ring is not None:
+            groove = RingGroove(half, ring.groove_width, ring.depth)
+            top = half + ring.groove_width + ring.land
+            edge = BrokenEdge.chamfer(min(edge.axial, ring.land / 2))
+        else:
+            self.notes += (
+                f"DIN 471 has no retaining ring for journals of {2 * radius:g} mm: the discs are held along the axis "
+                "by their fit alone; export.journal_radius_mm changes that",
+            )
+        foot = AT_SHOULDER if self.gap >= 1.5 * AT_SHOULDER.rise else IN_CORNER
+        return (
+            Prism(Circle(radius, self.offset), step, 0.0, foot=foot, head=IN_CORNER),
+            Prism(Circle(radius, -self.offset), 0.0, top, top_edge=edge, foot=IN_CORNER, groove=groove),
+        )
 
     def integral_parts(self) -> tuple[Part, ...]:
         bore = self.shaft_bore(MAJOR, self.room, "disc")

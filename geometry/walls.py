@@ -71,7 +71,7 @@ def _opening(part: Part) -> str:
 
 def _of_prism(part: Part, piece: Prism) -> Iterator[Wall]:
     yield Wall(part.name, "its axial width", piece.height, _height_keys(part))
-    rim = piece.outline.least_radius
+    rim = piece.outline.least_radius - max((recess.depth for recess in piece.recesses), default=0.0)
     if piece.inner is not None:
         ring = (piece.outline.box[2] - piece.outline.box[0] - piece.inner.box[2] + piece.inner.box[0]) / 2
         yield Wall(part.name, "the ring between hole and rim", ring, "export.journal_radius_mm")
