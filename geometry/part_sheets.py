@@ -168,6 +168,10 @@ def _section(sheet: Sheet, place: Placed, part: Part, solid: cq.Solid) -> None:
 def _heights(sheet: Sheet, place: Placed, part: Part, edge: float, bottom: float) -> None:
     """Axial lengths, a line each: pieces, slot, then the whole."""
     spans = [(piece.bottom, piece.top) for piece in part.body] if len(part.body) > 1 else []
+    for piece in part.body:
+        if isinstance(piece, Prism) and piece.groove is not None:
+            # Where the ring stands, from the step below it.
+            spans.append((piece.bottom, piece.groove.bottom))
     if part.slot:
         spans.append((part.bottom, part.bottom + part.slot.depth))
     spans.append((part.bottom, part.top))

@@ -70,7 +70,8 @@ class TwoDiscs(Carrier):
         where it slides; and the two discs on it."""
         journal = self._journal(bore)
         half, step = self.width / 2, -self.width / 2 - self.gap
-        flange = Circle(max(shoulder, journal + self.offset))
+        # Turned to a round size, to the next tenth of a mm.
+        flange = Circle(math.ceil(10 * max(shoulder, journal + self.offset) - 1e-9) / 10)
         body = (Prism(flange, step - thickness, step, bottom_edge=self.chamfer()), *self._journals(journal, step))
         top = body[-1].top
         faces = ((top, 1),) if slot else ((step - thickness, -1), (top, 1))
