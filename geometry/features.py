@@ -150,7 +150,8 @@ class KeywayBore:
             edge for edge in slot.Edges() if abs(edge.Center().y - self.bottom) < 1e-9 and abs(edge.Center().x) > 1e-9
         ]
         rounded = slot.fillet(self.key.corner, edges)
-        return rounded.rotate(cq.Vector(), cq.Vector(0, 0, 1), -math.degrees(self.direction)).Solids()[0]
+        turned: cq.Solid = rounded.rotate(cq.Vector(), cq.Vector(0, 0, 1), -math.degrees(self.direction)).Solids()[0]
+        return turned
 
 
 @dataclass(frozen=True)
