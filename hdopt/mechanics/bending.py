@@ -1,4 +1,4 @@
-"""Bending of the flexspline's ring by the wave generator: change of curvature and the stress it makes."""
+"""Bending and stretch of the flexspline's ring by the wave generator: change of curvature, stresses, safety."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive, DriveGeometry, Material
-from hdopt.drive.profiles import WaveGeneratorProfile, polar_curvature
+from hdopt.drive.profiles import WaveGeneratorProfile, perimeter_error, polar_curvature
 from hdopt.errors import MissingValue
 
 QUARTER = np.linspace(0.0, math.pi / 2, 3601)
@@ -54,6 +54,26 @@ def bending_stress(material: Material, wall: float, change: ArrayLike, plate: bo
     """
     factor = 1 / (1 - material.poisson**2) if plate else 1.0
     return factor * material.modulus * wall * np.asarray(change) / 2
+
+
+def hoop_stress(material: Material, geometry: DriveGeometry, profile: WaveGeneratorProfile) -> float:
+    """Stress of the ring of `geometry` and `material` that `profile` stretches, N/mm^2; 0 where it does not.
+
+    E (P - 2 pi R_b)/(2 pi R_b) at the inner wall, where it is largest: P is the perimeter of the profile, which that
+    wall takes (radius R_b before). Of a free ring that follows the profile all round.
+    """
+    unstretched = 2 * math.pi * geometry.flexspline_inner_radius
+    return material.modulus * max(perimeter_error(profile, geometry.flexspline_inner_radius) / unstretched, 0.0)
+
+
+def fatigue_safety(endurance: float, notched_amplitude: float, mean: float, sensitivity: float) -> float:
+    """Safety n = sigma_-1/(K_sigma sigma_a + psi sigma_m) against fatigue by an alternating stress on a mean one.
+
+    `endurance` is sigma_-1, `notched_amplitude` K_sigma sigma_a, the alternating stress times its notch factor, `mean`
+    sigma_m (all N/mm^2) and `sensitivity` psi (none): a straight line in Haigh's diagram. A steady tension is not
+    raised by the notch factor, as it yields there.
+    """
+    return endurance / (notched_amplitude + sensitivity * mean)
 
 
 def max_bending_stress(drive: Drive, plate: bool = False) -> float:

@@ -23,7 +23,7 @@ from numba import njit
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
-from hdopt.drive.profiles import WaveGeneratorProfile, polar_curvature
+from hdopt.drive.profiles import WaveGeneratorProfile, perimeter_error, polar_curvature
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.mechanics.bending import ring_wall
 from hdopt.mechanics.contact import contact_angle
@@ -155,6 +155,13 @@ class Mesh:
         if angle <= 0:
             return math.inf  # no flank runs free: none carries
         return 2 * torque / (pitch_diameter * face_width * self.summed_depth(angle))
+
+    @cached_property
+    def stretch(self) -> float:
+        """By which share the profile stretches the ring's inner wall (`hdopt.mechanics.bending.hoop_stress`); not below
+        0."""
+        radius = self.geometry.flexspline_inner_radius
+        return max(perimeter_error(self.profile, radius) / (2 * math.pi * radius), 0.0)
 
     @cached_property
     def largest_curvature_change(self) -> float:

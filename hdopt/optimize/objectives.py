@@ -30,7 +30,7 @@ from hdopt.mechanics.bearing_life import (
     radial_force,
     ring_force,
 )
-from hdopt.mechanics.bending import bending_stress, ring_wall
+from hdopt.mechanics.bending import bending_stress, fatigue_safety, ring_wall
 from hdopt.mechanics.contact import homogenization_coefficient
 from hdopt.mechanics.lag import cross_slide_lag_arcmin
 from hdopt.optimize.design_space import Combination, Design, DesignSpace
@@ -69,6 +69,7 @@ class DesignConditions:
     face_width: float | None
     backlash: float | None
     notch_factor: float = 2.2
+    mean_stress_sensitivity: float = 0.2
     k_b: float = 1.0
     sample: Array | None = None
     quantile: float = 0.9973
@@ -398,14 +399,24 @@ def largest_bending_stress(trade: DesignConditions, design: Design) -> float:
 
 
 def bending_safety(trade: DesignConditions, design: Design) -> float:
-    """Endurance limit over notch factor times bending stress, which alternates: n = sigma_-1/(K_sigma sigma_a).
+    """Safety against fatigue by bending, which alternates, on the hoop stress, which stays (`fatigue_safety`).
 
-    K_sigma is the notch factor of `trade`, sigma_a the `largest_bending_stress` of `design`. Raises `MissingValue`
-    where the material has no endurance limit.
+    Notch factor and sensitivity to the mean stress are those of `trade`, the alternating stress is the
+    `largest_bending_stress` of `design` and the mean its `ring_hoop_stress`. Raises `MissingValue` where the material
+    has no endurance limit.
     """
-    if design.drive.material is None or design.drive.material.endurance is None:
+    material = design.drive.material
+    if material is None or material.endurance is None:
         raise MissingValue("the safety against bending fatigue", "material.endurance_mpa")
-    return design.drive.material.endurance / (trade.notch_factor * largest_bending_stress(trade, design))
+    notched = trade.notch_factor * largest_bending_stress(trade, design)
+    return fatigue_safety(material.endurance, notched, ring_hoop_stress(trade, design), trade.mean_stress_sensitivity)
+
+
+def ring_hoop_stress(trade: DesignConditions, design: Design) -> float:
+    """`hoop_stress` of the ring of `design`, N/mm^2; it does not depend on `trade`."""
+    if design.drive.material is None:
+        raise MissingValue("hoop stress", "material.modulus_mpa", "material.poisson")
+    return design.mesh.stretch * design.drive.material.modulus
 
 
 def trailing_flank_room(trade: DesignConditions, design: Design) -> float:
@@ -441,6 +452,12 @@ def life(trade: DesignConditions, design: Design) -> float:
     rated = bearing_load(reference.geometry, constants.rated_torque, constants.friction, ring_load(trade, reference))
     width, rated_width = design.drive.wave_generator.width, reference.wave_generator.width
     return bearing_life_h(load, width, rated, rated_width, speed, constants)
+
+
+def wave_generator_load(trade: DesignConditions, design: Design) -> float:
+    """`bearing_load` of `design` under the torque of `trade`, N, with the ring's force as far as it is modelled."""
+    torque = trade.needed("torque", "the bearing's load")
+    return bearing_load(design.drive.geometry, torque, trade.bearing.friction, ring_load(trade, design.drive))
 
 
 def ring_load(trade: DesignConditions, drive: Drive) -> float:
@@ -483,6 +500,7 @@ QUANTITIES: dict[str, Quantity] = {
     "flank_pressure_mpa": Scalar("Mean flank pressure", "MPa", flank_pressure),
     "bending_stress_mpa": Scalar("Bending stress", "MPa", largest_bending_stress),
     "curvature_change_per_mm": Scalar("Curvature change", "1/mm", lambda t, d: d.mesh.largest_curvature_change),
+    "hoop_stress_mpa": Scalar("Hoop stress", "MPa", ring_hoop_stress),
     "bending_safety": Scalar("Safety against bending fatigue", "", bending_safety, False),
     "contact_angle_deg": Scalar("Contact angle", "deg", lambda t, d: math.degrees(d.mesh.contact_angle), False),
     "carrying_angle_deg": Scalar("Carrying angle", "deg", lambda t, d: math.degrees(carrying_angle(t, d)), False),
@@ -491,6 +509,8 @@ QUANTITIES: dict[str, Quantity] = {
     "tip_relief_um": Scalar("Tip relief for the tooth's lean", "um", tip_relief),
     "radial_force_n": Scalar("Radial force", "N", largest_radial_force),
     "axial_force_n": Scalar("Axial force", "N", largest_axial_force),
+    "bearing_load_n": Scalar("Load of the WG bearing", "N", wave_generator_load),
+    "ring_force_n": Scalar("of it, bending of the ring", "N", lambda t, d: ring_load(t, d.drive)),
     "bearing_life_h": Scalar("WG bearing life L10", "h", life, False),
     "width_mm": Scalar("WG width", "mm", lambda t, d: d.drive.wave_generator.width),
     "pitch_diameter_mm": Scalar("Pitch diameter of the CS", "mm", _diameter),

@@ -119,6 +119,7 @@ def _trade(study: Study, section: SearchSection, seed: int) -> DesignConditions:
         face_width=load.tooth_face_width,
         backlash=drive.clearances.backlash,
         notch_factor=given.notch_factor,
+        mean_stress_sensitivity=given.mean_stress_sensitivity,
         sample=sample_rows(study, section.samples, seed) if needs_sample else None,
         quantile=section.quantile,
         added=_effects(study, section, needs_sample),

@@ -7,8 +7,16 @@ import pytest
 from cases import CSF_25_80, PROFILES, drive
 
 from hdopt.drive.geometry import Load, Material
+from hdopt.drive.profiles import Ellipse
 from hdopt.errors import HdoptError, MissingValue
-from hdopt.mechanics.bending import bending_stress, curvature_change, max_bending_stress, max_curvature_change
+from hdopt.mechanics.bending import (
+    bending_stress,
+    curvature_change,
+    fatigue_safety,
+    hoop_stress,
+    max_bending_stress,
+    max_curvature_change,
+)
 from hdopt.mechanics.contact import (
     contact_angle,
     homogenization_coefficient,
@@ -105,6 +113,19 @@ def test_largest_curvature_change_is_the_largest(profile):
     assert max_curvature_change(CSF_25_80, profile) == pytest.approx(
         np.abs(curvature_change(CSF_25_80, profile, phi)).max(), rel=1e-6
     )
+
+
+def test_a_ring_blown_up_has_the_hoop_stress_of_its_strain():
+    """E times the growth of the radius over the radius; a profile that is too short presses nothing."""
+    for growth, expected in ((0.03, 206_000 * 0.03 / 30.65), (-0.03, 0.0)):
+        round_one = Ellipse(30.65 + growth, 30.65 + growth - 1e-9)
+        assert hoop_stress(STEEL, CSF_25_80, round_one) == pytest.approx(expected, rel=1e-6)
+
+
+def test_safety_falls_with_alternating_and_steady_stress():
+    """Haigh's straight line: 450/(180 + 0.2 100), and the plain ratio without a steady stress."""
+    assert fatigue_safety(450.0, 180.0, 100.0, 0.2) == pytest.approx(2.25)
+    assert fatigue_safety(450.0, 180.0, 0.0, 0.2) == pytest.approx(2.5)
 
 
 def test_stress_of_a_ring_and_of_a_plate():

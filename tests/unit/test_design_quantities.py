@@ -8,7 +8,8 @@ import pytest
 from scipy import stats
 
 from hdopt.mechanics.bearing_life import bearing_life_h, bearing_load, ring_force
-from hdopt.mechanics.bending import max_bending_stress
+from hdopt.mechanics.bending import hoop_stress, max_bending_stress
+from hdopt.mechanics.tooth_path import Mesh
 from hdopt.optimize.design_space import Combination, Structure
 from hdopt.optimize.objectives import Point, find_quantity
 from hdopt.study import load_study
@@ -29,7 +30,20 @@ def of(key, problem, design):
     return find_quantity(key).value(problem.trade, design)
 
 
-def test_safety_is_endurance_over_notched_stress(problem, design):
+def test_safety_is_endurance_over_notched_bending_and_a_share_of_the_hoop_stress(problem, design):
+    """The wave generator of Table 1 as it stands: its perimeter stretches the ring, 222 MPa (E times the stretch)."""
+    own = Mesh(design.drive.geometry, problem.space.baseline.wave_generator.profile)
+    table_1 = replace(design, mesh=own)
+    hoop = of("hoop_stress_mpa", problem, table_1)
+    assert hoop == pytest.approx(222, abs=0.5)
+    assert hoop == pytest.approx(hoop_stress(design.drive.material, own.geometry, own.profile), rel=1e-12)
+    bending = of("bending_stress_mpa", problem, table_1)
+    expected = design.drive.material.endurance / (2.2 * bending + 0.2 * hoop)
+    assert of("bending_safety", problem, table_1) == pytest.approx(expected, rel=1e-12)
+
+
+def test_safety_is_endurance_over_notched_stress_where_nothing_is_stretched(problem, design):
+    assert of("hoop_stress_mpa", problem, design) == pytest.approx(0, abs=1e-6)
     stress = max_bending_stress(design.drive)
     assert of("bending_stress_mpa", problem, design) == pytest.approx(stress, rel=1e-6)
     expected = design.drive.material.endurance / (2.2 * stress)
