@@ -20,10 +20,17 @@ if TYPE_CHECKING:
 @study_options
 @click.option("--fronts/--no-fronts", default=True, help="Also trace the fronts between the two objectives.")
 @click.option(
+    "--regions/--no-regions",
+    default=False,
+    help="Also follow each constant of the trade to where another choice is the better.",
+)
+@click.option(
     "--write-study", "study_file", metavar="FILE", type=OutputFile(), help="Write the best design as a study (TOML)."
 )
 @work_options
-def command(asked: StudyOptions, fronts: bool, study_file: Path | None, json_file: Path | None, seed: int) -> int:
+def command(
+    asked: StudyOptions, fronts: bool, regions: bool, study_file: Path | None, json_file: Path | None, seed: int
+) -> int:
     """Which design: profile, structure, pressure angle, width, module and deflection; and what they cost.
 
     STUDY is a study file or a shipped study; its [search] section says what may vary. Ctrl-C ends with the best so far.
@@ -33,7 +40,7 @@ def command(asked: StudyOptions, fronts: bool, study_file: Path | None, json_fil
     from hdopt.workflow.search import search, write_search
 
     loaded = asked.load()
-    result = search(loaded, seed, _stages() if sys.stderr.isatty() else lambda stage: None, fronts)
+    result = search(loaded, seed, _stages() if sys.stderr.isatty() else lambda stage: None, fronts, regions=regions)
     verdict = of_search(loaded, result)
     try:
         write_search(result, {"study": study_file} if study_file else {}, loaded)

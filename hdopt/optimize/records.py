@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 from hdopt.figures import drawn
+from hdopt.optimize.region_records import Regions
 from hdopt.optimize.setup import Setup
 from hdopt.optimize.solve import Solution
 
@@ -74,6 +75,8 @@ class SearchResult:
     setup: Setup
     solutions: tuple[Solution, ...]
     notes: tuple[str, ...] = ()
+    regions: Regions | None = None
+    """How far each constant of the trade may go before another choice is the better; None where it was not asked."""
 
     @property
     def chosen(self) -> Solution:
@@ -113,6 +116,7 @@ class SearchResult:
             "algorithm": self.algorithm,
             "stopped_because": self.stopped_because,
             "notes": list(self.notes),
+            **({} if self.regions is None else {"regions": self.regions.to_dict()}),
         }
 
     def to_frame(self) -> pd.DataFrame:
@@ -165,26 +169,6 @@ def _designs(designs: Sequence[DesignRecord]) -> pd.DataFrame:
             for d in designs
         ]
     )
-
-
-@dataclass(frozen=True)
-class Perturbation:
-    """What becomes of the choice where one constant is changed: the design chosen then, and whether it is another."""
-
-    constant: str
-    value: float
-    unit: str
-    source: str
-    factor: float
-    chosen: DesignRecord
-    feasible: bool
-    objective: float
-    same_choice: bool
-    regret: float | None
-    """By how much the design chosen now would miss the new best, as a share; None where it breaks a limit then."""
-
-    def to_dict(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 @dataclass(frozen=True)

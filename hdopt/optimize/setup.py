@@ -17,8 +17,8 @@ class SearchSettings:
     """What a search minimises and how far it goes.
 
     `objective` and `second_objective` name quantities, `robust` adds a front under the tolerances at `quantile`,
-    `front_points` is the size of a front, `perturbation` the share by which each constant is changed; the algorithms
-    are those found best where they are None.
+    `front_points` is the size of a front, `perturbation` how far each constant is followed (0.5: down to
+    1/1.5 and up to 1.5 times its value); the algorithms are those found best where they are None.
     """
 
     objective: str
@@ -26,7 +26,7 @@ class SearchSettings:
     robust: bool = False
     quantile: float = 0.9973
     front_points: int = 30
-    perturbation: float = 0.2
+    perturbation: float = 0.5
     global_algorithm: str | None = None
     local_algorithm: str | None = None
 

@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any  # Any: values of JSON
 
 from hdopt.optimize.design_space import VARIABLES
 from hdopt.optimize.objectives import QUANTITIES
 from hdopt.optimize.records import DesignRecord, SearchResult
+from hdopt.optimize.region_records import NONE_LEFT, Regions
 
 NOT_MODELLED = (
     "tooth separation under load",
     "the stiffness and efficiency that an automatic or one-way wave generator loses in its cross-slide",
     "ratcheting and buckling torque and torsional stiffness K1 to K3, which are catalogue values without a formula",
-    "the stiffness of the flexspline's cup, which loads the wave generator's bearing more than the toothed ring alone",
+    "the stiffness of the flexspline's cup, which loads the wave generator's bearing beside the toothed ring",
 )
 """What stands beside every choice, because no formula of the trade knows it."""
+
+
+def ring_share(design: DesignRecord) -> str | None:
+    """How much of the load of the wave generator's bearing of a `design` bends the ring, as far as that is modelled, in
+    a sentence; None where either is not known."""
+    load, ring = (design.quantities.get(key) for key in ("bearing_load_n", "ring_force_n"))
+    if not load or not ring:
+        return None
+    return (
+        f"bending the flexspline counts with {ring:.0f} of the {load:.0f} N on the wave generator's bearing "
+        f"({100 * ring / load:.1f} %): that is the toothed ring alone, what its cup adds is not modelled"
+    )
 
 
 def break_evens(result: SearchResult) -> tuple[str, ...]:
@@ -38,6 +52,35 @@ def break_evens(result: SearchResult) -> tuple[str, ...]:
         f"{number(abs(value - at_best), unit)} ({100 * abs(value / at_best - 1):.2g} %) beside {structure}"
         for structure, value in sorted(others.items(), key=lambda item: abs(item[1] - at_best))
     )
+
+
+def nearest_boundary(regions: Regions) -> str:
+    """The sentence on the nearest of all boundaries of structure and profile in `regions`."""
+    if regions.nearest is None:
+        reach = regions.ranges[0].highest - 1 if regions.ranges else 0.0
+        return f"no constant of the trade changes the structure or the profile up to {1 + reach:g} times its value"
+    constant, boundary = regions.nearest
+    name = f"{constant.constant[:1].lower()}{constant.constant[1:]}"
+    return (
+        f"the nearest boundary of the choice: {boundary.per_cent:+.1f} % of {name}, beyond which "
+        f"{boundary.becomes.replace('_', ' ')} is chosen"
+        if boundary.becomes != NONE_LEFT
+        else f"the nearest boundary of the choice: {boundary.per_cent:+.1f} % of {name}, beyond which {NONE_LEFT}"
+    )
+
+
+def region_lines(regions: Regions) -> Iterator[str]:
+    """`regions` in lines for the terminal: each constant with a boundary of structure or profile, the nearest first."""
+    yield f"  {nearest_boundary(regions)}"
+    bounded = [(r, r.nearest("structure", "profile")) for r in regions.ranges]
+    found = [(r, b) for r, b in bounded if b is not None]
+    for constant, _ in sorted(found, key=lambda pair: abs(math.log(pair[1].factor))):
+        bounds = [b for b in constant.boundaries if b.level != "design"]
+        said = "; ".join(f"{b.per_cent:+.1f} % {b.level} {b.becomes}" for b in bounds)
+        yield f"    {constant.constant:46s} {said}"
+    free = [r.constant for r, b in bounded if b is None]
+    if free:
+        yield f"    none within reach: {'; '.join(free)}"
 
 
 def number(value: float, unit: str = "") -> str:
@@ -81,8 +124,12 @@ def result_lines(result: SearchResult) -> Iterator[str]:
         )
     if gaps := break_evens(result):
         yield f"  {best.structure} stays the choice until what it costs is worth {', '.join(gaps)}"
+    if result.regions is not None:
+        yield from region_lines(result.regions)
     for note in result.notes:
         yield f"  note: {note}"
+    if share := ring_share(baseline):
+        yield f"  of the drive as it is: {share}"
     yield f"  not modelled: {'; '.join(NOT_MODELLED)}"
 
 

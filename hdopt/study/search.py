@@ -111,6 +111,8 @@ class TradeSection(Section):
     """Coefficient of friction of the flanks."""
     notch_factor: Positive = 2.2
     """Notch factor of the bending stress under the teeth."""
+    mean_stress_sensitivity: NotNegative = 0.2
+    """How much of the steady hoop stress counts beside the alternating bending in the safety."""
     wg_tilt_major_over: Literal["bore", "shoulder"] = "bore"
     """What the wave generator's tilt along its major axis is a callout over: its fit on the shaft, whose length follows
     its width, or a shoulder's diameter, which does not. The input axis tilts over its bearings' span."""
@@ -143,8 +145,8 @@ class SearchSection(Section):
     """Drives that make a quantile."""
     front_points: int = Field(default=30, ge=2, le=1000)
     """Points of a front."""
-    perturbation: float = Field(default=0.2, gt=0, lt=1)
-    """By which share constants are changed to see whether the choice stays."""
+    perturbation: float = Field(default=0.5, ge=0.05, le=3)
+    """How far each constant is followed to see where the choice changes: 0.5 is down to 1/1.5 and up to 1.5 times."""
     global_algorithm: str | None = None
     """Name of NLopt's algorithm for the global stage; its own choice if omitted."""
     local_algorithm: str | None = None

@@ -10,6 +10,7 @@ from hdopt.files import write_text
 from hdopt.kinematics.model_error import model_error
 from hdopt.optimize.fronts import Progress
 from hdopt.optimize.records import SearchResult
+from hdopt.optimize.region_maps import find_regions
 from hdopt.optimize.search import search_designs
 from hdopt.study import AnyStudy, Study, as_study
 from hdopt.workflow.output_files import Files, checked_files, write_table_files
@@ -26,20 +27,33 @@ def search(
     progress: Progress = lambda stage: None,
     fronts: bool = True,
     files: Files | None = None,
+    regions: bool = False,
 ) -> SearchResult:
     """Search a study's designs for the best, and for fronts between its two objectives.
 
     `study` is a study, its name or its path; `seed` that of what is done at random; `progress` is told what comes
-    next; without `fronts` only the best design is looked for. An interrupt (Ctrl-C) ends it with the best so far.
-    `files` to write: {"study": PATH} the chosen design as a study, {"csv": PATH} or {"xlsx": PATH} the tables. Raises
-    `HdoptError` before any work where a file cannot be written.
+    next; without `fronts` only the best design is looked for; with `regions` each constant of the trade is followed to
+    where another choice is the better, which takes a few times as long. An interrupt (Ctrl-C) ends it with the best
+    so far. `files` to write: {"study": PATH} the chosen design as a study, {"csv": PATH} or {"xlsx": PATH} the tables.
+    Raises `HdoptError` before any work where a file cannot be written.
     """
     study, wanted = as_study(study), checked_files(files, FILES)
     setup = setup_of(study, seed)
     result = search_designs(setup, seed, progress, fronts=fronts, study=study.name, notes=_notes(study))
     result = replace(result, notes=(*result.notes, *words_on_model(result)))
+    if regions:
+        result = with_regions(result, seed, progress)
     write_search(result, wanted, study)
     return result
+
+
+def with_regions(result: SearchResult, seed: int = 1, progress: Progress = lambda stage: None) -> SearchResult:
+    """A search's `result` with the regions of the trade's constants in which its choice holds; as it is where no design
+    keeps the limits, or the search was interrupted. `seed` and `progress` as in `search`."""
+    if not result.feasible or result.interrupted:
+        return result
+    progress("regions")
+    return replace(result, regions=find_regions(result, seed))
 
 
 def write_search(result: SearchResult, files: Mapping[str, Path], study: Study) -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hdopt.kinematics import peak_to_peak_arcmin
+from hdopt.optimize.constants import constants_of
 from hdopt.optimize.objectives import ROBUST
-from hdopt.optimize.robustness import constants_of, perturb
 from hdopt.report import Figure, Table
 from hdopt.study import load_study
 from hdopt.workflow.search import search, words_on_model
@@ -77,21 +77,10 @@ def test_a_search_says_how_far_its_best_design_is_from_the_exact_geometry(result
     assert said.startswith("the best design: the closed form") and "over 16 drives" in said
 
 
-def test_every_constant_has_a_source_and_is_perturbed(result):
+def test_every_constant_has_a_source(result):
     constants = constants_of(result.setup)
     assert len({constant.name for constant in constants}) == len(constants) > 12
     assert all(c.source.startswith(("cited", "assumed", "the study")) for c in constants)
-    made = perturb(result.setup, result, (0.8,), 1)
-    assert [item.constant for item in made] == [constant.name for constant in constants]
-    regrets = [item.regret for item in made if item.regret is not None]
-    assert min(regrets) > -1e-3  # no design beats the one searched anew
-
-
-def test_more_of_what_limits_never_helps(result):
-    """A fifth more of the safety costs error; an easier limit cannot."""
-    made = {item.constant: item for item in perturb(result.setup, result, (1.2,), 1)}
-    assert made["Limit: Safety against bending fatigue"].objective > result.chosen.objective
-    assert made["Endurance limit"].objective <= result.chosen.objective * (1 + 1e-4)
 
 
 def test_the_chosen_study_file_is_the_chosen_design(study, result, tmp_path):

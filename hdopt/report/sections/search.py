@@ -9,13 +9,15 @@ import pandas as pd
 
 from hdopt.optimize.design_space import VARIABLES
 from hdopt.optimize.objectives import NOMINAL, QUANTITIES, ROBUST, Quantity, find_quantity
-from hdopt.optimize.records import DesignRecord, Front, Perturbation, SearchResult, Verification
-from hdopt.optimize.summary import NOT_MODELLED, break_evens, number
+from hdopt.optimize.records import DesignRecord, Front, SearchResult, Verification
+from hdopt.optimize.region_records import Regions
+from hdopt.optimize.summary import NOT_MODELLED, break_evens, nearest_boundary, number, ring_share
 from hdopt.optimize.views import DesignMap, Rings, TradeViews
 from hdopt.report import Figure, KeyFigures, Section, Table, Text
 from hdopt.report.sections.design_map import Design, design_map, words_on_limits
 from hdopt.report.sections.design_map import Limit as MapLimit
 from hdopt.report.sections.profiles import profiles_section
+from hdopt.report.sections.regions import region_items
 from hdopt.report.sections.words import in_sentence, label, listed
 from hdopt.report.theme import GREY, INK, PALETTE, PAPER, VERMILLION, faded, figure
 
@@ -49,13 +51,13 @@ def trade_sections(
     result: SearchResult,
     views: TradeViews,
     checked: Verification,
-    perturbed: Sequence[Perturbation],
+    regions: Regions,
     file: str,
 ) -> tuple[Section, ...]:
     """All sections of the trade report, in reading order.
 
     `result` is that of the search, `views` its map and rings, `checked` its best design checked by other means,
-    `perturbed` what each constant of the trade changes; `file` is the name of the chosen design's study file.
+    `regions` where it holds; `file` is the name of the chosen design's study file.
     """
     return (
         chosen_section(result, file),
@@ -63,7 +65,7 @@ def trade_sections(
         designs_section(result),
         map_section(result, views.design_map),
         rings_section(result, views.rings),
-        confidence_section(result, checked, perturbed),
+        confidence_section(result, checked, regions),
     )
 
 
@@ -129,6 +131,8 @@ def chosen_section(result: SearchResult, file: str, key: str = "trade-chosen") -
 def _not_modelled(result: SearchResult) -> str:
     """What no formula knows, and how much of it would change the structure that `result` chose."""
     words = f"Not modelled: {'; '.join(NOT_MODELLED)}. Weigh these beside the table."
+    if share := ring_share(result.baseline):
+        words += f" Of the drive as it is: {share}."
     if not (gaps := break_evens(result)):
         return words
     structure = in_sentence(label(result.best.structure))
@@ -444,53 +448,24 @@ def rings_section(result: SearchResult, rings: Rings) -> Section:
 
 
 def confidence_section(
-    result: SearchResult, checked: Verification, perturbed: Sequence[Perturbation], key: str = "trade-confidence"
+    result: SearchResult, checked: Verification, regions: Regions, key: str = "trade-confidence"
 ) -> Section:
-    """The choice of a `result` as `checked` by other means, and `perturbed`: each constant of the trade changed, with
-    what is best then; `key` names the section."""
-    objective = find_quantity(result.objective)
-    share = round(100 * result.setup.settings.perturbation)
+    """The choice of a `result` as `checked` by other means, and the `regions` of the trade's constants in which it
+    holds; `key` names the section."""
     return Section(
         key,
         "How sure the choice is",
         (
             KeyFigures(_checked_figures(checked)),
-            Figure(
-                f"{key}-figure",
-                f"The best {in_sentence(objective.title)} with each constant changed by {share} %",
-                _bars(result, perturbed, objective),
-                "A bar ends at the best value that can be had with the constant changed; vermillion where another "
-                "profile or structure is then the best. Searched anew are combinations within 10 % of the best, and "
-                "all where a constant bears on the lag.",
-            ),
-            Table(
-                f"{key}-perturbed",
-                "Every constant of the trade, its source, and what changing it does",
-                _perturbed(objective, perturbed),
-            ),
+            *region_items(result.best, regions, key),
             Text(
                 f"First-order optimality holds to {result.optimality_residual:.1e} of the objective's slope. "
                 f"Algorithms: {result.algorithm}; {result.evaluations} designs evaluated, {result.impossible} of them "
                 f"impossible; stopped because: {result.stopped_because}."
             ),
         ),
-        _what_changes(share, perturbed),
+        nearest_boundary(regions),
     )
-
-
-def _what_changes(share: int, perturbed: Sequence[Perturbation]) -> str:
-    other = [item for item in perturbed if item.feasible and not item.same_choice]
-    none = [item for item in perturbed if not item.feasible]
-    names = list(dict.fromkeys(item.constant for item in other))
-    verdict = f"Each constant was changed by {share} % to either side and the search repeated. " + (
-        f"The chosen profile and structure change with {listed(list(map(in_sentence, names)))}."
-        if names
-        else "The chosen profile and structure stay the same in every case that has a design at all."
-    )
-    if none:
-        missing = list(dict.fromkeys(f"{in_sentence(i.constant)} times {i.factor:g}" for i in none))
-        verdict += f" No design keeps all limits with {listed(missing)}."
-    return verdict
 
 
 def _checked_figures(checked: Verification) -> dict[str, str]:
@@ -508,50 +483,3 @@ def _checked_figures(checked: Verification) -> dict[str, str]:
     if fresh.searched_arcmin is not None:
         values["in the search"] = f"{fresh.searched_arcmin:.4f} arcmin"
     return values
-
-
-def _perturbed(objective: Quantity, perturbed: Sequence[Perturbation]) -> pd.DataFrame:
-    return pd.DataFrame(
-        [
-            {
-                "constant": item.constant,
-                "value": number(item.value, item.unit),
-                "times": f"{item.factor:g}",
-                "best then": in_sentence(name_of(item.chosen)) if item.feasible else "none keeps all limits",
-                f"{in_sentence(objective.title)} then": number(item.objective, objective.unit)
-                if item.feasible
-                else "–",
-                "today's choice then": _regret(item),
-                "source": item.source,
-            }
-            for item in perturbed
-        ]
-    )
-
-
-def _regret(item: Perturbation) -> str:
-    if not item.feasible:
-        return "–"
-    return "breaks a limit" if item.regret is None else f"{100 * item.regret:.2g} % above the best"
-
-
-def _bars(result: SearchResult, perturbed: Sequence[Perturbation], objective: Quantity) -> go.Figure:
-    base = result.chosen.objective
-    names = list(dict.fromkeys(item.constant for item in perturbed))
-    made = figure(_axis(objective), "", height=110 + 22 * len(names), barmode="overlay", showlegend=True)
-    for factor, colour in zip(sorted({item.factor for item in perturbed}), (PALETTE[0], PALETTE[5]), strict=False):
-        items = [item for item in perturbed if item.factor == factor and item.feasible]
-        made.add_bar(
-            y=[item.constant for item in items],
-            x=[item.objective - base for item in items],
-            base=base,
-            orientation="h",
-            name=f"times {factor:g}",
-            marker={"color": [colour if item.same_choice else VERMILLION for item in items]},
-            text=[f"{item.objective:.4f}: {in_sentence(name_of(item.chosen))}" for item in items],
-            textposition="none",
-            hovertemplate="%{y} times " + f"{factor:g}" + "<br>%{text}<extra></extra>",
-        )
-    made.add_vline(x=base, line={"color": INK, "width": 1})
-    made.update_yaxes(autorange="reversed")
-    return made

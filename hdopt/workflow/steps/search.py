@@ -6,8 +6,7 @@ from dataclasses import replace
 
 from hdopt.files import write_text
 from hdopt.optimize.records import SearchResult
-from hdopt.optimize.robustness import perturb
-from hdopt.optimize.summary import chosen_words, design_words
+from hdopt.optimize.summary import chosen_words, design_words, nearest_boundary
 from hdopt.optimize.views import trade_views
 from hdopt.report import Download, Section, Text
 from hdopt.report.sections.search import trade_sections
@@ -19,28 +18,26 @@ from hdopt.workflow.write_design import chosen_study_toml
 
 
 def search(study: Study, context: Context) -> StepResult:
-    """Best design of the `study`, fronts, its price, its verification and every constant perturbed; names the choice
-    and writes its study file to the folder of the `context`."""
-    result = search_designs(study, context.seed)
-    if not result.feasible:
+    """Best design of the `study`, fronts, its price, its verification and the regions in which it holds; names the
+    choice and writes its study file to the folder of the `context`."""
+    result = search_designs(study, context.seed, regions=True)
+    if not result.feasible or result.regions is None:
         return _no_design(study, result)
-    share = result.setup.settings.perturbation
     checked = verify(study, result, context.seed)
-    perturbed = perturb(result.setup, result, (1 - share, 1 + share), context.seed)
     file = context.folder / f"{study.name}-chosen.toml"
     text = chosen_study_toml(study, result)
     write_text(file, text)
     results = result.to_dict() | {
         "verification": checked.to_dict(),
-        "perturbations": [item.to_dict() for item in perturbed],
         "chosen_study": file.name,
     }
-    first, *others = trade_sections(result, trade_views(result), checked, perturbed, file.name)
+    first, *others = trade_sections(result, trade_views(result), checked, result.regions, file.name)
     notes = tuple(Text(f"{note[:1].upper()}{note[1:]}.") for note in result.notes)
     chosen = Download(file.name, text, "The study file of the chosen design, for every other command.")
     sections = (replace(first, items=(*notes, *first.items, chosen)), *others)
     says = (
         f"chosen wave generator: {chosen_words(result)}",
+        nearest_boundary(result.regions),
         f"study file: {file}  (hdopt export {file} --step wg.step)",
     )
     return StepResult(sections, results, (file,), says)

@@ -1,4 +1,4 @@
-"""How sure a choice is: every constant of the trade perturbed, and the search repeated."""
+"""The constants of the trade: value, unit, where each comes from, and the search with one of them changed."""
 
 from __future__ import annotations
 
@@ -7,16 +7,8 @@ from dataclasses import dataclass, replace
 
 from hdopt.drive.geometry import Drive
 from hdopt.mechanics.bearing_life import SOURCES
-from hdopt.optimize.evaluation import record_of
 from hdopt.optimize.objectives import find_quantity
-from hdopt.optimize.records import Perturbation, SearchResult, choose
-from hdopt.optimize.search import method_of
 from hdopt.optimize.setup import Setup, with_trade
-from hdopt.optimize.solve import Solution, solve
-
-CONTENDERS = 0.1
-"""Combinations within this share of the best are searched anew under every perturbed constant; so are all of them
-where a constant bears on the lag, the one quantity besides the error itself that the structure decides."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +42,13 @@ def constants_of(setup: Setup) -> list[Constant]:
             "",
             "assumed: upper end of the 1.7 to 2.2 that handbooks give for flexspline teeth",
         ),
+        _trade(
+            "Sensitivity to the mean stress",
+            "mean_stress_sensitivity",
+            trade.mean_stress_sensitivity or None,
+            "",
+            "assumed: 0.2, of the size that handbooks give for alloyed steel; not checked against a source",
+        ),
     ]
     if drive.geometry.flexspline_wall is not None:
         found.append(Constant("Flexspline wall", drive.geometry.flexspline_wall, "mm", "assumed", _wall))
@@ -66,50 +65,6 @@ def constants_of(setup: Setup) -> list[Constant]:
                 Constant(f"Limit: {find_quantity(key).title}", given.bound, words, "the study's choice", _limit(key))
             )
     return [constant for constant in found if constant is not None]
-
-
-def perturb(setup: Setup, result: SearchResult, factors: tuple[float, float], seed: int) -> list[Perturbation]:
-    """Each constant of `setup` times each of `factors`, every combination searched anew, with `seed`, from where it
-    stands in `result`."""
-    method = method_of(setup, seed)
-    made = []
-    for constant in constants_of(setup):
-        for factor in factors:
-            changed = constant.scaled(setup, factor)
-            solved = []
-            for solution in contenders(result, constant):
-                start = solution.values
-                solved.append(solve(changed.problem(solution.combination), method, [start]))
-            best = choose(solved)
-            now = changed.problem(best.combination)
-            kept = now.space.design(result.chosen.combination, result.chosen.values)
-            broken = any(
-                x.excess(find_quantity(x.quantity).value(changed.trade, kept)) > 1e-4 for x in changed.limits()
-            )
-            value = find_quantity(setup.settings.objective).value(changed.trade, kept)
-            made.append(
-                Perturbation(
-                    constant.name,
-                    constant.value,
-                    constant.unit,
-                    constant.source,
-                    factor,
-                    record_of(changed, best),
-                    best.feasible,
-                    best.objective,
-                    best.combination == result.chosen.combination,
-                    None if broken else value / best.objective - 1,
-                )
-            )
-    return made
-
-
-def contenders(result: SearchResult, constant: Constant) -> list[Solution]:
-    """The combinations of `result` that a changed `constant` could make the best."""
-    if "Backlash" in constant.name or "lag" in constant.name.split():
-        return list(result.solutions)
-    reach = (1 + CONTENDERS) * result.chosen.objective
-    return [s for s in result.solutions if (s.feasible and s.objective <= reach) or not result.feasible]
 
 
 def _bearing(name: str, field: str, value: float, unit: str) -> Constant:
