@@ -46,6 +46,7 @@ def run_case(seed: int, effect: str, severity: float, drive: Drive) -> Case | No
     from hdopt.bench import cases
     from hdopt.bench.instrument import record
     from hdopt.bench.signal_chain import read_angles, read_error
+    from hdopt.compensation.path import path_of
     from hdopt.recordings.read import recording_from_table
     from hdopt.recordings.rows import gather, neighbours_for
     from hdopt.workflow.compensate import compensate
@@ -69,8 +70,7 @@ def run_case(seed: int, effect: str, severity: float, drive: Drive) -> Case | No
     neighbours = neighbours_for(seen)
     rows = gather([fresh], neighbours)
     left = gather([replace(fresh, error_arcmin=fresh.error_arcmin - truth)], neighbours)
-    direction = rows.direction if rows.reverses else 0.0
-    after = rows.error - made.found.at(rows.theta, rows.theta / rows.ratio, direction)
+    after = rows.error - made.found.at(rows.theta, rows.theta / rows.ratio, path_of(rows, made.found.crossing_deg))
     return Case(
         seed,
         effect,

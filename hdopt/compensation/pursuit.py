@@ -42,9 +42,9 @@ def pursue(
 ) -> Harmonics:
     """At most `terms` harmonics of `residual` (n,) arcmin over input and output `angles`, both (n,) rad.
 
-    `pairs` are the (k, j) to try. `zeros` (n, q) are columns that are free anyway; `direction` (n,) +1/-1 gives a
-    return error, None none. Effective independent values are counted by the first autocorrelation of what is left, so
-    that coloured noise is not taken for harmonics.
+    `pairs` are the (k, j) to try. `zeros` (n, q) are columns that are free anyway; `direction` (n,) +1/-1, or the path
+    between, gives a return error, None none. Effective independent values are counted by the first autocorrelation of
+    what is left, so that coloured noise is not taken for harmonics.
     """
     free = zeros if direction is None else np.column_stack([zeros, direction])
     stride = max(1, len(residual) // CELLS)
@@ -66,7 +66,7 @@ def pursue(
             break
         after = left - part @ (part.T @ left)
         gain = len(y) * math.log(max(float(left @ left), 1e-300) / max(float(after @ after), 1e-300))
-        if gain * _effective(after) < 2 * math.log(len(y)) + 2 * math.log(len(pairs)):
+        if gain * independent_share(after) < 2 * math.log(len(y)) + 2 * math.log(len(pairs)):
             break
         chosen.append(best)
         basis = np.column_stack([basis, part])
@@ -74,8 +74,8 @@ def pursue(
     return _fitted(angles, residual, zeros, direction, [pairs[c] for c in chosen])
 
 
-def _effective(left: Array) -> float:
-    """Share of independent values in what is left: (1 - r)/(1 + r) by its first autocorrelation r."""
+def independent_share(left: Array) -> float:
+    """Share of independent values in what is `left` (n,): (1 - r)/(1 + r) by its first autocorrelation r."""
     r = float(left[1:] @ left[:-1]) / max(float(left @ left), 1e-300)
     return (1 - min(max(r, 0.0), 0.98)) / (1 + min(max(r, 0.0), 0.98))
 

@@ -22,19 +22,22 @@ of an amplitude of order 4."""
 @dataclass(frozen=True)
 class Harmonics:
     """Terms c cos(k a + j b) + s sin(k a + j b), arcmin: `k` and `j` (m,) whole, `cos` and `sin` (m,); `back` is half
-    the return error, added forward and taken away backward."""
+    the return error, added forward and taken away backward, once it has crossed over `crossing_deg` of output after a
+    reversal (0: at once; `hdopt.compensation.path`)."""
 
     k: Index
     j: Index
     cos: Array
     sin: Array
     back: float = 0.0
+    crossing_deg: float = 0.0
 
     def __len__(self) -> int:
         return len(self.k)
 
     def at(self, inputs: Array, outputs: Array, direction: Array | float = 0.0) -> Array:
-        """Error (arcmin, n) at input and output angles `inputs`, `outputs` (n,) rad and `direction` +1, -1 or 0."""
+        """Error (arcmin, n) at input and output angles `inputs`, `outputs` (n,) rad and `direction` +1, -1, 0 or the
+        path between (`path_of`)."""
         value = np.zeros(np.shape(inputs)) + self.back * np.asarray(direction)
         for k, j, c, s in zip(self.k, self.j, self.cos, self.sin, strict=True):
             phase = k * inputs + j * outputs
@@ -44,10 +47,12 @@ class Harmonics:
 
 @dataclass(frozen=True)
 class Surface:
-    """The error on an even grid, `values` (n_input, n_output) arcmin, mean zero; `back` as in `Harmonics`."""
+    """The error on an even grid, `values` (n_input, n_output) arcmin, mean zero; `back` and `crossing_deg` as in
+    `Harmonics`."""
 
     values: Array
     back: float = 0.0
+    crossing_deg: float = 0.0
 
     def at(self, inputs: Array, outputs: Array, direction: Array | float = 0.0) -> Array:
         """Error (arcmin, n) by straight lines between grid points at `inputs`, `outputs` (n,) rad and `direction`."""
@@ -72,7 +77,9 @@ class Surface:
         found = spectrum[upper]
         keep = np.argsort(-np.abs(found), kind="stable")[:terms]
         chosen = found[keep]
-        return Harmonics(k[upper][keep], j[upper][keep], 2 * chosen.real, -2 * chosen.imag, self.back)
+        return Harmonics(
+            k[upper][keep], j[upper][keep], 2 * chosen.real, -2 * chosen.imag, self.back, self.crossing_deg
+        )
 
 
 def grid_angles() -> tuple[Array, Array]:
@@ -83,10 +90,13 @@ def grid_angles() -> tuple[Array, Array]:
     return np.asarray(inputs, float), np.asarray(outputs, float)
 
 
-def surface_of(parts: Sequence[Harmonics], base: Array | None = None, back: float = 0.0) -> Surface:
-    """The sum of `parts` on the grid, with a `base` already there (n_input, n_output); `back` half a return error."""
+def surface_of(
+    parts: Sequence[Harmonics], base: Array | None = None, back: float = 0.0, crossing_deg: float = 0.0
+) -> Surface:
+    """The sum of `parts` on the grid, with a `base` already there (n_input, n_output); `back` half a return error and
+    `crossing_deg` the output's travel over which it crosses."""
     inputs, outputs = grid_angles()
     values = np.zeros(inputs.shape) if base is None else np.asarray(base, float).copy()
     for part in parts:
         values += part.at(inputs.ravel(), outputs.ravel()).reshape(values.shape)
-    return Surface(values - values.mean(), back)
+    return Surface(values - values.mean(), back, crossing_deg)

@@ -20,6 +20,7 @@ def written(found: Harmonics | Surface, form: str, facts: Mapping[str, Any]) -> 
 def _csv(found: Harmonics | Surface, facts: Mapping[str, Any]) -> str:
     head = [f"# {key}: {str(value).replace(chr(10), ' ')}" for key, value in facts.items()]
     head.append(f"# half_return_arcmin: {found.back!r}")
+    head.append(f"# return_crossing_output_deg: {found.crossing_deg!r}")
     if isinstance(found, Harmonics):
         rows = ["k_input,j_output,cos_arcmin,sin_arcmin"]
         rows += [f"{k},{j},{c!r},{s!r}" for k, j, c, s in _terms(found)]
@@ -39,6 +40,7 @@ def _terms(found: Harmonics) -> list[tuple[int, int, float, float]]:
 
 def _json(found: Harmonics | Surface, facts: Mapping[str, Any]) -> str:
     content: dict[str, Any] = {"schema": 1, **facts, "half_return_arcmin": found.back}
+    content["return_crossing_output_deg"] = found.crossing_deg
     if isinstance(found, Harmonics):
         content["terms"] = [{"k": k, "j": j, "cos_arcmin": c, "sin_arcmin": s} for k, j, c, s in _terms(found)]
     else:
@@ -51,8 +53,17 @@ FUNCTION = "hdopt_error_arcmin"
 _HEAD = """/* Kinematic error of a drive, to be subtracted: output = input/N - error.
 {facts}
    input_rad from the zero of the recording's input count, output_rad = input_rad/N counted on;
-   direction: +1 forward, -1 backward, 0 neither. */
+   path: the side of the return error, +1 forward, -1 backward, 0 unknown; keep it, and after each move call
+   path = hdopt_path(path, output_moved_rad), which crosses over {crossing!r} deg of output after a reversal. */
 #include <math.h>
+
+double hdopt_path(double path, double output_moved_rad)
+{{
+    if (output_moved_rad == 0)
+        return path;
+    double side = output_moved_rad > 0 ? 1 : -1;
+    return side + (path - side) * {remains};
+}}
 """
 
 _C_TERMS = """
@@ -62,9 +73,9 @@ static const int hdopt_j[] = {{{j}}};
 static const double hdopt_cos[] = {{{cos}}};
 static const double hdopt_sin[] = {{{sin}}};
 
-double hdopt_error_arcmin(double input_rad, double output_rad, int direction)
+double hdopt_error_arcmin(double input_rad, double output_rad, double path)
 {{
-    double error = direction * ({back});
+    double error = path * ({back});
     for (int i = 0; i < HDOPT_TERMS; i++) {{
         double phase = hdopt_k[i] * input_rad + hdopt_j[i] * output_rad;
         error += hdopt_cos[i] * cos(phase) + hdopt_sin[i] * sin(phase);
@@ -80,7 +91,7 @@ static const double hdopt_table[HDOPT_INPUTS][HDOPT_OUTPUTS] = {{
 {rows}
 }};
 
-double hdopt_error_arcmin(double input_rad, double output_rad, int direction)
+double hdopt_error_arcmin(double input_rad, double output_rad, double path)
 {{
     const double turn = 6.283185307179586476925;
     double x = input_rad / turn, y = output_rad / turn;
@@ -91,14 +102,17 @@ double hdopt_error_arcmin(double input_rad, double output_rad, int direction)
     int i0 = i % HDOPT_INPUTS, i1 = (i + 1) % HDOPT_INPUTS, j0 = j % HDOPT_OUTPUTS, j1 = (j + 1) % HDOPT_OUTPUTS;
     double low = hdopt_table[i0][j0] * (1 - p) + hdopt_table[i1][j0] * p;
     double high = hdopt_table[i0][j1] * (1 - p) + hdopt_table[i1][j1] * p;
-    return low * (1 - q) + high * q + direction * ({back});
+    return low * (1 - q) + high * q + path * ({back});
 }}
 """
 
 
 def _c(found: Harmonics | Surface, facts: Mapping[str, Any]) -> str:
     said = "\n".join(f"   {key}: {value}" for key, value in facts.items()).replace("*/", "* /")
-    head = _HEAD.format(facts=said)
+    # Crossing at once leaves nothing of the old side, however small the move.
+    turn = math.radians(found.crossing_deg)
+    remains = f"exp(-fabs(output_moved_rad) / {turn!r})" if turn > 0 else "0"
+    head = _HEAD.format(facts=said, crossing=found.crossing_deg, remains=remains)
     if isinstance(found, Harmonics):
         numbers = {name: _list(getattr(found, name).tolist()) for name in ("cos", "sin", "k", "j")}
         return head + _C_TERMS.format(count=len(found), back=repr(found.back), **numbers)

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any  # Any: values of JSON
 import numpy as np
 
 from hdopt.arrays import Array, Index, Mask
-from hdopt.compensation.pursuit import dictionary, pursue
+from hdopt.compensation.path import AT_ONCE, crossing_of, half_return, path_of, paths_of, some_of
+from hdopt.compensation.pursuit import dictionary, independent_share, pursue
 from hdopt.compensation.surface import Harmonics, Surface, grid_angles, surface_of
 from hdopt.compensation.writers import FORMATS, homing_arcmin, written
 from hdopt.drive.geometry import Drive
@@ -105,6 +106,7 @@ class Compensated:
                 "high": self.high,
             },
             "directions": self.both,
+            "return": {"half_arcmin": self.found.back, "crossing_output_deg": self.found.crossing_deg},
             "recordings": [vars(part) for part in self.recordings],
             "held_out": self.held_out,
             "evidence": self.evidence,
@@ -201,14 +203,16 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
         whole = fit_rows(rows, drive, seed, sign)
         sign = (whole.sign,)
     fold, held_out = _folds(rows)
-    trials = _trials(rows, fold, terms, lambda train: None if drive is None else fit_rows(train, drive, seed, sign))
+    paths = paths_of(rows)
+    trials = _trials(
+        (rows, fold), terms, paths, lambda train: None if drive is None else fit_rows(train, drive, seed, sign)
+    )
     before = _centred(rows.error, rows, fold)
     nested, method = _choose(trials, fold)
-    found = _candidates(rows, whole, terms)[method]
+    found = _candidates(rows, whole, terms, paths)[method]
     worth, evidence = _worth(before, nested, rows)
     # Parts of one recording are extrapolated in angle when held out; a fresh run over the same angles is not.
-    everywhere = np.ones(len(rows), bool)
-    again = _centred(rows.error - _at(found, rows, everywhere), rows, np.zeros_like(fold))
+    again = _centred(rows.error - _at(found, rows), rows, np.zeros_like(fold))
     predicted, low, high = _predicted(again if rows.records == 1 else trials[method], rows, seed)
     ways = {"forward": 1.0, "backward": -1.0} if rows.reverses else {}
     return Compensated(
@@ -231,14 +235,17 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
     )
 
 
-def _trials(rows: Rows, fold: Index, terms: int, fit: Callable[[Rows], WaveformFit | None]) -> dict[str, Array]:
-    """What each way leaves (n,) on every part, fitted to the others."""
+def _trials(
+    split: tuple[Rows, Index], terms: int, paths: Mapping[float, Array], fit: Callable[[Rows], WaveformFit | None]
+) -> dict[str, Array]:
+    """What each way leaves (n,) on every part, fitted to the others; `split` is the rows and the part of each."""
+    rows, fold = split
     trials: dict[str, Array] = {}
     for k in range(int(fold.max()) + 1):
         train, test = _rows(rows, fold != k), fold == k
-        for name, found in _candidates(train, fit(train), terms).items():
+        for name, found in _candidates(train, fit(train), terms, some_of(paths, fold != k)).items():
             left = trials.setdefault(name, np.full(len(rows), np.nan))
-            left[test] = rows.error[test] - _at(found, rows, test)
+            left[test] = rows.error[test] - _at(found, rows)[test]
     return {name: _centred(left, rows, fold) for name, left in trials.items()}
 
 
@@ -262,27 +269,41 @@ def _rows(rows: Rows, mask: Mask) -> Rows:
     return replace(part, record=np.unique(part.record, return_inverse=True)[1])
 
 
-def _candidates(rows: Rows, fit: WaveformFit | None, terms: int) -> dict[str, Found]:
-    """Every way to compensate, fitted to `rows`, in the form that will be written."""
-    outputs = rows.theta / rows.ratio
+def _candidates(rows: Rows, fit: WaveformFit | None, terms: int, paths: Mapping[float, Array]) -> dict[str, Found]:
+    """Every way to compensate, fitted to `rows`, in the form that will be written; `paths` are those that the return
+    error may take along them."""
+    angles = (rows.theta, rows.theta / rows.ratio)
     zeros = (rows.record[:, None] == np.arange(rows.records)).astype(float)
     if rows.span_turns >= 0.5 * rows.ratio:
         zeros = np.column_stack([zeros, (rows.theta - rows.theta.mean()) / TURN])
-    direction = rows.direction if rows.reverses else None
     pairs = dictionary(rows.span_turns / rows.ratio)
     most = terms or MOST_TERMS
-    alone = pursue((rows.theta, outputs), rows.error, zeros, direction, pairs, most)
-    made: dict[str, Found] = {"harmonics": alone if terms else surface_of([alone], back=alone.back)}
+    alone = pursue(angles, rows.error, zeros, paths.get(AT_ONCE), pairs, most)
+    crossing = _crossing(rows.error - alone.at(*angles), zeros, paths)
+    path = paths.get(crossing)
+    if crossing:
+        alone = replace(pursue(angles, rows.error, zeros, path, pairs, most), crossing_deg=crossing)
+    made: dict[str, Found] = {"harmonics": alone if terms else surface_of([alone], None, alone.back, crossing)}
     if fit is None:
         return made
     base = _model_surface(fit)
-    left = rows.error - base.at(rows.theta, outputs)
-    rest = pursue((rows.theta, outputs), left, zeros, direction, pairs, most // 2)
-    both = surface_of([rest], base.values, rest.back)
-    model = replace(base, back=fit.back_arcmin)
+    left = rows.error - base.at(*angles)
+    rest = pursue(angles, left, zeros, path, pairs, most // 2)
+    both = surface_of([rest], base.values, rest.back, crossing)
+    back = 0.0 if path is None else half_return(left, zeros, path)
+    model = replace(base, back=back, crossing_deg=crossing)
     made["model"] = model.harmonics(terms) if terms else model
     made["model and harmonics"] = both.harmonics(terms) if terms else both
     return made
+
+
+def _crossing(left: Array, zeros: Array, paths: Mapping[float, Array]) -> float:
+    """The output's travel (deg) over which the return error in what is `left` crosses after a reversal."""
+    if not paths:
+        return AT_ONCE
+    columns = np.column_stack([zeros, paths[AT_ONCE]])
+    rest = left - columns @ np.linalg.lstsq(columns, left, rcond=1e-8)[0]
+    return crossing_of(left, zeros, paths, independent_share(rest))
 
 
 def _model_surface(fit: WaveformFit) -> Surface:
@@ -294,9 +315,9 @@ def _model_surface(fit: WaveformFit) -> Surface:
     return Surface(values - values.mean())
 
 
-def _at(found: Found, rows: Rows, mask: Mask) -> Array:
-    theta = rows.theta[mask]
-    return found.at(theta, theta / rows.ratio, rows.direction[mask] if rows.reverses else 0.0)
+def _at(found: Found, rows: Rows) -> Array:
+    """What `found` says of all `rows` (n,): the path since a reversal needs those before."""
+    return found.at(rows.theta, rows.theta / rows.ratio, path_of(rows, found.crossing_deg))
 
 
 def _centred(values: Array, rows: Rows, fold: Index) -> Array:

@@ -1,5 +1,7 @@
 """`hdopt compensate`: what it leaves on a fresh run, what its C code computes, and that it refuses noise."""
 
+import ctypes
+import itertools
 import json
 import shutil
 import subprocess
@@ -9,6 +11,7 @@ import pandas as pd
 import pytest
 
 from hdopt.cli import main
+from hdopt.compensation.path import path_of
 from hdopt.compensation.surface import Harmonics, surface_of
 from hdopt.compensation.writers import written
 from hdopt.drive.errors import DriveErrors
@@ -145,6 +148,66 @@ def test_command_writes_every_form(tmp_path, capsys, form):
     assert {"csv": "k_input,j_output", "json": '"terms"', "c": "hdopt_error_arcmin"}[form] in text
     assert "home both shafts" in text and "void after" in text
     assert "home both shafts" in capsys.readouterr().out
+
+
+def swinging(seed, crossing_deg, half=0.1, strokes=30):
+    """Strokes of 8 to 24 input turns there and back; friction's state lags by `crossing_deg` of output, stepped here
+    sample by sample, the noise a tenth of it."""
+    rng = np.random.default_rng(seed)
+    ends = np.cumsum(np.resize([1, -1], strokes) * rng.uniform(8, 24, strokes)) * TURN
+    theta = np.concatenate([np.arange(a, b, np.sign(b - a) * TURN / 40) for a, b in itertools.pairwise([0, *ends])])
+    moved = np.diff(theta, prepend=theta[0] - 1e-3) / RATIO
+    state = np.empty(len(theta))
+    last = np.sign(moved[0])
+    for n, step in enumerate(moved):
+        side = np.sign(step)
+        last = side + (last - side) * np.exp(-abs(np.degrees(step)) / crossing_deg) if crossing_deg else side
+        state[n] = last
+    error = 0.3 * np.sin(2 * theta) + half * state + rng.normal(0, NOISE, len(theta))
+    frame = pd.DataFrame(
+        {"input_angle_deg": np.degrees(theta), "output_angle_deg": np.degrees(theta) / RATIO - error / 60}
+    )
+    return recording_from_table(frame, RATIO)
+
+
+def test_the_path_after_a_reversal_is_compensated():
+    """Friction that crosses over 20 deg of output, on strokes of 36 to 108: a table by direction alone leaves half the
+    loop near each reversal. The crossings tried lie up to 1.7 apart."""
+    made = compensate([swinging(seed, 20.0) for seed in (1, 2)])
+    assert made.found.crossing_deg == pytest.approx(20.0, rel=0.35)
+    assert made.found.back == pytest.approx(0.1, rel=0.1)
+    fresh = gather([swinging(3, 20.0)])
+    left = fresh.error - made.found.at(fresh.theta, fresh.theta / RATIO, path_of(fresh, made.found.crossing_deg))
+    plain = fresh.error - made.found.at(fresh.theta, fresh.theta / RATIO, fresh.direction)
+    assert np.std(left) < 1.3 * NOISE < 0.5 * np.std(plain)
+
+
+def test_play_crosses_at_once():
+    """Would catch a crossing that is named where there is none."""
+    made = compensate([swinging(seed, 0.0) for seed in (1, 2)])
+    assert made.found.crossing_deg == 0
+    assert made.found.back == pytest.approx(0.1, abs=0.002)
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+@pytest.mark.parametrize("crossing_deg", [0.0, 20.0])
+def test_the_controllers_path_is_ours(tmp_path, crossing_deg):
+    """The state that the C code keeps, move by move both ways, is the path along a recording: to 0.02, as rows at a
+    turning point are means of both ways and their travel is so far off."""
+    rows = gather([swinging(5, 20.0)])
+    found = Harmonics(np.array([2]), np.array([0]), np.array([0.3]), np.array([0.0]), 0.1, crossing_deg)
+    (tmp_path / "c.c").write_text(written(found, "c", {}))
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", "c.so", "c.c", "-lm"], cwd=tmp_path, check=True)
+    step = ctypes.CDLL(str(tmp_path / "c.so")).hdopt_path
+    step.restype, step.argtypes = ctypes.c_double, [ctypes.c_double] * 2
+    reach = rows.theta / RATIO
+    state, kept = 1.0, [1.0]
+    for moved in np.diff(reach):
+        state = step(state, moved)
+        kept.append(state)
+    ours = path_of(rows, crossing_deg)
+    inside = np.r_[False, np.diff(rows.direction) == 0]  # a row at a turning point is the mean of both ways
+    np.testing.assert_allclose(np.array(kept)[inside], ours[inside], atol=0.02)
 
 
 def test_terms_out_of_range(drive):

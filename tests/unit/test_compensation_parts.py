@@ -83,7 +83,7 @@ def test_the_controllers_code_computes_the_same(found, tmp_path):
     source.write_text(written(found, "c", {"drive": "test"}))
     subprocess.run(["cc", "-O1", "-shared", "-fPIC", "-o", library, source, "-lm"], check=True)
     function = ctypes.CDLL(str(library)).hdopt_error_arcmin
-    function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double, ctypes.c_double, ctypes.c_int]
+    function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double] * 3
     for a, b in zip(A[:40], B[:40], strict=True):
         for way in (1, -1):
             expected = float(found.at(np.array([a]), np.array([b]), way)[0])

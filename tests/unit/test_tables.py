@@ -216,7 +216,8 @@ def test_the_cloud_of_the_explorer_is_in_study_units(tmp_path):
     for _, row in cloud.head(3).iterrows():
         drive = hdopt.load_study("csf-25-80").with_({"errors": dict(row.drop("peak_to_peak_arcmin"))})
         assert hdopt.kinematic_error(drive, method="closed form").peak_to_peak_arcmin == pytest.approx(
-            row["peak_to_peak_arcmin"], abs=1e-6  # the kernel's own promise
+            row["peak_to_peak_arcmin"],
+            abs=1e-6,  # the kernel's own promise
         )
 
 

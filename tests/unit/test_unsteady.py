@@ -50,9 +50,7 @@ def fit_of(error):
     samples = gather([record(error)])
     problem = FitProblem(samples, None, np.ones((len(samples), 1)), Noise.white(samples, float(np.std(error))))
     bare = refine(evaluate(problem, np.zeros(0), np.zeros(1), (), ()))
-    return evaluate(
-        problem.with_noise(noise_model.estimate(samples, bare.residual)), np.zeros(0), bare.offsets, (), ()
-    )
+    return evaluate(problem.with_noise(noise_model.estimate(samples, bare.residual)), np.zeros(0), bare.offsets, (), ())
 
 
 def coloured(rng, pole=0.6, size=0.02):
