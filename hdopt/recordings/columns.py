@@ -119,7 +119,46 @@ def choose_columns(table: Table, name: str) -> tuple[dict[str, Column], list[str
             f"{name}: {wanted}; the columns are {', '.join(known[:12])}{' ...' if len(known) > 12 else ''}\n"
             "say which is which with --columns input=NAME:UNIT,output=NAME:UNIT,time=NAME:UNIT (or error= for output=)"
         )
-    return found, [f"{channel} is taken from {column.name!r} by its name" for channel, column in found.items()]
+    return found, [_by_name(channel, column) for channel, column in found.items()]
+
+
+def _by_name(channel: str, column: Column) -> str:
+    return f"{channel} is taken from {column.name!r} by its name"
+
+
+def default_columns(table: Table) -> tuple[dict[str, Column], list[str]]:
+    """The default layout of a `table` that has its angles, and sentences on what was found beside them: time, torque
+    and temperature under other names, where one column's name and unit say them. Without them the recording can be
+    read, so that nothing is asked for."""
+    layout = parse_columns(None)
+    found: dict[str, Column] = {}
+    for channel in ("time", "torque", "temperature"):
+        if layout[channel].name in table.channels:
+            continue
+        fits = [column for column in table.channels if _speaks_of(column, NAME_PATTERNS[channel])]
+        if len(fits) == 1 and (_unit_stated(channel, fits[0], table) or _runs(channel, table, fits[0])):
+            found[channel] = Column(fits[0])
+    return layout | found, [_by_name(channel, column) for channel, column in found.items()]
+
+
+def _unit_stated(channel: str, column: str, table: Table) -> str:
+    """The unit that the file or the column's own name states; empty where neither does."""
+    source = table.channels.get(column)
+    return (stated_unit(channel, source.unit) if source is not None and source.unit else "") or unit_in_name(
+        channel, column
+    )
+
+
+def _runs(channel: str, table: Table, column: str) -> bool:
+    """Whether the column is a clock that goes on: the day of a recording is none."""
+    values = table.channels[column].values
+    return _is_clock(channel, table, column) and len(values) > 0 and bool(values[0] != values[-1])
+
+
+def _is_clock(channel: str, table: Table, column: str) -> bool:
+    """Whether the column holds times of day, whose resolution the file knows."""
+    source = table.channels.get(column)
+    return channel == "time" and source is not None and source.values.dtype.kind in "mMOUS"
 
 
 def _speaks_of(column: str, pattern: str) -> bool:
@@ -159,7 +198,7 @@ def with_units(
         by_file = stated_unit(channel, source.unit) if source is not None and source.unit else ""
         by_name = unit_in_name(channel, column.name)
         stated = by_file or by_name
-        is_clock = channel == "time" and source is not None and source.values.dtype.kind in "mMOUS"
+        is_clock = _is_clock(channel, table, column.name)
         unit = column.unit or stated or ("s" if is_clock else "")
         if not unit:
             open_units.append(f"{channel}={column.name}:UNIT")

@@ -114,6 +114,26 @@ def test_dates_of_any_resolution_are_seconds(truth, tmp_path, unit):
     assert any("dates" in said for said in recording.understood)
 
 
+@pytest.mark.parametrize(
+    ("name", "taken"), [("time", True), ("Zeit [ms]", True), ("date", False), ("time_of_day", False)]
+)
+def test_a_clock_of_another_name_beside_the_default_angles_is_taken(truth, tmp_path, name, taken):
+    """Would catch a recording read without its clock because its angles alone bear the default names."""
+    time, theta, output = truth
+    clock = {
+        "time": pd.Timestamp("2025-01-01") + pd.to_timedelta(time, unit="s"),
+        "Zeit [ms]": 1000 * time,
+        "date": "2025-01-01",
+        "time_of_day": time,  # of no unit: without it the file can be read, so nothing is asked
+    }[name]
+    angles = pd.DataFrame({"input_angle_deg": np.degrees(theta), "output_angle_deg": np.degrees(output)})
+    angles.assign(**{name: clock}).to_parquet(tmp_path / "r.parquet")
+    found = read_recording(tmp_path / "r.parquet", RATIO)
+    assert (found.time is not None) == taken
+    if taken:
+        np.testing.assert_allclose(found.time - found.time[0], time - time[0], atol=1e-6)
+
+
 def test_counts_gear_and_turns(truth, tmp_path):
     """An encoder of 16384 counts behind a gear of 3 on the input, the output in turns, both beyond one overflow."""
     time, theta, output = truth
@@ -218,6 +238,8 @@ def test_mcap_with_json(truth, tmp_path):
             writer.add_message(channel, ns, json.dumps({"in": a, "enc": {"out": b}}).encode(), ns)
         writer.finish()
     same(read_recording(tmp_path / "bench.mcap", RATIO, "input=/rig.in:rad,output=/rig.enc.out:rad"), truth)
+    with pytest.raises(HdoptError, match=r"unknown column for input '/rig/in'; did you mean '/rig\.in'"):
+        read_recording(tmp_path / "bench.mcap", RATIO, "input=/rig/in:rad,output=/rig/enc/out:rad")
 
 
 def test_mdf(truth, tmp_path):
