@@ -212,4 +212,4 @@ def _batch_lines(batch: Batch) -> Iterator[str]:
         p = batch.performance
         yield f"Ppk {p.ppk:.3g} ({p.low:.3g} to {p.high:.3g}), {p.n} drives, limit {batch.limit:g} arcmin"
     elif batch.limit is not None:
-        yield "Ppk: too few drives (8 at least)"
+        yield "Ppk: not known, too few drives (8 at least) or no two that differ"

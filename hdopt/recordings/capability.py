@@ -27,14 +27,15 @@ class Performance:
 
 
 def performance(values: Sequence[float], limit: float, seed: int = 1) -> Performance | None:
-    """Ppk of positive `values` against an upper `limit`; None below eight drives.
+    """Ppk of positive `values` against an upper `limit`; None below eight drives, and where all are alike: without any
+    scatter nothing is said of the next drive.
 
     (U - X50)/(X99.865 - X50) of a log-normal distribution fitted to the values: a peak-to-peak is positive and skewed.
     The interval is a parametric bootstrap of 2000 draws from `seed`.
     """
     log = np.log(np.asarray(values, float))
     n = len(log)
-    if n < FEWEST_FOR_PPK or not np.isfinite(log).all():
+    if n < FEWEST_FOR_PPK or not np.isfinite(log).all() or np.ptp(log) == 0:
         return None
     mean, spread = float(log.mean()), float(log.std(ddof=1))
     rng = np.random.default_rng(seed)

@@ -170,6 +170,11 @@ def test_ppk_outliers_and_gauge():
     assert both.reproducibility == pytest.approx(0.05, rel=0.25)
 
 
+def test_drives_without_any_scatter_have_no_ppk():
+    """Would catch a Ppk of infinity, with an interval of no numbers, for one recording given eight times."""
+    assert performance([0.8465] * 8, 1.0) is None
+
+
 def write(tmp_path, name, recording):
     output = recording.input_angle / RATIO - np.radians(recording.error_arcmin / 60)
     pd.DataFrame(
@@ -249,3 +254,28 @@ def test_what_is_said_of_one_drive_is_refused_for_many(tmp_path, capsys, monkeyp
     path = write(tmp_path, "a.csv", recorded(wave))
     assert run("inspect", path, "--each", "--drive", "none", "--ratio", "80", option, value) == 2
     assert f"{option}: said of one drive" in capsys.readouterr().err
+
+
+def each_on(engine, paths, tmp_path, capsys):
+    code = run("inspect", *paths, "--each", "--drive", "none", "--ratio", "80", "--limit", "peak_to_peak=1arcmin",
+               "--engine", engine, "--json", str(tmp_path / "m.json"))  # fmt: skip
+    assert code == 0, capsys.readouterr().err
+    content = json.loads((tmp_path / "m.json").read_text())
+    return {key: value for key, value in content.items() if key != "provenance"}
+
+
+def test_many_drives_are_the_same_on_a_dask_cluster(tmp_path, capsys):
+    """Would catch a source or a sheet that cannot go to another machine, and a fault of one file that ends them all."""
+    distributed = pytest.importorskip("distributed")
+    paths = [
+        write(tmp_path, f"d{k}.csv", recorded(lambda t, a=a: a * np.sin(2 * t), turns=3, seed=k))
+        for k, a in enumerate([0.30, 0.31, 0.29])
+    ]
+    (tmp_path / "broken.csv").write_text("a,b\n1,2\n")
+    paths.append(str(tmp_path / "broken.csv"))
+    here = each_on("process", paths, tmp_path, capsys)
+    assert len(here["drives"]) == 4 and here["drives"][-1]["error"].startswith("broken.csv")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, protocol="tcp://", dashboard_address=None
+    ) as cluster:
+        assert each_on(cluster.scheduler_address.replace("tcp", "dask", 1), paths, tmp_path, capsys) == here
