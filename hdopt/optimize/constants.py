@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from hdopt.drive.geometry import Drive
+from hdopt.drive.geometry import Drive, Structure
 from hdopt.mechanics.bearing_life import SOURCES
 from hdopt.optimize.objectives import find_quantity
 from hdopt.optimize.setup import Setup, with_trade
@@ -58,6 +58,10 @@ def constants_of(setup: Setup) -> list[Constant]:
             found.append(
                 Constant("Endurance limit", drive.material.endurance, "MPa", "assumed", _material("endurance"))
             )
+    for structure, cost in trade.structure_costs:
+        if cost:
+            name = f"Cost of the structure {structure.value.replace('_', ' ')}"
+            found.append(Constant(name, 100 * cost, "% of the objective", "the study's", _structure_cost(structure)))
     for key, given in setup.limit_rules.items():
         words = "share of the baseline" if given.of_baseline else find_quantity(key).unit
         if given.bound:
@@ -104,6 +108,14 @@ def _material(field: str) -> Callable[[Setup, float], Setup]:
         assert drive.material is not None, "a constant of the material is perturbed only where there is a material"
         material = replace(drive.material, **{field: factor * getattr(drive.material, field)})
         return _with_baseline(setup, replace(drive, material=material))
+
+    return scaled
+
+
+def _structure_cost(structure: Structure) -> Callable[[Setup, float], Setup]:
+    def scaled(setup: Setup, factor: float) -> Setup:
+        costs = tuple((s, cost * factor if s == structure else cost) for s, cost in setup.trade.structure_costs)
+        return with_trade(setup, structure_costs=costs)
 
     return scaled
 

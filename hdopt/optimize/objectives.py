@@ -16,7 +16,7 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.drive.errors import ERROR_NAMES, DriveErrors
-from hdopt.drive.geometry import Drive
+from hdopt.drive.geometry import Drive, Structure
 from hdopt.errors import HdoptError, MissingValue, unknown_name
 from hdopt.kinematics.closed_form import tip_geometry
 from hdopt.kinematics.gradients import Extremes, extremes_of
@@ -75,6 +75,8 @@ class DesignConditions:
     quantile: float = 0.9973
     added: DesignEffects | None = None
     """Effects that count beside the errors."""
+    structure_costs: tuple[tuple[Structure, float], ...] = ()
+    """What structures cost, as shares of the objective; those left out cost nothing."""
     over_bore: tuple[bool, bool] = (False, False)
     """Whether the wave generator's tilts, along its major and its minor axis, are callouts over its fit's length."""
 
@@ -84,6 +86,10 @@ class DesignConditions:
         if value is None:
             raise MissingValue(needed_by, _KEYS[name])
         return value
+
+    def structure_factor(self, structure: Structure) -> float:
+        """What the objective of a design of this `structure` is multiplied with where designs are compared."""
+        return 1 + dict(self.structure_costs).get(structure, 0.0)
 
     @cached_property
     def rows(self) -> Array:

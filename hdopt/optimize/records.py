@@ -203,5 +203,6 @@ class Verification:
 
 
 def choose(solutions: Sequence[Solution]) -> Solution:
-    """The least objective of the feasible `solutions`; where none is, the one nearest to the limits."""
-    return min(solutions, key=lambda s: (0.0 if s.feasible else s.violation, s.objective))
+    """The least of the feasible `solutions` in the objective with what structures cost; where none is feasible, the one
+    nearest to the limits."""
+    return min(solutions, key=lambda s: (0.0 if s.feasible else s.violation, s.weighed))

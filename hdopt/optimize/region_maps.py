@@ -70,7 +70,7 @@ def _map(ground: Ground, x: Followed, y: Followed) -> RegionMap:
             found = solver.choice(solver.solve((i, j), near))
         if found is not None:
             chosen[i, j] = names.setdefault(found, len(names))
-    keeps = [[ground.keeps(solver.setup((i, j))) is None for j in range(n)] for i in range(n)]
+    excess = [[ground.excess(solver.setup((i, j)))[0] for j in range(n)] for i in range(n)]
     return RegionMap(
         x.constant.name,
         y.constant.name,
@@ -78,7 +78,7 @@ def _map(ground: Ground, x: Followed, y: Followed) -> RegionMap:
         tuple(factors[1]),
         tuple(map(str, names)),
         tuple(tuple(map(int, row)) for row in chosen),
-        tuple(map(tuple, keeps)),
+        tuple(map(tuple, excess)),
     )
 
 

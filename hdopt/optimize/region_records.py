@@ -53,7 +53,8 @@ class ConstantRange:
 @dataclass(frozen=True)
 class RegionMap:
     """What is chosen over two constants: `chosen[i][j]` at `y_factors[i]` and `x_factors[j]` times their values is a
-    place in `choices`, or -1 where no design keeps all limits; `keeps` says where today's numbers keep them."""
+    place in `choices`, or -1 where no design keeps all limits; `excess` is the share by which today's numbers exceed
+    the limit that they break most, below 0 where they keep all."""
 
     x: str
     y: str
@@ -61,7 +62,7 @@ class RegionMap:
     y_factors: tuple[float, ...]
     choices: tuple[str, ...]
     chosen: tuple[tuple[int, ...], ...]
-    keeps: tuple[tuple[bool, ...], ...]
+    excess: tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True)

@@ -46,6 +46,8 @@ LOSS = 0.01
 """Today's numbers no longer hold where another design is better by this share."""
 BROKEN = 1e-4
 """Excess over a limit, as a share of it, from which a design breaks it."""
+DISTANT = 0.25
+"""Combinations that are worse than today's by more than this share are not looked at."""
 HOPELESS = 0.05
 """A search that ends with limits broken by less than this share is tried again, from the study's own drive."""
 HELD = 1e-5
@@ -93,14 +95,15 @@ class Ground:
         return {combination: self._helped(solution, found) for combination, solution in found.items()}
 
     def _helped(self, solution: Solution, others: Bests) -> Solution:
-        """`solution`, or the best from where another of the same profile stands, if that is better: structures share
-        their designs, and a local search may have stopped in a worse valley."""
+        """`solution`, or the best from where another of the same profile stands, where that promises more: structures
+        share their designs, and a local search may have stopped in a worse valley."""
         problem, best = solution.problem, solution
         for combination, other in others.items():
             if combination.profile != problem.combination.profile or other.values == solution.values:
                 continue
             found = problem.evaluate(problem.place(other.values), slopes=False)
-            if _rank(found.violation, found.objective) < _rank(best.violation, (1 - SAME) * best.objective):
+            promising = found.objective < (1 - SAME) * best.objective or not _keeps(best)
+            if promising and found.violation < HOPELESS:
                 tried = solve(problem, self.method, [other.values])
                 best = min(best, tried, key=lambda s: _rank(s.violation, s.objective))
         return best
@@ -116,7 +119,7 @@ class Ground:
                 again = solve(problem, self.method, [problem.space.baseline_values])
                 found = min(found, again, key=lambda s: _rank(s.violation, s.objective))
             self._known[asked] = found
-        return self._known[asked]
+        return replace(self._known[asked], problem=problem)
 
     def choice(self, bests: Bests) -> Combination | None:
         """The combination to choose among `bests`: today's unless another is better by more than `SAME`; None where
@@ -125,18 +128,17 @@ class Ground:
         if not _keeps(found):
             return None
         own = bests.get(self.chosen.combination)
-        if own is not None and _keeps(own) and own.objective <= (1 + SAME) * found.objective:
+        if own is not None and _keeps(own) and own.weighed <= (1 + SAME) * found.weighed:
             return self.chosen.combination
         return found.combination
 
-    def keeps(self, changed: Setup) -> str | None:
-        """The title of the first limit that today's numbers break under a `changed` setup, None where they keep all."""
+    def excess(self, changed: Setup) -> tuple[float, str]:
+        """By which share today's numbers exceed the limit that they break most under a `changed` setup (below 0: the
+        room of the nearest), and that limit's title."""
         design = changed.space.design(self.chosen.combination, self.chosen.values)
-        for limit in changed.limits():
-            quantity = find_quantity(limit.quantity)
-            if limit.excess(quantity.value(changed.trade, design)) > BROKEN:
-                return quantity.title
-        return None
+        quantities = [(limit, find_quantity(limit.quantity)) for limit in changed.limits()]
+        found = [(limit.excess(one.value(changed.trade, design)), one.title) for limit, one in quantities]
+        return max(found, default=(-math.inf, ""))
 
 
 def _rank(violation: float, objective: float) -> tuple[float, float]:
@@ -149,7 +151,7 @@ def _keeps(solution: Solution) -> bool:
 
 def _least(bests: Bests) -> Solution:
     """The best of `bests`; where none keeps all limits, the one nearest to them."""
-    return min(bests.values(), key=lambda s: _rank(s.violation, s.objective))
+    return min(bests.values(), key=lambda s: _rank(s.violation, s.weighed))
 
 
 def _signature(problem: DesignProblem, today: Solution) -> Iterator[float]:
@@ -201,8 +203,11 @@ def follow(ground: Ground, constant: Constant) -> Followed:
 
 
 def _walk(ground: Ground, constant: Constant, end: float) -> list[tuple[float, Bests]]:
-    """Factors from 1 to `end` with the best designs there: of all combinations at the end, of contenders between."""
-    at_end = ground.best(constant.scaled(ground.setup, end), ground.today)
+    """Factors from 1 to `end` with the best designs there: of all but distant combinations at the end, of
+    contenders between."""
+    least = ground.chosen.weighed
+    start = {c: s for c, s in ground.today.items() if not _keeps(s) or s.weighed <= (1 + DISTANT) * least}
+    at_end = ground.best(constant.scaled(ground.setup, end), start)
     if all(solution.values == ground.today[combination].values for combination, solution in at_end.items()):
         return [(1.0, ground.today), (end, at_end)]
     watched = _watched(ground.today, at_end)
@@ -224,8 +229,8 @@ def contenders(*stages: Bests, share: float = CONTENDERS) -> list[Combination]:
     found: dict[Combination, None] = {}
     for bests in stages:
         feasible = {c: s for c, s in bests.items() if _keeps(s)}
-        least = min((s.objective for s in feasible.values()), default=math.inf)
-        found |= dict.fromkeys(c for c, s in feasible.items() if s.objective <= (1 + share) * least)
+        least = min((s.weighed for s in feasible.values()), default=math.inf)
+        found |= dict.fromkeys(c for c, s in feasible.items() if s.weighed <= (1 + share) * least)
     return list(found)
 
 
@@ -235,11 +240,11 @@ def _watched(today: Bests, at_end: Bests) -> list[Combination]:
     found = dict.fromkeys(contenders(today, at_end))
     if not any(map(_keeps, at_end.values())):
         for level in ("structure", "profile"):
-            ordered = sorted(today.values(), key=lambda s: _rank(s.violation, s.objective))
+            ordered = sorted(today.values(), key=lambda s: _rank(s.violation, s.weighed))
             least: dict[str, Combination] = {}
             for solution in ordered:
                 least.setdefault(_level(level, solution.combination), solution.combination)
-            found |= dict.fromkeys(least.values())
+            found |= dict.fromkeys(c for c in least.values() if c in at_end)
     return list(found)
 
 
@@ -286,7 +291,8 @@ def _design_boundary(
     """Where, up to the factor `end`, today's numbers break a limit or fall behind the best by `LOSS`."""
 
     def broken(factor: float) -> str | None:
-        return ground.keeps(constant.scaled(ground.setup, factor))
+        excess, title = ground.excess(constant.scaled(ground.setup, factor))
+        return title if excess > BROKEN else None
 
     found: list[Boundary] = []
     before = 1.0
@@ -313,7 +319,8 @@ def _behind(ground: Ground, constant: Constant, factor: float, bests: Bests) -> 
     design = changed.space.design(ground.chosen.combination, ground.chosen.values)
     value = find_quantity(changed.settings.objective).value(changed.trade, design)
     best = _least(bests)
-    return value / best.objective - 1 if _keeps(best) else 0.0
+    own = value * changed.trade.structure_factor(ground.chosen.combination.structure)
+    return own / best.weighed - 1 if _keeps(best) else 0.0
 
 
 def bisect(inside: float, outside: float, holds: Callable[[float], bool], close: float) -> float:

@@ -38,6 +38,11 @@ class Solution:
         return self.outcome.evaluation.objective if self.outcome.evaluation else np.inf
 
     @property
+    def weighed(self) -> float:
+        """The objective with what the structure costs: what designs of different structures are compared by."""
+        return self.objective * self.problem.trade.structure_factor(self.combination.structure)
+
+    @property
     def violation(self) -> float:
         return self.outcome.evaluation.violation if self.outcome.evaluation else np.inf
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any  # Any: values of JSON
 
+from hdopt.drive.geometry import Structure
 from hdopt.optimize.design_space import VARIABLES
 from hdopt.optimize.objectives import QUANTITIES
 from hdopt.optimize.records import DesignRecord, SearchResult
@@ -13,7 +14,7 @@ from hdopt.optimize.region_records import NONE_LEFT, Regions
 
 NOT_MODELLED = (
     "tooth separation under load",
-    "the stiffness and efficiency that an automatic or one-way wave generator loses in its cross-slide",
+    "what an automatic or one-way wave generator loses in stiffness and efficiency in its cross-slide",
     "ratcheting and buckling torque and torsional stiffness K1 to K3, which are catalogue values without a formula",
     "the stiffness of the flexspline's cup, which loads the wave generator's bearing beside the toothed ring",
 )
@@ -37,21 +38,46 @@ def break_evens(result: SearchResult) -> tuple[str, ...]:
     before that one is the better: the gap of the best designs of both, in the objective's unit and as a share.
 
     What an alignment structure loses in stiffness and efficiency is not modelled: this is the number to hold it
-    against. Structures without a design that keeps the limits are left out.
+    against, over and above what the study says of it. Structures without a design that keeps the limits are left out.
     """
-    best, unit = result.best, QUANTITIES[result.objective].unit
+    unit = QUANTITIES[result.objective].unit
     if not result.feasible:
         return ()
-    at_best = best.quantities[result.objective]
+    at_best = _weighed(result, result.best)
     others: dict[str, float] = {}
     for design in result.combinations:
-        if design.feasible and design.structure != best.structure:
-            value = design.quantities[result.objective]
+        if design.feasible and design.structure != result.best.structure:
+            value = _weighed(result, design)
             others[design.structure] = min(value, others.get(design.structure, value))
     return tuple(
         f"{number(abs(value - at_best), unit)} ({100 * abs(value / at_best - 1):.2g} %) beside {structure}"
         for structure, value in sorted(others.items(), key=lambda item: abs(item[1] - at_best))
     )
+
+
+def _weighed(result: SearchResult, design: DesignRecord) -> float:
+    factor = result.setup.trade.structure_factor(Structure(design.structure))
+    return factor * design.quantities[result.objective]
+
+
+def structure_costs(result: SearchResult) -> str | None:
+    """What the study of `result` says that structures cost, and what it leaves open, in a sentence; None where only one
+    structure may be chosen."""
+    compared = list(dict.fromkeys(design.structure for design in result.combinations))
+    if len(compared) < 2:
+        return None
+    given = {s.value: cost for s, cost in result.setup.trade.structure_costs}
+    said = [f"{name} {100 * cost:g} %" for name, cost in given.items() if name in compared]
+    missing = [name for name in compared if name not in given and name != Structure.INTEGRAL.value]
+    words = f"structures cost, as the study says: {', '.join(said)} of the objective" if said else ""
+    if not missing:
+        return words
+    ask = (
+        f"what {', '.join(missing)} lose in stiffness and efficiency is your number to give, as no published one was "
+        "found: search.trade.structure_cost_percent, for each the share of the objective that you would give to be "
+        f"without it, such as {{ {missing[0]} = 2.0 }}"
+    )
+    return f"{words}; {ask}" if words else ask
 
 
 def nearest_boundary(regions: Regions) -> str:
@@ -123,7 +149,10 @@ def result_lines(result: SearchResult) -> Iterator[str]:
             f"hypervolume {front.hypervolume:.4g}"
         )
     if gaps := break_evens(result):
-        yield f"  {best.structure} stays the choice until what it costs is worth {', '.join(gaps)}"
+        more = "a further" if result.setup.trade.structure_costs else "worth"
+        yield f"  {best.structure} stays the choice until what it costs is {more} {', '.join(gaps)}"
+    if costs := structure_costs(result):
+        yield f"  {costs}"
     if result.regions is not None:
         yield from region_lines(result.regions)
     for note in result.notes:

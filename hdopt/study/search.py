@@ -9,6 +9,8 @@ from pydantic import Field, model_validator
 
 from hdopt.study.base import NotNegative, Positive, Section
 
+StructureName = Literal["integral", "automatic", "one_way_major", "one_way_minor"]
+
 
 class VariableSection(Section):
     """Bounds of one design variable, with `step` or `values` where only some of them can be had."""
@@ -113,6 +115,9 @@ class TradeSection(Section):
     """Notch factor of the bending stress under the teeth."""
     mean_stress_sensitivity: NotNegative = 0.2
     """How much of the steady hoop stress counts beside the alternating bending in the safety."""
+    structure_cost_percent: dict[StructureName, NotNegative] = Field(default_factory=dict)
+    """What a structure costs in stiffness and efficiency, as the share of the objective you would give to be without
+    it, in per cent; it weighs in the choice only. No formula is known: the designer's own number."""
     wg_tilt_major_over: Literal["bore", "shoulder"] = "bore"
     """What the wave generator's tilt along its major axis is a callout over: its fit on the shaft, whose length follows
     its width, or a shoulder's diameter, which does not. The input axis tilts over its bearings' span."""
@@ -129,7 +134,7 @@ class SearchSection(Section):
         default=["ellipse", "resal", "two_disk"], min_length=1
     )
     """Profiles that may be chosen."""
-    structures: list[Literal["integral", "automatic", "one_way_major", "one_way_minor"]] = Field(
+    structures: list[StructureName] = Field(
         default=["integral", "automatic", "one_way_major", "one_way_minor"], min_length=1
     )
     """Structures that may be chosen."""

@@ -123,6 +123,7 @@ def _trade(study: Study, section: SearchSection, seed: int) -> DesignConditions:
         sample=sample_rows(study, section.samples, seed) if needs_sample else None,
         quantile=section.quantile,
         added=_effects(study, section, needs_sample),
+        structure_costs=tuple((Structure(name), cost / 100) for name, cost in given.structure_cost_percent.items()),
         over_bore=(given.wg_tilt_major_over == "bore", given.wg_tilt_minor_over == "bore"),
     )
 

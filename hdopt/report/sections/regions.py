@@ -37,7 +37,7 @@ def region_items(best: DesignRecord, regions: Regions, key: str) -> tuple[Figure
         *(
             Figure(
                 f"{key}-map-{place}",
-                f"What is chosen over {in_sentence(drawn.x)} and {in_sentence(drawn.y)}",
+                f"What is chosen over two constants: {drawn.x}; {drawn.y}",
                 _map(drawn),
                 "The cross is today's choice. Inside the line today's numbers keep all limits. Searched on a coarse "
                 "grid, and twice as fine where the choice changes.",
@@ -47,7 +47,7 @@ def region_items(best: DesignRecord, regions: Regions, key: str) -> tuple[Figure
         Table(
             f"{key}-boundaries",
             "Every constant of the trade, its source, and the nearest boundaries",
-            pd.DataFrame([_row(constant) for constant in regions.ranges]),
+            pd.DataFrame([_row(constant) for constant in _nearest_first(regions.ranges)]),
             f"In per cent of the constant; a dash: none within reach. Chosen today: {_name(best.name)}.",
         ),
     )
@@ -78,11 +78,12 @@ def _ends(constant: ConstantRange, *levels: str) -> tuple[float, float]:
     return 100 * (max(low, default=constant.lowest) - 1), 100 * (min(high, default=constant.highest) - 1)
 
 
+def _nearest_first(ranges: Sequence[ConstantRange]) -> list[ConstantRange]:
+    return sorted(ranges, key=lambda r: (not r.boundaries, min(map(abs, _ends(r, *CHOICE)))))
+
+
 def _bars(ranges: Sequence[ConstantRange]) -> go.Figure:
-    shown = sorted(
-        (r for r in ranges if r.boundaries),
-        key=lambda r: min(map(abs, _ends(r, *CHOICE))),
-    )
+    shown = [r for r in _nearest_first(ranges) if r.boundaries]
     made = figure("Change of the constant [%]", "", height=130 + 30 * len(shown), barmode="overlay")
     for name, levels, colour, width in (
         ("structure and profile stay", CHOICE, faded(BLUE, 0.35), 0.7),
@@ -155,8 +156,8 @@ def _map(drawn: RegionMap) -> go.Figure:
     made.add_contour(
         x=drawn.x_factors,
         y=drawn.y_factors,
-        z=[[float(kept) for kept in row] for row in drawn.keeps],
-        contours={"start": 0.5, "end": 0.5, "size": 1, "coloring": "none"},
+        z=drawn.excess,
+        contours={"start": 1e-4, "end": 1e-4, "size": 1, "coloring": "none"},
         line={"color": INK, "width": 1.5, "dash": "dash"},
         showscale=False,
         showlegend=True,

@@ -11,7 +11,7 @@ from hdopt.optimize.design_space import VARIABLES
 from hdopt.optimize.objectives import NOMINAL, QUANTITIES, ROBUST, Quantity, find_quantity
 from hdopt.optimize.records import DesignRecord, Front, SearchResult, Verification
 from hdopt.optimize.region_records import Regions
-from hdopt.optimize.summary import NOT_MODELLED, break_evens, nearest_boundary, number, ring_share
+from hdopt.optimize.summary import NOT_MODELLED, break_evens, nearest_boundary, number, ring_share, structure_costs
 from hdopt.optimize.views import DesignMap, Rings, TradeViews
 from hdopt.report import Figure, KeyFigures, Section, Table, Text
 from hdopt.report.sections.design_map import Design, design_map, words_on_limits
@@ -133,10 +133,13 @@ def _not_modelled(result: SearchResult) -> str:
     words = f"Not modelled: {'; '.join(NOT_MODELLED)}. Weigh these beside the table."
     if share := ring_share(result.baseline):
         words += f" Of the drive as it is: {share}."
-    if not (gaps := break_evens(result)):
-        return words
-    structure = in_sentence(label(result.best.structure))
-    return f"{words} The structure ({structure}) stays the choice until what it costs is worth {', '.join(gaps)}."
+    if gaps := break_evens(result):
+        structure = in_sentence(label(result.best.structure))
+        more = "a further" if result.setup.trade.structure_costs else "worth"
+        words += f" The structure ({structure}) stays the choice until what it costs is {more} {', '.join(gaps)}."
+    if costs := structure_costs(result):
+        words += f" {costs[:1].upper()}{costs[1:]}."
+    return words
 
 
 def _against_baseline(result: SearchResult) -> pd.DataFrame:
