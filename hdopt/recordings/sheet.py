@@ -175,13 +175,14 @@ def _spread(values: Array) -> dict[str, float] | None:
 @dataclass(frozen=True)
 class Unit:
     """One drive of a batch: figures in arcmin, `verdict` of its peak-to-peak ("" without a limit), or why its file
-    could not be read. `figure` says which peak-to-peak stands there: "beat", or "recording" where that is not known."""
+    could not be read: then there are no figures. `figure` says which peak-to-peak stands there: "beat", or "recording"
+    where that is not known."""
 
     name: str
-    peak_to_peak: float = 0.0
+    peak_to_peak: float | None = None
     figure: str = ""
-    one_turn: float = 0.0
-    rms: float = 0.0
+    one_turn: float | None = None
+    rms: float | None = None
     return_error: float | None = None
     verdict: str = ""
     missed: bool = False

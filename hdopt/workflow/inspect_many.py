@@ -42,7 +42,7 @@ def inspect_many(
     sound = [unit for unit in units if not unit.error]
     if not sound:
         raise HdoptError(f"none of {len(units)} recordings can be read; the first: {units[0].error[:200]}")
-    values = [unit.peak_to_peak for unit in sound]
+    values = [unit.peak_to_peak for unit in sound if unit.peak_to_peak is not None]
     far = {sound[k].name for k in outliers(values)}
     limit = limits.get("peak_to_peak")
     batch = Batch(

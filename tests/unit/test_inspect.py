@@ -15,7 +15,9 @@ from hdopt.recordings import figures
 from hdopt.recordings.capability import gauge, outliers, performance
 from hdopt.recordings.decision import decide, parse_limits
 from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.sheet import Batch, Unit
 from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
+from hdopt.report.sections.inspection import batch_report
 from hdopt.study import load_study
 from hdopt.workflow.inspect import inspect
 
@@ -279,3 +281,15 @@ def test_many_drives_are_the_same_on_a_dask_cluster(tmp_path, capsys):
         n_workers=1, threads_per_worker=2, processes=False, protocol="tcp://", dashboard_address=None
     ) as cluster:
         assert each_on(cluster.scheduler_address.replace("tcp", "dask", 1), paths, tmp_path, capsys) == here
+
+
+def test_a_page_of_many_drives_gives_no_figures_to_what_was_not_read():
+    """Would catch a peak-to-peak of 0 for a file that could not be read, which is the best of all drives."""
+    drives = (Unit("a", 0.5, "beat", 0.4, 0.2, None, "met"), Unit("b", 1.5, "beat", 1.4, 0.6, None, "missed", True),
+              Unit("c", error="c: holds no rows"))  # fmt: skip
+    batch = Batch(drives, 1.0, None)
+    assert batch.to_dict()["drives"][2]["peak_to_peak"] is None
+    figures, _, table, unread = batch_report(batch).sections[0].items
+    assert figures.values == {"Drives": "2", "Limit of the peak-to-peak": "1 arcmin", "Met": "1", "Missed": "1",
+                              "Not read": "1"}  # fmt: skip
+    assert list(table.frame["drive"]) == ["a", "b"] and list(unread.frame["why"]) == ["c: holds no rows"]

@@ -11,6 +11,8 @@ from hdopt.report import Figure, Item, KeyFigures, Report, Section, Table, Text
 from hdopt.report.theme import BLUE, DIVERGING, GREY, INK, VERMILLION, figure
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from hdopt.recordings.figures import Cells
     from hdopt.recordings.sheet import Batch, Inspection
 
@@ -199,8 +201,45 @@ def _checks(found: Inspection) -> Section:
     return Section("checks", "Checks, and how the files were read", (Table("check-table", "Checks", frame), *notes))
 
 
+PPK_SAYS = "Ppk by percentiles of a log-normal distribution (ISO 22514-2), outliers counted."
+
+
+def _batch_figures(batch: Batch) -> dict[str, str]:
+    """What a batch comes to: the limit and who keeps it, Ppk, what could not be read."""
+    sound = [drive for drive in batch.drives if not drive.error]
+    values = {"Drives": f"{len(sound)}"}
+    if batch.limit is not None:
+        values["Limit of the peak-to-peak"] = f"{batch.limit:g} arcmin"
+        for verdict in ("met", "missed", "not decidable"):
+            count = sum(drive.verdict == verdict for drive in sound)
+            if count or verdict != "not decidable":
+                values[verdict.capitalize()] = str(count)
+    if batch.performance is not None:
+        p = batch.performance
+        values["Ppk"] = f"{p.ppk:.2f}"
+        values["Its 95 % interval"] = f"{p.low:.2f} to {p.high:.2f}"
+    if len(sound) < len(batch.drives):
+        values["Not read"] = str(len(batch.drives) - len(sound))
+    return values
+
+
+def _drive_rows(batch: Batch) -> pd.DataFrame:
+    """One row for each drive that could be read, with units; those that could not stand in a table of their own."""
+    import pandas as pd
+
+    columns = ["drive", "peak-to-peak, arcmin", "over", "largest turn, arcmin", "rms, arcmin", "return error, arcmin"]
+    rows = [
+        (d.name, d.peak_to_peak, d.figure, d.one_turn, d.rms, d.return_error, d.verdict, "outlier" if d.outlier else "")
+        for d in batch.drives
+        if not d.error
+    ]
+    return pd.DataFrame(rows, columns=[*columns, "verdict", "marked"])
+
+
 def batch_report(batch: Batch) -> Report:
     """Many drives: `batch` as one table and one plot."""
+    import pandas as pd
+
     sound = [drive for drive in batch.drives if not drive.error]
     made = figure("Drive", "Peak-to-peak (arcmin)", 380)
     for outlier, colour, name in ((False, BLUE, "drive"), (True, VERMILLION, "outlier")):
@@ -215,15 +254,14 @@ def batch_report(batch: Batch) -> Report:
             )
     if batch.limit is not None:
         made.add_hline(y=batch.limit, line={"color": INK, "dash": "dash"})
-    values = {"Drives": f"{len(sound)}"}
-    if batch.performance is not None:
-        p = batch.performance
-        values["Ppk"] = f"{p.ppk:.2f}"
-        values["Its 95 % interval"] = f"{p.low:.2f} to {p.high:.2f}"
     items: tuple[Item, ...] = (
-        KeyFigures(values),
+        KeyFigures(_batch_figures(batch)),
         Figure("batch", "Peak-to-peak of every drive", made, "Dashed: the limit."),
-        Table("batch-table", "Every drive", batch.to_frame()),
+        Table("batch-table", "Every drive", _drive_rows(batch)),
     )
-    section = Section("drives", "Drives", items, "Ppk by percentiles of a log-normal distribution (ISO 22514-2).")
+    unread = [(drive.name, drive.error) for drive in batch.drives if drive.error]
+    if unread:
+        frame = pd.DataFrame(unread, columns=["recording", "why"])
+        items = (*items, Table("unread-table", "Recordings that could not be read", frame))
+    section = Section("drives", "Drives", items, PPK_SAYS)
     return Report("Many drives of one type", f"{len(batch.drives)} recordings", (section,))
