@@ -448,6 +448,11 @@ class VerdictSettings:
     noise_over_neighbours: float = threshold(
         5.0, "1", "measured: coloured noise of the simulated bench reaches 2.9 times what neighbouring samples show"
     )
+    left_over_passes: float = threshold(
+        2.0,
+        "1",
+        "choice: what is left over what differs from pass to pass, at which three quarters of its power repeat",
+    )
     model_resolution: float = threshold(
         0.002, "1", "measured: closed form against exact geometry, 0.4337 and 0.4346 arcmin peak to peak"
     )

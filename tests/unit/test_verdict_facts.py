@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from test_verdict_rules import CLEAN, FIRED, held
 
+from hdopt.diagnosis.checks.repeated_passes import NOTHING_REPEATED, RepeatedPasses
 from hdopt.diagnosis.inference.catalogue import SCALE
 from hdopt.diagnosis.inference.cross_validation import HeldOut
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.verdict.facts import own_gain, stands_out, too_little
 from hdopt.diagnosis.verdict.named_effect import confidences
-from hdopt.diagnosis.verdict.residual_structure import clearly_unexplained, outside_share
+from hdopt.diagnosis.verdict.residual_structure import clearly_unexplained, left_over_passes, outside_share
 from hdopt.diagnosis.verdict.rivals import placebo_as_good, rivals, scale_is_as_good
 from hdopt.diagnosis.verdict.rules import rule_for
 from hdopt.effects.term import Term
@@ -39,7 +40,13 @@ def candidate(powers, log_bayes_factor=100.0, outside=False, residual=1.0):
 
 def evidence(*candidates, base=3.0, extended=1.0, **more):
     rows = SimpleNamespace(locked=False, blocks=20, span_turns=20.0, rows_per_turn=60.0, output_step=0.0)
-    known = {"settings": DEFAULT, "rows": rows, "neighbours_arcmin": 0.0, "sensor_arcmin": 0.0}
+    known = {
+        "settings": DEFAULT,
+        "rows": rows,
+        "neighbours_arcmin": 0.0,
+        "sensor_arcmin": 0.0,
+        "passes": NOTHING_REPEATED,
+    }
     known |= {"high": None, "false_alarm_p": 0.002, "below_detection": {}}
     return SimpleNamespace(
         base_held_out=held(20, base),
@@ -161,3 +168,18 @@ def test_confidence_is_the_weight_of_the_sets_that_hold_an_effect():
     assert found["hysteresis"] == pytest.approx(0.8 / (1 + exp(-1)))
     assert found["thermal_drift"] == pytest.approx(0.8)
     assert confidences(evidence(*pair, false_alarm_p=0.0))["thermal_drift"] == DEFAULT.verdict.most_confident
+
+
+@pytest.mark.parametrize(
+    ("passes", "more", "over"),
+    [
+        (RepeatedPasses(0.3, 0.4, 20, 9.0), {}, 0.5 / 0.3),
+        (RepeatedPasses(0.3, 0.4, 20, 3.9), {}, 1.0),  # by chance
+        (RepeatedPasses(0.3, 0.4, 20, 9.0), {"sensor_arcmin": 0.45}, 0.5 / 0.45),  # steps come again as well
+        (RepeatedPasses(0.3, 0.4, 20, 9.0), {"base": 2.0}, 1.0),  # 0.16 of a gain of 1: another shape of it
+        (RepeatedPasses(0.3, 0.4, 20, 9.0), {"base_power": 201.0**2}, 1.0),  # below the model's own accuracy
+    ],
+)
+def test_what_is_left_is_held_against_what_differs_from_pass_to_pass(passes, more, over):
+    said = evidence(candidate({"hysteresis": 1.0}), passes=passes, **({"base": 1.0} | more))
+    assert left_over_passes(said) == pytest.approx(over)

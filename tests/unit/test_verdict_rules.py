@@ -40,6 +40,8 @@ NAMED = replace(CLEAN, explained=True, false_alarm_p=0.002, own_gain=1.0)
 FIRED = [
     ("happened once", replace(NAMED, momentary=True), {"momentary": False}),
     ("happened once", replace(NAMED, momentary=True), {"turns_suffice": False}),
+    ("comes again", replace(CLEAN, left_over_passes=3.0), {"left_over_passes": 1.5}),
+    ("comes again", replace(CLEAN, left_over_passes=3.0), {"turns_suffice": False}),
     ("no physics explains", replace(NAMED, outside_share=0.5), {"outside_share": 0.1}),
     ("no physics explains", replace(NAMED, outside_share=0.5), {"false_alarm_p": 0.2}),
     ("no physics explains", replace(CLEAN, high=True, high_outside_share=0.5), {"high_outside_share": 0.1}),

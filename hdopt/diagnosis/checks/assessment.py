@@ -10,6 +10,7 @@ import numpy as np
 
 from hdopt.arrays import Array, Index
 from hdopt.diagnosis.checks.false_alarm import best_score, false_alarm_chance
+from hdopt.diagnosis.checks.repeated_passes import RepeatedPasses, repeated_passes
 from hdopt.diagnosis.checks.scale import Scale, fitted_scale
 from hdopt.diagnosis.checks.slow_wander import SlowWave, slow_wave
 from hdopt.diagnosis.checks.step_detection import Steps, sudden_steps
@@ -73,6 +74,7 @@ class Evidence:
     neighbours_arcmin: float
     sensor_arcmin: float
     scale: Scale | None
+    passes: RepeatedPasses
     nested: NestedHeldOut | None = None
 
     @property
@@ -126,6 +128,7 @@ def assess(state: State) -> Evidence:
         neighbours_arcmin=noise_between_neighbours(state.recordings),
         sensor_arcmin=max(one.quantum_arcmin for one in state.recordings),
         scale=fitted_scale(best, state.nuisances),
+        passes=repeated_passes(best),
     )
 
 

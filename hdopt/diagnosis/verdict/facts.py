@@ -15,6 +15,7 @@ from hdopt.diagnosis.settings import VerdictSettings
 from hdopt.diagnosis.verdict.named_effect import NamedEffect, describe
 from hdopt.diagnosis.verdict.residual_structure import (
     clearly_unexplained,
+    left_over_passes,
     momentary,
     outside_share,
     resolution,
@@ -44,7 +45,8 @@ class Facts:
     adequate. `rivals`: other sets that are as good, placebo and
     perfect imitations among them; `scale_as_good`: so is a ratio or gain that is off, alone. `heldout_over_floor`:
     held-out error over what a generic basis leaves; `noise_over_neighbours`: the same over the noise that neighbouring
-    samples and the sensors' steps show. `above_resolution`: some effect is larger than what sensors and model resolve.
+    samples and the sensors' steps show; `left_over_passes`: what is left over what differs from pass to pass of one
+    angle. `above_resolution`: some effect is larger than what sensors and model resolve.
     """
 
     settings: VerdictSettings
@@ -64,6 +66,7 @@ class Facts:
     scale_as_good: bool = False
     heldout_over_floor: float = 1.0
     noise_over_neighbours: float = 1.0
+    left_over_passes: float = 1.0
     above_resolution: bool = True
 
     @property
@@ -140,6 +143,7 @@ def find(evidence: Evidence) -> Findings:
         heldout_over_floor=evidence.extended_held_out.rms / evidence.noise_floor,
         noise_over_neighbours=evidence.extended_held_out.rms
         / max(evidence.neighbours_arcmin, evidence.sensor_arcmin, TINY),
+        left_over_passes=left_over_passes(evidence),
         above_resolution=above_resolution(evidence),
     )
     pairs = confounded_pairs(evidence, facts.named, high) if facts.said else ()

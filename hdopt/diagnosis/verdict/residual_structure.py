@@ -74,6 +74,20 @@ def unsteady(evidence: Evidence) -> Where | None:
     return where
 
 
+def left_over_passes(evidence: Evidence) -> float:
+    """What is left over what can be noise by repeated passes of the same angles, where what comes again is clearly no
+    chance, more than sensors and model resolve and a fair part of what is there; 1 elsewhere. `evidence` is that of the
+    diagnosis.
+    """
+    passes, settings = evidence.passes, evidence.settings.verdict
+    if passes.t <= settings.remainder_t:
+        return 1.0
+    explained = max(evidence.base_held_out.variance - evidence.extended_held_out.variance, 0.0)
+    if passes.repeated**2 <= max(settings.remainder_share * explained, resolution(evidence) ** 2):
+        return 1.0
+    return passes.left / max(passes.scatter, evidence.sensor_arcmin, TINY)
+
+
 def resolution(evidence: Evidence) -> float:
     """Rms (arcmin) below which nothing in `evidence` is a finding: a share of the base's own, to which its model is
     accurate, and of the noise and the steps of the sensors; of what is left where a coarse encoder's steps were taken
@@ -142,4 +156,18 @@ def locate_remainder(evidence: Evidence) -> Where:
         "direction": "both",
         "share_of_residual": float(min(left / explainable, 1.0)),
         "rms_arcmin": math.sqrt(left),
+    }
+
+
+def locate_repeated(evidence: Evidence) -> Where:
+    """Where that lives which comes again from pass to pass and nothing in the catalogue explains. `evidence` is that of
+    the diagnosis.
+    """
+    fit, repeated = evidence.selection.best.fit, evidence.passes.repeated
+    return {
+        "domain": "angle",
+        "orders_per_input_turn": main_orders(fit, fit.residual),
+        "direction": "both",
+        "share_of_residual": float(min(repeated**2 / max(evidence.base_held_out.variance, TINY), 1.0)),
+        "rms_arcmin": repeated,
     }

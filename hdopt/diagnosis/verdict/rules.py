@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from hdopt.diagnosis.checks.confounding import Confounding
 from hdopt.diagnosis.verdict.facts import Facts, Findings, sparse
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
-from hdopt.diagnosis.verdict.residual_structure import in_what_way, locate_remainder
+from hdopt.diagnosis.verdict.residual_structure import in_what_way, locate_remainder, locate_repeated
 from hdopt.diagnosis.verdict.rivals import Sets, separating_measurement, tied_pairs
 from hdopt.diagnosis.verdict.where import Where
 
@@ -41,6 +41,13 @@ def happened_once(facts: Facts) -> bool:
     `facts` are those of the recording.
     """
     return facts.turns_suffice and facts.momentary
+
+
+def comes_again(facts: Facts) -> bool:
+    """What is left is far above what differs from pass to pass over the same angles: noise does not come again.
+    `facts` are those of the recording.
+    """
+    return facts.turns_suffice and facts.left_over_passes > facts.settings.left_over_passes
 
 
 def no_physics_explains(facts: Facts) -> bool:
@@ -115,6 +122,23 @@ def no_noise(findings: Findings) -> Conclusion:
         "does not explain it."
     )
     test = "record the same motion again: what repeats is the drive's, what does not is the bench's"
+    return Conclusion("unknown", says, effects, separating_test=test, where=where)
+
+
+def no_chance(findings: Findings) -> Conclusion:
+    """What is left comes again at the same angles; effects that carry most of what was there are said beside it.
+    `findings` hold the facts and the evidence behind them.
+    """
+    evidence, facts = findings.evidence, findings.facts
+    effects = findings.effects if facts.carry_most and not no_physics_explains(facts) else ()
+    where = locate_repeated(evidence)
+    says = "".join(f"{found.says} " for found in effects)
+    says += (
+        f"What is left comes again at the same input angles, {where['rms_arcmin']:.2g} arcmin rms of it, where only "
+        f"{evidence.passes.scatter:.2g} differ from pass to pass: that is no noise, and the catalogue does not "
+        "explain it."
+    )
+    test = "pass the same angles at another load and speed: what stays where it is belongs to the teeth or an encoder"
     return Conclusion("unknown", says, effects, separating_test=test, where=where)
 
 
@@ -203,6 +227,7 @@ def adequate(findings: Findings) -> Conclusion:
 
 RULES = (
     Rule("happened once", happened_once, unknown),
+    Rule("comes again", comes_again, no_chance),
     Rule("no physics explains", no_physics_explains, unknown),
     Rule("changes in time", changes_in_time, unknown),
     Rule("generic basis wins", generic_basis_wins, unknown),
