@@ -11,8 +11,9 @@ from test_verdict_rules import CLEAN, FIRED, held
 from hdopt.diagnosis.checks.repeated_passes import NOTHING_REPEATED, RepeatedPasses
 from hdopt.diagnosis.inference.catalogue import SCALE
 from hdopt.diagnosis.inference.cross_validation import HeldOut
+from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut
 from hdopt.diagnosis.settings import DEFAULT
-from hdopt.diagnosis.verdict.facts import own_gain, stands_out, too_little
+from hdopt.diagnosis.verdict.facts import found_again, own_gain, stands_out, too_little, unseen_rms
 from hdopt.diagnosis.verdict.named_effect import confidences
 from hdopt.diagnosis.verdict.residual_structure import clearly_unexplained, left_over_passes, outside_share
 from hdopt.diagnosis.verdict.rivals import placebo_as_good, rivals, scale_is_as_good
@@ -46,6 +47,7 @@ def evidence(*candidates, base=3.0, extended=1.0, **more):
         "neighbours_arcmin": 0.0,
         "sensor_arcmin": 0.0,
         "passes": NOTHING_REPEATED,
+        "nested": None,
     }
     known |= {"high": None, "false_alarm_p": 0.002, "below_detection": {}}
     return SimpleNamespace(
@@ -81,6 +83,23 @@ def test_effects_gain_what_they_carry_themselves():
     assert own_gain(evidence(candidate({"hysteresis": 2.0}))) == pytest.approx(2.0)
     assert own_gain(evidence(candidate({"hysteresis": 0.1}))) == pytest.approx(0.2)
     assert own_gain(evidence(candidate({"hysteresis": 0.1, SCALE: 5.0}))) == pytest.approx(0.2)
+
+
+def test_effects_gain_no_more_than_on_turns_that_no_stage_saw():
+    """Fault caught: a set that was chosen on all turns and predicts the hidden ones worse than the base is named."""
+    large = candidate({"hysteresis": 2.0})
+    assert own_gain(evidence(large, nested=NestedHeldOut(1.2, 1.0, 5, ()))) == pytest.approx(0.44)
+    assert own_gain(evidence(large, nested=NestedHeldOut(0.9, 1.0, 5, ()))) < 0
+    assert own_gain(evidence(large, nested=NestedHeldOut(9.0, 1.0, 5, ()))) == pytest.approx(2.0)
+
+
+def test_what_is_left_is_that_of_turns_that_no_stage_saw():
+    hidden = NestedHeldOut(2.0, 1.7, 5, ("hysteresis", "lost_motion"))
+    assert unseen_rms(evidence(extended=4.0, nested=hidden)) == 1.7
+    assert unseen_rms(evidence(extended=4.0)) == pytest.approx(2.0)
+    one, other = SimpleNamespace(id="hysteresis"), SimpleNamespace(id="resonance")
+    assert found_again(evidence(nested=hidden), [one]) and found_again(evidence(), [other])
+    assert not found_again(evidence(nested=hidden), [one, other])
 
 
 @pytest.mark.parametrize(("power", "base", "said"), [(0.5, 2.0, True), (0.01, 2.0, False), (0.5, 100.0, False)])

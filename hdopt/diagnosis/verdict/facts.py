@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,9 +45,10 @@ class Facts:
     `generic_t`. `turns_suffice`: turns can be held out; `too_little`: the record cannot say even that the base is
     adequate. `rivals`: other sets that are as good, placebo and
     perfect imitations among them; `scale_as_good`: so is a ratio or gain that is off, alone. `heldout_over_floor`:
-    held-out error over what a generic basis leaves; `noise_over_neighbours`: the same over the noise that neighbouring
-    samples and the sensors' steps show; `left_over_passes`: what is left over what differs from pass to pass of one
-    angle. `above_resolution`: some effect is larger than what sensors and model resolve.
+    error on turns that no stage saw (cross-validated where none could be spared) over what a generic basis leaves;
+    `found_again`: what is said was found without those turns too; `noise_over_neighbours`: cross-validated error over
+    the noise that neighbouring samples and the sensors' steps show; `left_over_passes`: what is left over what differs
+    from pass to pass of one angle. `above_resolution`: some effect is larger than what sensors and model resolve.
     """
 
     settings: VerdictSettings
@@ -65,6 +67,7 @@ class Facts:
     rivals: Sets
     scale_as_good: bool = False
     heldout_over_floor: float = 1.0
+    found_again: bool = True
     noise_over_neighbours: float = 1.0
     left_over_passes: float = 1.0
     above_resolution: bool = True
@@ -140,7 +143,7 @@ def find(evidence: Evidence) -> Findings:
         too_little=too_little(evidence),
         rivals=(),
         scale_as_good=scale_is_as_good(evidence),
-        heldout_over_floor=evidence.extended_held_out.rms / evidence.noise_floor,
+        heldout_over_floor=unseen_rms(evidence) / evidence.noise_floor,
         noise_over_neighbours=evidence.extended_held_out.rms
         / max(evidence.neighbours_arcmin, evidence.sensor_arcmin, TINY),
         left_over_passes=left_over_passes(evidence),
@@ -154,7 +157,20 @@ def find(evidence: Evidence) -> Findings:
     if facts.said:
         as_good = (*as_good, *imitating_sets(pairs, [one.id for one in effects], settings))
     as_good = tuple(dict.fromkeys(as_good))[: settings.most_rivals]
-    return Findings(evidence, replace(facts, rivals=as_good), high, pairs, effects)
+    again = found_again(evidence, effects)
+    return Findings(evidence, replace(facts, rivals=as_good, found_again=again), high, pairs, effects)
+
+
+def unseen_rms(evidence: Evidence) -> float:
+    """Error of what was found in `evidence` on turns that no stage saw, arcmin rms; cross-validated where none could be
+    spared.
+    """
+    return evidence.extended_held_out.rms if evidence.nested is None else evidence.nested.extended
+
+
+def found_again(evidence: Evidence, effects: Sequence[NamedEffect]) -> bool:
+    """Whether the diagnosis of a part of the turns, if `evidence` has one, found every one of the `effects` said."""
+    return evidence.nested is None or {one.id for one in effects} <= set(evidence.nested.effects)
 
 
 def effect_powers(candidate: Candidate) -> list[float]:
@@ -174,11 +190,14 @@ def above_resolution(evidence: Evidence) -> bool:
 
 def own_gain(evidence: Evidence) -> float:
     """How much better the effects predict, over what is left, and do so themselves: not by a better drive that was
-    found beside them. `evidence` is that of the diagnosis.
+    found beside them; no more than on turns that no stage saw, where some could be spared. `evidence` is that of the
+    diagnosis.
     """
     base, extended = evidence.base_held_out.variance, evidence.extended_held_out.variance
     own = sum(effect_powers(evidence.selection.best))
-    return min(base - extended, evidence.settings.verdict.own_power * own) / extended
+    gain = min(base - extended, evidence.settings.verdict.own_power * own) / extended
+    nested = evidence.nested
+    return gain if nested is None else min(gain, (nested.base / nested.extended) ** 2 - 1)
 
 
 def stands_out(high: Candidate, evidence: Evidence) -> bool:

@@ -7,11 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from hdopt.diagnosis.checks.confounding import Confounding
-from hdopt.diagnosis.verdict.facts import Facts, Findings, sparse
+from hdopt.diagnosis.verdict.facts import Facts, Findings, sparse, unseen_rms
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.diagnosis.verdict.residual_structure import in_what_way, locate_remainder, locate_repeated
 from hdopt.diagnosis.verdict.rivals import Sets, separating_measurement, tied_pairs
 from hdopt.diagnosis.verdict.where import Where
+from hdopt.effects import EFFECTS
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,13 @@ def more_than_noise_is_left(facts: Facts) -> bool:
     """
     much = facts.heldout_over_floor > facts.settings.heldout_over_floor
     return facts.said and much and facts.generic_t > facts.settings.remainder_t
+
+
+def not_found_again(facts: Facts) -> bool:
+    """What is said was not all found without the turns that were hidden, and misses these by clearly more than noise.
+    `facts` are those of the recording.
+    """
+    return facts.said and not facts.found_again and facts.heldout_over_floor > facts.settings.heldout_over_floor
 
 
 def too_much_for_noise(facts: Facts) -> bool:
@@ -153,6 +161,24 @@ def named_and_more(findings: Findings) -> Conclusion:
     )
     test = "take what is named away, or record without it, and see what stays"
     return Conclusion("unknown", says, findings.effects, separating_test=test, where=where)
+
+
+def unstable(findings: Findings) -> Conclusion:
+    """What explains all turns is not what a part of them shows. `findings` hold the facts and the evidence behind
+    them.
+    """
+    evidence, effects = findings.evidence, findings.effects
+    unseen, floor = unseen_rms(evidence), evidence.noise_floor
+    named = evidence.nested.effects if evidence.nested is not None else ()
+    again = " and ".join(name for name in named if name in EFFECTS) or "none of the catalogue's effects"
+    says = " ".join(found.says for found in effects)
+    says += (
+        f" A diagnosis without a part of the turns finds {again}, and misses these by {unseen:.2g} arcmin rms, "
+        f"{unseen / floor:.2g} times the noise: what is there is not known."
+    )
+    where = effects[0].where | {"rms_arcmin": math.sqrt(max(unseen**2 - floor**2, 0.0))}
+    test = "record more turns of the same motion: what is there stays, whichever of them are left out"
+    return Conclusion("unknown", says, effects, separating_test=test, where=where)
 
 
 def ambiguous(findings: Findings) -> Conclusion:
@@ -233,6 +259,7 @@ RULES = (
     Rule("generic basis wins", generic_basis_wins, unknown),
     Rule("too much for noise", too_much_for_noise, no_noise),
     Rule("more than noise is left", more_than_noise_is_left, named_and_more),
+    Rule("not found again", not_found_again, unstable),
     Rule("others are as good", others_are_as_good, ambiguous),
     Rule("named", lambda facts: facts.said, named),
     Rule("too little", lambda facts: facts.too_little, insufficient),
