@@ -14,7 +14,7 @@ from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.verdict.draw import base_notes, prior_notes
 from hdopt.diagnosis.verdict.facts import Facts, resolution
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
-from hdopt.diagnosis.verdict.rivals import imitating_sets, placebo_as_good
+from hdopt.diagnosis.verdict.rivals import imitating_sets, placebo_as_good, shared_with_imitators
 from hdopt.diagnosis.verdict.rules import RULES, rule_for
 from hdopt.effects.estimate import Parameter
 from hdopt.recordings.read import recording_from_table
@@ -99,6 +99,28 @@ def pair(**changes):
 def test_what_can_be_imitated_wholly_is_a_tie(changes, sets):
     """Would catch a name at full confidence beside `confounded` 100 % and log evidence apart 0."""
     assert imitating_sets([pair(**changes)], ["lost_motion", "thermal_drift"], DEFAULT.verdict) == sets
+
+
+def effect(name, confidence=0.97):
+    return NamedEffect(name, confidence, {}, {}, "")
+
+
+@pytest.mark.parametrize(
+    ("changes", "weighed", "confidence"),
+    [
+        ({}, (), 0.97 / 2),  # nothing apart
+        ({"evidence_apart": 3.0}, (), 0.97 / (1 + np.exp(-1.5))),
+        ({"evidence_apart": 6.0}, (), 0.97),
+        ({"imitates": 0.9}, (), 0.97),
+        ({}, (("thermal_drift", "hysteresis"),), 0.97),  # a candidate, which has its share already
+        ({"other": "thermal_drift"}, (), 0.97),
+    ],
+)
+def test_a_tie_is_no_certainty(changes, weighed, confidence):
+    """Fault caught: 0.97 for one of two names whose columns are the same."""
+    said = [effect("lost_motion"), effect("thermal_drift")]
+    shared = shared_with_imitators(said, [pair(**changes)], weighed, DEFAULT.verdict)
+    assert [one.confidence for one in shared] == pytest.approx([confidence, 0.97])
 
 
 def held(turns, variance):

@@ -30,6 +30,7 @@ from hdopt.diagnosis.verdict.rivals import (
     placebo_as_good,
     rivals,
     scale_is_as_good,
+    shared_with_imitators,
 )
 
 
@@ -153,7 +154,10 @@ def find(evidence: Evidence) -> Findings:
     effects = effects_said(evidence, facts, high)
     as_good: Sets = ()
     if facts.named:
-        as_good = (*rivals(evidence, high), *placebo_as_good(evidence, pairs))
+        as_good = rivals(evidence, high)
+    effects = shared_with_imitators(effects, pairs, as_good, settings)
+    if facts.named:
+        as_good = (*as_good, *placebo_as_good(evidence, pairs))
     if facts.said:
         as_good = (*as_good, *imitating_sets(pairs, [one.id for one in effects], settings))
     as_good = tuple(dict.fromkeys(as_good))[: settings.most_rivals]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding, confounded_with
@@ -11,6 +13,7 @@ from hdopt.diagnosis.inference.cross_validation import paired_t
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.high_order import ripple_orders
 from hdopt.diagnosis.settings import VerdictSettings
+from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.effects import EFFECTS, HIGH_ORDER
 
 Sets = tuple[tuple[str, ...], ...]
@@ -66,11 +69,33 @@ def imitating_sets(pairs: Sequence[Confounding], ids: Sequence[str], settings: V
     """The sets that explain as well because one of their effects can imitate wholly the one that it stands for: of
     `pairs` those in which the recording tells nothing apart, with `ids` said, by the `settings`.
     """
-    return tuple(
-        tuple(dict.fromkeys(pair.other if name == pair.effect else name for name in ids))
-        for pair in pairs
-        if pair.imitates >= settings.imitated and pair.evidence_apart < settings.tie and pair.other not in ids
-    )
+    return tuple(with_imitator(pair, ids) for pair in pairs if is_tie(pair, settings) and pair.other not in ids)
+
+
+def is_tie(pair: Confounding, settings: VerdictSettings) -> bool:
+    """Whether the recording tells nothing apart in a confounded `pair`, by the `settings`."""
+    return pair.imitates >= settings.imitated and pair.evidence_apart < settings.tie
+
+
+def with_imitator(pair: Confounding, ids: Sequence[str]) -> tuple[str, ...]:
+    """The set `ids` with the other of the confounded `pair` in place of the one that it could imitate."""
+    return tuple(dict.fromkeys(pair.other if name == pair.effect else name for name in ids))
+
+
+def shared_with_imitators(
+    effects: Sequence[NamedEffect], pairs: Sequence[Confounding], weighed: Sets, settings: VerdictSettings
+) -> tuple[NamedEffect, ...]:
+    """The `effects` said, each with its confidence shared with what could imitate it wholly: of confounded `pairs` that
+    the recording does not tell apart each side has the weight of its evidence, flattened by the `settings` like all
+    evidence. Sets that were `weighed` as candidates have their share already.
+    """
+    ids = [one.id for one in effects]
+    known = {frozenset(one) for one in weighed}
+    shares = dict.fromkeys(ids, 1.0)
+    for pair in pairs:
+        if is_tie(pair, settings) and pair.other not in ids and frozenset(with_imitator(pair, ids)) not in known:
+            shares[pair.effect] += math.exp(-max(pair.evidence_apart, 0.0) / settings.flatten)
+    return tuple(replace(one, confidence=one.confidence / shares[one.id]) for one in effects)
 
 
 def confounded_pairs(evidence: Evidence, named: bool, high: Candidate | None) -> tuple[Confounding, ...]:
