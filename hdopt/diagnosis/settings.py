@@ -224,7 +224,7 @@ class AlternativeSettings:
     frequency_cells: int = threshold(4, "1", "choice: oversampling of the periodogram")
     fewest_cells: int = threshold(64, "1", "choice: cells of a short record")
     lowest_frequency: float = threshold(0.4, "1/record", "theorem: slower waves are trends")
-    highest_frequency: float = threshold(0.45, "1/row", "theorem: below half the row rate (Nyquist)")
+    highest_frequency: float = threshold(0.495, "1/row", "theorem: below half the row rate (Nyquist)")
     frequencies: int = threshold(3, "1", "choice: strongest frequencies looked at")
     line_cells: int = threshold(8, "1", "theorem: cells of a line's main lobe at this oversampling")
     slow_waves: tuple[float, ...] = threshold((0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8), "1/record", "choice: slow waves")

@@ -7,7 +7,7 @@ known to be answered wrongly stands in `WRONG_YET`, and is run like the rest.
 
 import pytest
 
-from hdopt.bench.cases import simulate
+from hdopt.bench.cases import generate, simulate
 from hdopt.bench.marking import COMPARED
 from tests.regression.cases import SPECS, diagnosed
 
@@ -18,9 +18,13 @@ SIZE = 0.05
 WRONG_YET = {
     "hysteresis 0.5": "friction over 0.09 deg of output is called a delay or play",
     "cs_tooth_harmonics 1.0": "teeth cut in segments: the ramps' ends are called a defect as well",
-    "mains 1.0": "50 Hz, folded to few samples a turn, is taken as noise",
-    "slow wave 1.0": "a slow wave in time is called a coupling",
 }
+UNDECIDABLE = {
+    "slow wave 1.0": "two cycles in one pass over one output turn are also what a coupling or an oval wheel makes"
+}
+"""Outside the catalogue, but by the bench's own likelihood rule with the true noise the record cannot tell it from an
+effect: `ambiguous` is right as well.
+"""
 WRONG_SIZE_YET = {
     "local_tooth_defect 0.5": "the defect is found half a turn off, at the other zone",
     "bearing_pass 1.0": "the number of balls is not stated: the wave that counts them is under twice the others'",
@@ -53,6 +57,8 @@ def test_verdict_names_and_sizes(name, session_answers):
     named = {effect["id"] for effect in said["effects"]}
     if spec.family == "nothing":
         assert (said["verdict"], named) == ("adequate", set())
+    elif name in UNDECIDABLE:
+        assert said["verdict"] in ("ambiguous", "unknown")
     elif spec.outside:
         assert (said["verdict"], named) == ("unknown", set())
     else:
@@ -79,3 +85,11 @@ def test_every_effect_is_among_them_and_few_are_excused():
     asserted = [name for name in SPECS if name not in WRONG_YET]
     assert len(asserted) >= 40
     assert {effect for name in asserted for effect in SPECS[name].effects} == set(CATALOGUE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", UNDECIDABLE)
+def test_what_is_excused_cannot_be_told_apart(name):
+    """By the bench's likelihood rule, which knows the truth and the true noise, and no answer."""
+    key = generate(SPECS[name])[1]
+    assert key.rivals and key.margin < 1 and not key.separable

@@ -7,6 +7,7 @@ from test_cross_validation import RATE, noisy, rows_of, without_base
 
 from hdopt.diagnosis.inference import residual_noise
 from hdopt.diagnosis.inference.noise import Noise, autoregression, estimate, weights_with_a_past
+from hdopt.diagnosis.inference.nonphysical_alternatives import strongest_frequencies
 from hdopt.diagnosis.inference.residual_noise import measure_noise, roughness
 from hdopt.diagnosis.settings import DEFAULT
 
@@ -97,3 +98,14 @@ def test_a_line_is_no_noise():
     noise = measure_noise(without_base(rows)).noise
     # The sine alone has 0.07 rms; what is left of it lies a part of a resolution step beside the lines taken out.
     assert noise.sigma == pytest.approx(0.02, rel=0.25)
+
+
+@pytest.mark.parametrize("hz", [3.1, 44.9, 48.5])
+def test_lines_are_looked_for_up_to_half_the_row_rate(hz):
+    """Rows at 100 Hz; mains fold to any frequency below 50. Fault caught: a search that ends at 45 Hz and leaves a line
+    at 48.5 to the noise, however strong it is.
+    """
+    rows = noisy(40)
+    wave = np.sin(2 * np.pi * hz * rows.time + 0.3)
+    found = strongest_frequencies(rows, wave, DEFAULT.alternatives)
+    assert found[0] == pytest.approx(hz, abs=0.25 / np.ptp(rows.time))
