@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -17,6 +19,10 @@ from hdopt.geometry.contour import Circle, Contour
 POLAR, CARTESIAN = ("angle_deg", "radius_mm"), ("x_mm", "y_mm")
 FEWEST_POINTS = 16
 LARGEST_GAP = math.radians(30)
+FitMethod = Literal["least_squares", "minimum_zone"]
+MOST_PROGRAMMES, SETTLED = 20, 1e-9
+"""Linear programmes of a minimum zone at most, and the gain, mm, below which no further one is worth its while."""
+
 FARTHEST = 1.0
 """A point farther from the cam than this, mm, is not of it."""
 
@@ -91,38 +97,28 @@ def read_cam(path: Path) -> Array:
     return np.column_stack([table[:, 1] * np.sin(angle), table[:, 1] * np.cos(angle)])
 
 
-def fit_cam(points: Array, contour: Contour, probe_radius: float = 0.0) -> CamFit:
-    """Turn and move measured points onto a contour so that the sum of squared deviations is least.
+def fit_cam(points: Array, contour: Contour, probe_radius: float = 0.0, method: FitMethod = "least_squares") -> CamFit:
+    """Turn and move measured points onto a contour: by `method` so that the sum of squared deviations is least, or the
+    largest one (the minimum zone that ISO 1101 judges a form by).
 
     `points` of shape (n, 2), mm, are centres of a ball of `probe_radius` mm that touches the cam from outside (0: they
     are on the surface). Raises `HdoptError` where points are missing over more than 30 degrees or are not of this cam.
     """
-    from scipy.optimize import least_squares
-
     if not 0 <= probe_radius < math.inf:
         raise HdoptError(f"the probe radius is {probe_radius:g} mm; it must be a finite number, 0 or above")
     turns = not isinstance(contour, Circle)
 
-    def moved(x: Array) -> Array:
-        sin, cos = math.sin(x[2]), math.cos(x[2])
-        # Turned back counter-clockwise by the rotation, for angles count clockwise.
-        away = points - x[:2]
-        return np.column_stack([away[:, 0] * cos - away[:, 1] * sin, away[:, 0] * sin + away[:, 1] * cos])
-
     def residuals(x: Array) -> Array:
-        return contour.deviation(moved(np.append(x, [0.0] * (3 - len(x))))) - probe_radius
+        return contour.deviation(_moved(points, x)) - probe_radius
 
     middle = np.array([0.0, contour.offset]) if isinstance(contour, Circle) else np.zeros(2)
     _require_all_round(points - points.mean(0))
-    starts = [0.0, math.pi / 2] if turns else [0.0]
-    fits = []
-    for start in starts:
-        guess = [*(points.mean(0) - middle), start] if turns else [*(points.mean(0) - middle)]
-        fits.append(least_squares(residuals, guess, x_scale=[0.01, 0.01, 0.01][: len(guess)], xtol=1e-14, ftol=1e-14))
-    best = np.append(min(fits, key=lambda fit: fit.cost).x, [0.0] * (not turns))
+    best = _least_squares(residuals, points.mean(0) - middle, turns)
+    if method == "minimum_zone":
+        best = _least_largest(residuals, best, turns)
     # Half a turn is no difference to a cam with two like lobes.
     best[2] = (best[2] + math.pi / 2) % math.pi - math.pi / 2 if turns else 0.0
-    at = moved(best)
+    at = _moved(points, best)
     deviation = residuals(best)
     if np.abs(deviation).max() > FARTHEST:
         raise HdoptError(
@@ -137,6 +133,58 @@ def fit_cam(points: Array, contour: Contour, probe_radius: float = 0.0) -> CamFi
     return CamFit(
         float(best[2]), (float(shift[0]), float(shift[1])), angle[order], deviation[order], (surface + shift)[order]
     )
+
+
+def _moved(points: Array, x: Array) -> Array:
+    """The points less the shift x[:2], turned back counter-clockwise by x[2], for angles count clockwise."""
+    sin, cos = math.sin(x[2]), math.cos(x[2])
+    away = points - x[:2]
+    return np.column_stack([away[:, 0] * cos - away[:, 1] * sin, away[:, 0] * sin + away[:, 1] * cos])
+
+
+def _least_squares(residuals: Callable[[Array], Array], start: Array, turns: bool) -> Array:
+    """Shift (mm) and rotation (rad) with the least sum of squares; the rotation stays 0 unless the contour `turns`."""
+    from scipy.optimize import least_squares
+
+    free = 3 if turns else 2
+    fits = [
+        least_squares(
+            lambda x: residuals(np.append(x, [0.0] * (3 - free))),
+            [*start, turn][:free],
+            x_scale=[0.01] * free,
+            xtol=1e-14,
+            ftol=1e-14,
+        )
+        for turn in ([0.0, math.pi / 2] if turns else [0.0])
+    ]
+    return np.append(min(fits, key=lambda fit: fit.cost).x, [0.0] * (3 - free))
+
+
+def _least_largest(residuals: Callable[[Array], Array], start: Array, turns: bool) -> Array:
+    """Shift and rotation whose largest deviation is least, from the least squares' on.
+
+    The deviations are linear in so small a move but for second order: a few linear programmes, each about the last
+    one's answer, find it.
+    """
+    from scipy.optimize import linprog
+
+    free, x, step = (3 if turns else 2), start.copy(), 1e-5
+    for _ in range(MOST_PROGRAMMES):
+        now = residuals(x)
+        moves = step * np.eye(3)[:free]
+        slope = np.column_stack([(residuals(x + move) - residuals(x - move)) / (2 * step) for move in moves])
+        one = np.ones((len(now), 1))
+        rows, sides = np.vstack([np.hstack([slope, -one]), np.hstack([-slope, -one])]), np.concatenate([-now, now])
+        # Counted in um, or the solver's own tolerance would be as large as the answer.
+        bounds = [(-100.0, 100.0)] * free + [(0.0, None)]
+        found = linprog([0.0] * free + [1.0], rows, 1e3 * sides, bounds=bounds)
+        if not found.success:
+            break
+        tried = x + np.append(1e-3 * found.x[:free], [0.0] * (3 - free))
+        if np.abs(residuals(tried)).max() >= np.abs(now).max() - SETTLED:
+            break
+        x = tried
+    return x
 
 
 def _normals(points: Array, contour: Contour) -> Array:

@@ -40,6 +40,13 @@ if TYPE_CHECKING:
     help="What was measured: the cam itself, or the outside of the bearing on it.",
 )
 @click.option("--part", metavar="NAME", help="disc_1 or disc_2 of a two-disk wave generator.")
+@click.option(
+    "--fit",
+    type=click.Choice(["least_squares", "minimum_zone"]),
+    default="least_squares",
+    show_default=True,
+    help="Least sum of squares, or least largest deviation (ISO 1101): whose deviations are judged.",
+)
 @click.option("--plot", metavar="FILE", type=OutputFile(), help="Deviations over the angle, with the zone (SVG).")
 @click.option("--write-study", metavar="FILE", type=OutputFile(), help="The study with the measured cam (TOML).")
 @json_option
@@ -54,9 +61,8 @@ def command(cam: str, study: str | None, drive: str | None, overrides: tuple[str
     from hdopt.workflow.compare import compare, write_comparison
 
     loaded = StudyOptions(study, drive, overrides).load()
-    result = compare(
-        loaded, cam, probe_radius_mm=options["probe_radius_mm"], surface=options["surface"], part=options["part"]
-    )
+    how = {name: options[name] for name in ("probe_radius_mm", "surface", "part", "fit")}
+    result = compare(loaded, cam, **how)
     wanted = {"plot": options["plot"], "study": options["write_study"]}
     table = write_comparison(result, {kind: path for kind, path in wanted.items() if path}, loaded, cam)
     emit(result.to_dict(), options["json_file"], _lines(result, options["write_study"], table), tables=result)
@@ -68,8 +74,10 @@ def _lines(result: CompareResult, study: Path | None, table: Path | None) -> Ite
     fit, deviation = values["fit"], values["deviation_um"]
     yield f"{result.study}: {values['points']} points of the {result.part.replace('_', ' ')} ({result.surface})"
     x, y = fit["shift_um"]
-    yield f"  best fit: turned by {fit['rotation_deg']:.4f} deg, moved by ({x:.3f}, {y:.3f}) um"
+    name = fit["method"].replace("_", " ")
+    yield f"  best fit ({name}): turned by {fit['rotation_deg']:.4f} deg, moved by ({x:.3f}, {y:.3f}) um"
     yield f"  deviation: {deviation['largest']:.3f} um at most, {deviation['rms']:.3f} um rms"
+    yield f"  least zone that holds every point: {values['minimum_zone_um']:.3f} um"
     yield f"  scatter of a single point: {values['noise_um']:.3f} um"
     word = "within" if result.met else "OUTSIDE"
     yield f"  {word} the profile's zone of {values['zone_um']:.4g} um (half of it to either side)"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal  # Any: values of JSON
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.figures import drawn
 from hdopt.files import replacing_all, write_text
-from hdopt.geometry.compare import CamFit, fit_cam, read_cam, table_of
+from hdopt.geometry.compare import CamFit, FitMethod, fit_cam, read_cam, table_of
 from hdopt.geometry.contour import Contour
 from hdopt.geometry.dimensions import tolerance_bounds
 from hdopt.geometry.job import Job, make_job
@@ -45,6 +45,10 @@ class CompareResult:
     zone: float
     fit: CamFit
     eccentricity_allowed: float | None
+    method: FitMethod = "least_squares"
+    """How the points were laid onto the cam; the verdict is that of this fit."""
+    minimum_zone: float = 0.0
+    """Least width of a zone about the cam that holds every point, mm."""
 
     @property
     def met(self) -> bool:
@@ -66,7 +70,9 @@ class CompareResult:
             "points": len(self.fit.angles),
             "zone_um": 1e3 * self.zone,
             "deviation_um": {"largest": 1e3 * self.fit.largest, "rms": 1e3 * self.fit.rms},
+            "minimum_zone_um": 1e3 * self.minimum_zone,
             "fit": {
+                "method": self.method,
                 "rotation_deg": math.degrees(self.fit.rotation),
                 "shift_um": [1e3 * value for value in self.fit.shift],
             },
@@ -107,23 +113,32 @@ def compare(
     probe_radius_mm: float = 0.0,
     surface: Surface = "cam",
     part: str | None = None,
+    fit: FitMethod = "least_squares",
     files: Files | None = None,
 ) -> CompareResult:
     """Lay the measured cam of a CSV file onto the cam that a `study`, or its name or path, designs.
 
     `measured` has angle_deg,radius_mm or x_mm,y_mm of the centre of a ball of `probe_radius_mm` mm; `surface` says
-    whether the cam itself was measured or the outside of the bearing on it; `part` is one of two discs. `files`
-    to write: {"csv": PATH} or {"xlsx": PATH} the deviation of every point, {"plot": PATH} an SVG of them,
-    {"study": PATH} the study with the measured cam. Raises `HdoptError` for points that are not of this cam, and before
-    any work where a file cannot be written.
+    whether the cam itself was measured or the outside of the bearing on it; `part` is one of two discs. `fit` lays the
+    points onto the cam with the least sum of squares, or with the least largest deviation ("minimum_zone", ISO 1101),
+    and the verdict is that fit's. `files` to write: {"csv": PATH} or {"xlsx": PATH} the deviation of every point,
+    {"plot": PATH} an SVG of them, {"study": PATH} the study with the measured cam. Raises `HdoptError` for points that
+    are not of this cam, and before any work where a file cannot be written.
     """
     study, wanted = as_study(study), checked_files(files, FILES)
     bounds = tolerance_bounds(study.data)
     job = make_job(study.drive, export_options(study), study.name, bounds, study.data.get("contributors"))
     name, contour = _nominal(job, surface, part)
-    fit = fit_cam(read_cam(Path(measured)), contour, probe_radius_mm)
-    allowed = bounds.get("wg_eccentricity_mm")
-    result = CompareResult(study.name, name, surface, probe_radius_mm, job.model.profile_zone, fit, allowed)
+    points = read_cam(Path(measured))
+    fits: dict[FitMethod, CamFit] = {
+        "least_squares": fit_cam(points, contour, probe_radius_mm),
+        "minimum_zone": fit_cam(points, contour, probe_radius_mm, "minimum_zone"),
+    }
+    if fit not in fits:
+        raise HdoptError(unknown_name("fit", fit, fits))
+    allowed, least = bounds.get("wg_eccentricity_mm"), 2 * fits["minimum_zone"].largest
+    zone = job.model.profile_zone
+    result = CompareResult(study.name, name, surface, probe_radius_mm, zone, fits[fit], allowed, fit, least)
     write_comparison(result, wanted, study, str(measured))
     return result
 

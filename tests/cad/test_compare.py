@@ -70,6 +70,66 @@ def test_disc_has_no_direction():
     assert fit.deviations == pytest.approx(0.01, abs=1e-7)
 
 
+@given(
+    turn=st.floats(-5, 5),
+    x=st.floats(-0.02, 0.02),
+    amplitude=st.floats(0.001, 0.02),
+    lobes=st.sampled_from([4, 6, 8]),
+)
+@settings(max_examples=10, deadline=None)
+def test_minimum_zone_of_even_lobes_is_their_height(turn, x, amplitude, lobes):
+    """Chebyshev: a deviation that has its extreme value with alternate signs more often than a move has freedoms cannot
+    be made smaller by a move."""
+    points = measured(error=lambda t: amplitude * np.cos(lobes * t), turn=math.radians(turn), shift=(x, 0.0))
+    fit = fit_cam(points, CAM, method="minimum_zone")
+    assert fit.largest == pytest.approx(amplitude, rel=2e-3)
+    assert math.degrees(fit.rotation) == pytest.approx(turn, abs=0.01)
+
+
+def test_minimum_zone_lies_in_the_middle_of_one_high_spot():
+    """A burr of 10 um: the least largest deviation of a cam is half of it, for the whole moves away; squares leave all
+    of it. With one burr a shift of 5 um gives +5 at the burr and -5 opposite."""
+    circle = Circle(27.0)
+    angle = np.arange(360) * 2 * np.pi / 360
+    radius = 27.0 + np.where(np.arange(360) == 90, 0.010, 0.0)
+    points = np.column_stack([radius * np.sin(angle), radius * np.cos(angle)])
+    squares, least = (fit_cam(points, circle, method=method) for method in ("least_squares", "minimum_zone"))
+    assert squares.largest == pytest.approx(0.010, rel=0.02)
+    assert least.largest == pytest.approx(0.005, rel=1e-3)
+    # Across the burr the cam may lie anywhere: the bottom of the largest deviation is flat there.
+    assert least.shift[0] == pytest.approx(0.005, abs=1e-6)
+    assert least.rotation == 0.0
+
+
+def test_minimum_zone_is_the_least_of_all_moves_tried():
+    rng = np.random.default_rng(8)
+    points = measured(error=lambda t: 0.004 * np.cos(3 * t + 1) + 0.002 * np.sin(5 * t) + 0.003 * (t > 5))
+    fit = fit_cam(points, CAM, method="minimum_zone")
+    assert fit.largest < fit_cam(points, CAM).largest
+    sin, cos = math.sin(fit.rotation), math.cos(fit.rotation)
+    back = points @ np.array([[cos, sin], [-sin, cos]]) - fit.shift
+    assert np.abs(CAM.deviation(back)).max() == pytest.approx(fit.largest, abs=1e-9)
+    for turn, x, y in rng.normal(0, [2e-4, 1e-3, 1e-3], (60, 3)).tolist():
+        near = back @ np.array([[1.0, turn], [-turn, 1.0]]) - (x, y)
+        # The least of the linear programme's own tolerance, 1e-7 um, and a matrix that turns to first order.
+        assert np.abs(CAM.deviation(near)).max() >= fit.largest - 2e-6
+
+
+def test_command_judges_by_the_fit_that_is_asked(tmp_path, capsys):
+    """One burr of 6 um: outside +-3.75 um by least squares, within the zone where the cam may move."""
+    angle = np.arange(720)
+    cam = save(tmp_path / "burr.csv", measured(error=lambda t: np.where(angle == 180, 0.006, 0.0)))
+    code, said = run(capsys, cam, "--json", "-")
+    assert code == 1 and json.loads(said.out)["fit"]["method"] == "least_squares"
+    least = json.loads(said.out)["minimum_zone_um"]
+    code, said = run(capsys, cam, "--fit", "minimum_zone", "--json", "-")
+    values = json.loads(said.out)
+    assert code == 0 and values["met"] and values["minimum_zone_um"] == least
+    assert values["deviation_um"]["largest"] == pytest.approx(least / 2)
+    code, said = run(capsys, cam, "--fit", "minimum_zone")
+    assert "best fit (minimum zone)" in said.out and "least zone that holds every point: " in said.out
+
+
 def run(capsys, *arguments):
     with pytest.raises(SystemExit) as stopped:
         main(["compare", *map(str, arguments)])
@@ -87,7 +147,7 @@ def test_command_says_within_and_outside(tmp_path, capsys):
     values = json.loads(said.out)
     assert code == 0 and values["met"] is True
     assert values["deviation_um"]["largest"] == pytest.approx(3.0, abs=0.1)
-    assert set(values["fit"]) == {"rotation_deg", "shift_um"}
+    assert set(values["fit"]) == {"method", "rotation_deg", "shift_um"}
     outside = save(tmp_path / "out.csv", measured(error=lambda t: 0.006 * np.cos(6 * t)))
     code, said = run(capsys, outside, "--plot", tmp_path / "plot.svg", "--csv", tmp_path / "points.csv")
     assert code == 1 and "OUTSIDE the profile's zone of 7.5 um" in said.out
