@@ -48,6 +48,7 @@ class Step:
     def check(self, path: Path, job: Job, name: str) -> JsonReady:
         from hdopt.geometry.callouts import callouts_of
         from hdopt.geometry.check import CheckFailed, check_step, tolerance_failures
+        from hdopt.geometry.pmi_practice import departures
         from hdopt.geometry.step import read_step
 
         schema = job.options.step_schema
@@ -56,7 +57,7 @@ class Step:
             made = [part for part in job.model.parts if not part.context]
             callouts = [callout for part in made for callout in callouts_of(part, job.model)]
             text = path.read_text(encoding="latin-1")
-            if failures := tolerance_failures(text, callouts):
+            if failures := [*tolerance_failures(text, callouts), *departures(text)]:
                 raise CheckFailed(name, failures)
             outcome["tolerances"] = sum(len(callout.frames) for callout in callouts)
             outcome["sizes"] = sum(callout.size is not None for callout in callouts)

@@ -85,8 +85,9 @@ def part_number(job: Job, number: int) -> str:
 
 
 def product_data(job: Job) -> dict[str, ProductData]:
-    """Number, material and callouts of each part of a `job` that is made, by its name."""
-    return {
+    """Number, material and callouts of each part of a `job` that is made, by its name; and the assembly's number."""
+    whole = {job.identity.title: ProductData(part_number(job, 0))}
+    return whole | {
         part.name: ProductData(part_number(job, number), *material(part), callouts_of(part, job.model))
         for number, part in enumerate((part for part in job.model.parts if not part.context), 1)
     }

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any  # Any: objects of OCP whose types it does
 
 from hdopt.errors import HdoptError
 from hdopt.geometry.day import moment
+from hdopt.geometry.part21_repair import repaired
 
 if TYPE_CHECKING:
     import cadquery as cq
@@ -59,11 +60,12 @@ class StepFile:
 
 @dataclass(frozen=True)
 class ProductData:
-    """What a file says of one part beside its shape: number, material, density (kg/mm^3), tolerances of its faces."""
+    """What a file says of one part beside its shape: number, material, density (kg/mm^3), tolerances of its faces; of
+    an assembly, the number alone."""
 
     number: str
-    material: str
-    density: float
+    material: str = ""
+    density: float = 0.0
     callouts: tuple[Callout, ...] = ()
 
 
@@ -115,10 +117,11 @@ def write_step(
         raise RuntimeError("Open CASCADE could not translate the parts to STEP")
 
     _add_colours(session, document, [part for part, _ in parts])
-    _number_products(writer.ChangeWriter().Model(), products or {})
+    _number_products(writer.ChangeWriter().Model(), products or {}, identity)
     _write_header(writer.ChangeWriter().Model(), identity)
     if writer.Write(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise HdoptError(f"cannot write {path}; give a file in a folder that can be written")
+    path.write_text(repaired(path.read_text(encoding="latin-1")), encoding="latin-1")
 
 
 def _add_colours(session: Any, document: TDocStd_Document, parts: Sequence[Part]) -> None:
@@ -191,9 +194,15 @@ def _add_product(document: TDocStd_Document, name: str, product: ProductData) ->
     annotate(document, label, product.callouts)
 
 
-def _number_products(model: Any, products: Mapping[str, ProductData]) -> None:
-    """The products' identifiers are their part numbers, their descriptions the material; their names stay."""
-    from OCP.StepBasic import StepBasic_Product
+def _number_products(model: Any, products: Mapping[str, ProductData], identity: Identity) -> None:
+    """The products' identifiers are their part numbers, their descriptions the material; their names stay. Each has
+    the fingerprint as its revision, and a density has the unit g/cm^3, of which Open CASCADE has other powers."""
+    from OCP.StepBasic import (
+        StepBasic_DerivedUnitElement,
+        StepBasic_Product,
+        StepBasic_ProductDefinitionFormation,
+        StepBasic_SiUnitAndMassUnit,
+    )
     from OCP.TCollection import TCollection_HAsciiString
 
     for index in range(1, model.NbEntities() + 1):
@@ -202,6 +211,10 @@ def _number_products(model: Any, products: Mapping[str, ProductData]) -> None:
             product = products[entity.Name().ToCString()]
             entity.SetId(TCollection_HAsciiString(_ascii(product.number)))
             entity.SetDescription(TCollection_HAsciiString(_ascii(product.material)))
+        elif isinstance(entity, StepBasic_ProductDefinitionFormation):
+            entity.SetId(TCollection_HAsciiString(identity.fingerprint))
+        elif isinstance(entity, StepBasic_DerivedUnitElement):
+            entity.SetExponent(1.0 if isinstance(entity.Unit(), StepBasic_SiUnitAndMassUnit) else -3.0)
 
 
 def read_step(path: Path) -> StepFile:
