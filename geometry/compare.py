@@ -147,14 +147,12 @@ def _least_squares(residuals: Callable[[Array], Array], start: Array, turns: boo
     from scipy.optimize import least_squares
 
     free = 3 if turns else 2
+
+    def of_free(x: Array) -> Array:
+        return residuals(np.append(x, [0.0] * (3 - free)))
+
     fits = [
-        least_squares(
-            lambda x: residuals(np.append(x, [0.0] * (3 - free))),
-            [*start, turn][:free],
-            x_scale=[0.01] * free,
-            xtol=1e-14,
-            ftol=1e-14,
-        )
+        least_squares(of_free, [*start, turn][:free], x_scale=[0.01] * free, xtol=1e-14, ftol=1e-14)
         for turn in ([0.0, math.pi / 2] if turns else [0.0])
     ]
     return np.append(min(fits, key=lambda fit: fit.cost).x, [0.0] * (3 - free))
@@ -178,7 +176,7 @@ def _least_largest(residuals: Callable[[Array], Array], start: Array, turns: boo
         # Counted in um, or the solver's own tolerance would be as large as the answer.
         bounds = [(-100.0, 100.0)] * free + [(0.0, None)]
         found = linprog([0.0] * free + [1.0], rows, 1e3 * sides, bounds=bounds)
-        if not found.success:
+        if found.x is None:
             break
         tried = x + np.append(1e-3 * found.x[:free], [0.0] * (3 - free))
         if np.abs(residuals(tried)).max() >= np.abs(now).max() - SETTLED:
