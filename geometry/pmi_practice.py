@@ -39,7 +39,8 @@ def arguments(body: str) -> list[str]:
 
 
 def record(body: str, name: str) -> list[str] | None:
-    """The arguments of the record `name` in an instance, simple or complex; None where it has none of that name."""
+    """The arguments of the record `name` in the `body` of an instance, simple or complex; None where it has no such
+    record."""
     found = re.search(rf"(?<![A-Z_]){name}\s*\(", body)
     if found is None:
         return None

@@ -43,6 +43,11 @@ def test_keyway_is_round_in_its_corners_and_reaches_no_farther_than_said():
     assert far == pytest.approx(bore.reach, abs=1e-3) and bore.reach < 9.6
     area = math.pi * 49 + volume_of(slot) / 4 - half_disc_in_strip(7.0, 5.0)
     assert bore.area_with_disc(0.0) == pytest.approx(area, rel=1e-9)
+    # A strip as wide as the bore is deep holds all of it; one that ends where the corners begin, all but their bottom.
+    assert bore.area_in_strip(2 * bore.bottom) == pytest.approx(area, rel=1e-12)
+    corner = bore.key.corner
+    rest = (5.0 - 2 * corner) * corner + math.pi * corner**2 / 2
+    assert area - bore.area_in_strip(2 * (bore.bottom - corner)) == pytest.approx(rest, rel=1e-9)
 
 
 def half_disc_in_strip(radius: float, width: float) -> float:
