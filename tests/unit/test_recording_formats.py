@@ -134,6 +134,39 @@ def test_a_clock_of_another_name_beside_the_default_angles_is_taken(truth, tmp_p
         np.testing.assert_allclose(found.time - found.time[0], time - time[0], atol=1e-6)
 
 
+def lines_of(truth, ending=""):
+    time, theta, output = truth
+    rows = zip(time, np.degrees(theta), np.degrees(output), strict=True)
+    return ["time_s,input_angle_deg,output_angle_deg", *(f"{t:.6f},{a:.9f},{b:.12f}{ending}" for t, a, b in rows)]
+
+
+def test_lines_with_too_many_fields_are_counted_and_said(truth, tmp_path, recwarn):
+    """Would catch rows lost without a word, and the warning of a library on the terminal."""
+    lines = lines_of(truth)
+    lines[40] += ",7"
+    lines[90] += ",8,9"
+    (tmp_path / "r.csv").write_text("\n".join(lines))
+    found = read_recording(tmp_path / "r.csv", RATIO)
+    assert any("2 lines with more fields than the header names left out" in said for said in found.understood)
+    assert len(found) == ROWS - 2 and not recwarn.list
+
+
+def test_a_separator_at_the_end_of_each_line_is_no_field(truth, tmp_path, recwarn):
+    (tmp_path / "r.csv").write_text("\n".join(lines_of(truth, ",")))
+    assert len(read_recording(tmp_path / "r.csv", RATIO)) == ROWS
+    assert not recwarn.list
+
+
+def test_fields_that_the_header_does_not_name_are_never_dropped_unseen(truth, tmp_path, recwarn):
+    """Would catch a field cut off each row because every line ends with a separator and one of them in a number."""
+    lines = lines_of(truth, ",")
+    lines[60] += "5"
+    (tmp_path / "r.csv").write_text("\n".join(lines))
+    with pytest.raises(HdoptError, match=r"r\.csv: its rows have more fields than the 3 that its header names"):
+        read_recording(tmp_path / "r.csv", RATIO)
+    assert not recwarn.list
+
+
 def test_counts_gear_and_turns(truth, tmp_path):
     """An encoder of 16384 counts behind a gear of 3 on the input, the output in turns, both beyond one overflow."""
     time, theta, output = truth

@@ -10,21 +10,27 @@ import codecs
 import csv
 import gzip
 import re
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any  # Any: arrays of numbers and of text, as the file's format has them
+from typing import TYPE_CHECKING, Any  # Any: arrays of numbers and of text, as the file's format has them
 
 import numpy as np
 
 from hdopt.errors import HdoptError
 from hdopt.recordings.table import Channel, Table
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 SAMPLE_BYTES = 65_536
 COMMENTS = ("#", "%", "//", '"#', "!")
 SEPARATORS = (";", "\t", "|", ",", " ")
 SEPARATOR_NAMES = {";": "semicolon", "\t": "tab", "|": "bar", ",": "comma", " ": "blanks"}
 NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?|[-+]?(nan|inf|infinity)", re.IGNORECASE)
+MOST_LINES = 0.8
+"""Share of the lines from which they decide how the file is written."""
 MISSING = ("", "na", "n/a", "null", "none", "-", "--", "nan")
 
 
@@ -47,8 +53,6 @@ def read(path: Path, wanted: Sequence[str] | None) -> Table:
 
     `path` of the file; `wanted` names the columns that will be used, None for all.
     """
-    import pandas as pd
-
     raw = _open(path)
     encoding = _encoding(raw)
     lines = raw.decode(encoding, errors="replace").splitlines()
@@ -59,28 +63,50 @@ def read(path: Path, wanted: Sequence[str] | None) -> Table:
     layout = find_layout(lines if len(raw) < SAMPLE_BYTES else lines[:-1], encoding, path.name)
     names = list(layout.header)
     use = list(wanted) if wanted and set(wanted) <= set(names) else None
-    frame = pd.read_csv(
-        path,
-        sep=r"\s+" if layout.separator == " " else layout.separator,
-        decimal=layout.decimal,
-        encoding=layout.encoding,
-        compression="gzip" if path.suffix.lower() == ".gz" else None,
-        header=None,
-        names=names,
-        index_col=False,
-        usecols=use,
-        skiprows=layout.first_row,
-        comment="#",
-        skipinitialspace=True,
-        low_memory=False,
-        on_bad_lines="skip",
-        na_values=["-", "--"],
-    )
+    frame, left_out = _frame(path, layout, use)
     units = dict(zip(names, layout.units, strict=False))
     channels: dict[str, Channel] = {}
     for name in [str(column) for column in frame]:
         channels[name] = Channel(_values(frame.pop(name), layout.decimal), units.get(name, ""))
-    return Table(channels, _notes(layout))
+    return Table(channels, (*_notes(layout), *left_out))
+
+
+def _frame(path: Path, layout: Layout, use: list[str] | None) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """The columns `use` of the file (all for None), and a sentence on the lines that have too many fields.
+
+    Raises `HdoptError` where all lines have: what the header does not name would be dropped unseen.
+    """
+    import pandas as pd
+
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", pd.errors.ParserWarning)
+        frame = pd.read_csv(
+            path,
+            sep=r"\s+" if layout.separator == " " else layout.separator,
+            decimal=layout.decimal,
+            encoding=layout.encoding,
+            compression="gzip" if path.suffix.lower() == ".gz" else None,
+            header=None,
+            names=list(layout.header),
+            index_col=False,
+            usecols=use,
+            skiprows=layout.first_row,
+            comment="#",
+            skipinitialspace=True,
+            low_memory=False,
+            on_bad_lines="warn",
+            na_values=["-", "--"],
+        )
+    said = [str(one.message) for one in told if issubclass(one.category, pd.errors.ParserWarning)]
+    if any("Length of header" in text for text in said):
+        raise HdoptError(
+            f"{path.name}: its rows have more fields than the {len(layout.header)} that its header names; name them "
+            "all, or see whether a decimal comma stands where the comma separates"
+        )
+    skipped = sum(text.count("Skipping line") for text in said)
+    if not skipped:
+        return frame, ()
+    return frame, (f"{skipped} line{'s' if skipped > 1 else ''} with more fields than the header names left out",)
 
 
 def _notes(layout: Layout) -> tuple[str, ...]:
@@ -156,7 +182,7 @@ def find_layout(lines: Sequence[str], encoding: str, name: str) -> Layout:
         raise HdoptError(f"{name} holds no rows; give a recording with samples in it")
     body = [line for _, line in numbered]
     separator = _separator(body)
-    cells = [split(line, separator) for line in body]
+    cells = _without_end_separators([split(line, separator) for line in body])
     widths = [len(row) for row in cells]
     tail = widths[len(widths) // 2 :]
     width = max(set(tail), key=tail.count)
@@ -184,13 +210,21 @@ def find_layout(lines: Sequence[str], encoding: str, name: str) -> Layout:
     )
 
 
+def _without_end_separators(cells: list[list[str]]) -> list[list[str]]:
+    """The rows without the empty cell that a separator at the end of most lines makes."""
+    ended = [len(row) > 1 and not row[-1] for row in cells[len(cells) // 2 :]]
+    if sum(ended) < MOST_LINES * len(ended):
+        return cells
+    return [row[:-1] if len(row) > 1 and not row[-1] else row for row in cells]
+
+
 def _separator(body: Sequence[str]) -> str:
     """The first separator that cuts most lines into the same number of cells, two at least."""
     sample = list(body[-200:]) if len(body) > 3 else list(body)
     for separator in SEPARATORS:
         widths = [len(split(line, separator)) for line in sample]
         usual = max(set(widths), key=widths.count)
-        if usual >= 2 and widths.count(usual) >= 0.8 * len(widths):
+        if usual >= 2 and widths.count(usual) >= MOST_LINES * len(widths):
             return separator
     return ","
 
