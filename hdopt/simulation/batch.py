@@ -21,7 +21,7 @@ from hdopt.simulation.model import ExtendedModel
 from hdopt.simulation.operation import Operation
 
 WALK_PER_TURN, TABLE_PER_TURN = 180, 1440
-"""Angles of the first walk, and places of the table, in an input turn at least."""
+"""Cells, and places of the table, in an input turn at least."""
 WALK_PER_PERIOD, TABLE_PER_PERIOD = 8, 32
 """The same in a period of the highest order."""
 BLOCK = 64
@@ -98,15 +98,16 @@ def matrix_peak_to_peak_arcmin(drive: Drive, matrix: Array, added: AddedTable, h
     `homogenization` is k_e, which evens out what the zones drive. Within 1e-3 arcmin of `simulation.extremes` in the
     closed form (a test measures it).
     """
-    from hdopt.simulation.walk_kernel import extended_block
+    from hdopt.simulation.cell_kernel import cell_table, extended_block
 
     matrix = np.ascontiguousarray(matrix, dtype=np.float64)
     out = np.empty(len(matrix))
-    constants = _constants(drive, homogenization)
-    coarse_zones, coarse_beside = added.walked
+    tip, tan_alpha, advance, turns, scale = _constants(drive, homogenization)
+    cells = added.zones.shape[2] // (added.stride * turns)
+    table = cell_table(added.zones, added.beside, cells, turns, scale)
 
     def fill(rows: slice) -> None:
-        extended_block(*constants, matrix[rows], added.zones, added.beside, coarse_zones, coarse_beside, out[rows])
+        extended_block(tip, tan_alpha, advance, scale, matrix[rows], table, out[rows])
 
     in_blocks(len(matrix), BLOCK, fill)
     return out

@@ -1,7 +1,6 @@
-"""The compiled walk: converged peak-to-peak of one drive with effects, whose values over a relative turn are a table.
+"""The compiled walk of one drive with effects: its kinematic error over every turn, and extremes near a place.
 
-Effects break the order that lets the base's kernel look at one input turn only, so every turn is walked: on a grid of
-angles first, then by golden section around the best local extremes. The base is the closed form
+Effects break the order that lets the base's kernel look at one input turn only. The base is the closed form
 (Jia 2021, Eqs. (16) to (32)); effects are interpolated in their table.
 """
 
@@ -17,7 +16,6 @@ from hdopt.kinematics.closed_form import RigidMotion, RimConstants, TipGeometry
 from hdopt.kinematics.compiled_closed_form import (
     compiled,
     entry,
-    inlined,
     motion_at,
     motion_of_row,
     rim_constants,
@@ -25,10 +23,6 @@ from hdopt.kinematics.compiled_closed_form import (
     tooth_deviation,
 )
 
-CANDIDATES = 40
-"""Local extremes of the grid that are followed, on either side."""
-STEPS = 16
-"""Golden-section steps: a cell of 2 deg shrinks to 1e-3 deg."""
 GOLDEN = (math.sqrt(5) - 1) / 2
 CELLS, BISECTIONS, MOST_CUTS = 120, 34, 16
 """Cells of an input turn in which changes of rim are looked for, halvings that place one (within 1e-11 rad), and most.
@@ -54,9 +48,10 @@ class WalkedDrive(NamedTuple):
     span: float
 
 
-@inlined
-def _rims(drive: WalkedDrive, cos: float, sin: float, s: float) -> tuple[float, float]:
-    """Deviation (mm of arc) of zone s (+1, -1) without its FS teeth, and the FS offset o', at the deeper rim."""
+@compiled
+def rims(drive: WalkedDrive, cos: float, sin: float, s: float) -> tuple[float, float]:
+    """Deviation (mm of arc) of zone `s` (+1, -1) of a `drive` without its FS teeth, and the FS offset o', at the deeper
+    rim; `cos` and `sin` are those of the input angle."""
     rim = drive.rim
     e_a, e_l, t_a, t_l = motion_at(drive.motion, cos, sin)
     depth, o, o_fs = rim_depth(rim, e_a, e_l, t_a, t_l, s, 1.0)
@@ -72,8 +67,8 @@ def _at(drive: WalkedDrive, theta: float, zones: Array, beside: Array) -> float:
     """Kinematic error (arcmin) at `theta` (rad), with effects interpolated in `zones` (2, n, mm) and `beside` (n)."""
     a_fs, fs_phase, advance, scale, span = drive.a_fs, drive.fs_phase, drive.advance, drive.scale, drive.span
     cos, sin = math.cos(theta), math.sin(theta)
-    one, o_one = _rims(drive, cos, sin, 1.0)
-    two, o_two = _rims(drive, cos, sin, -1.0)
+    one, o_one = rims(drive, cos, sin, 1.0)
+    two, o_two = rims(drive, cos, sin, -1.0)
     n = len(beside)
     place = theta / span
     place = (place - math.floor(place)) * n
@@ -87,9 +82,9 @@ def _at(drive: WalkedDrive, theta: float, zones: Array, beside: Array) -> float:
     return error
 
 
-@inlined
-def _rims_apart(drive: WalkedDrive, theta: float, s: float) -> float:
-    """How much deeper (mm) rim 1 than rim 2 lies in zone s at `theta`."""
+@compiled
+def rims_apart(drive: WalkedDrive, theta: float, s: float) -> float:
+    """How much deeper (mm) rim 1 than rim 2 lies in zone `s` of a `drive` at `theta`, rad."""
     e_a, e_l, t_a, t_l = motion_at(drive.motion, math.cos(theta), math.sin(theta))
     depth, _, _ = rim_depth(drive.rim, e_a, e_l, t_a, t_l, s, 1.0)
     other, _, _ = rim_depth(drive.rim, e_a, e_l, t_a, t_l, s, -1.0)
@@ -104,15 +99,15 @@ def _switches(drive: WalkedDrive, cuts: Array) -> int:
     """
     found, cell = 0, 2 * math.pi / CELLS
     for s in (1.0, -1.0):
-        before = _rims_apart(drive, 0.0, s) > 0
+        before = rims_apart(drive, 0.0, s) > 0
         for k in range(1, CELLS + 1):
             right = k * cell
-            after = _rims_apart(drive, right, s) > 0
+            after = rims_apart(drive, right, s) > 0
             if after != before and found < len(cuts):
                 left = right - cell
                 for _ in range(BISECTIONS):
                     middle = 0.5 * (left + right)
-                    if (_rims_apart(drive, middle, s) > 0) == before:
+                    if (rims_apart(drive, middle, s) > 0) == before:
                         left = middle
                     else:
                         right = middle
@@ -181,84 +176,6 @@ def _lowest_near(
 
 
 @compiled
-def _follow(
-    drive: WalkedDrive,
-    cuts: Array,
-    values: Array,
-    sign: float,
-    zones: Array,
-    beside: Array,
-    best: Array,
-    places: Index,
-    least: float,
-) -> float:
-    """Least of sign times the kinematic error over the turn, from its `values` on an even grid of the turn; `least` is
-    one that is known already.
-
-    Local extremes of the grid are followed in order of how deep they may reach: within a cell a kink or a trough lies
-    no deeper than the steeper of its sides falls.
-    """
-    n, kept = len(values), 0
-    worst_kept = math.inf
-    for i in range(n):
-        value, before, after = sign * values[i], sign * values[i - 1], sign * values[(i + 1) % n]
-        if value > before or value > after:
-            continue
-        reach = 2 * value - max(before, after)
-        if reach >= worst_kept:
-            continue
-        at = kept if kept < CANDIDATES else CANDIDATES - 1
-        while at > 0 and best[at - 1] > reach:
-            best[at], places[at] = best[at - 1], places[at - 1]
-            at -= 1
-        best[at], places[at] = reach, i
-        kept = min(kept + 1, CANDIDATES)
-        if kept == CANDIDATES:
-            worst_kept = best[kept - 1]
-    step = drive.span / n
-    for k in range(kept):
-        if best[k] >= least:
-            break
-        found, _ = _lowest_near(drive, cuts, places[k] * step, step, sign, zones, beside, STEPS)
-        least = min(least, found, sign * values[places[k]])
-    return least
-
-
-@compiled
-def _extremes_at_switches(
-    drive: WalkedDrive, cuts: Array, turns: int, zones: Array, beside: Array
-) -> tuple[float, float]:
-    """Least and largest kinematic error (arcmin) at either side of every change of rim, over all turns: these lie at
-    the same input angles in every turn, and only the phase of the FS teeth moves on.
-    """
-    a_fs, fs_phase, advance, scale, span = drive.a_fs, drive.fs_phase, drive.advance, drive.scale, drive.span
-    n, least, largest = len(beside), math.inf, -math.inf
-    for k in range(2 * len(cuts)):
-        theta = cuts[k // 2] + (EDGE if k % 2 else -EDGE)
-        cos, sin = math.cos(theta), math.sin(theta)
-        one, o_one = _rims(drive, cos, sin, 1.0)
-        two, o_two = _rims(drive, cos, sin, -1.0)
-        phase = advance * theta + fs_phase
-        one_sin, one_cos = a_fs * math.sin(phase + o_one), a_fs * math.cos(phase + o_one)
-        two_sin, two_cos = -a_fs * math.sin(phase - o_two), -a_fs * math.cos(phase - o_two)
-        start = theta / span
-        start = (start - math.floor(start)) * n
-        for t in range(turns):
-            turned = 2 * math.pi * advance * t
-            cos_t, sin_t = math.cos(turned), math.sin(turned)
-            place = start + t * (n / turns)
-            i = int(place)
-            share = place - i
-            i %= n
-            j = (i + 1) % n
-            first = one + cos_t * one_sin + sin_t * one_cos + zones[0, i] + share * (zones[0, j] - zones[0, i])
-            second = two + cos_t * two_sin + sin_t * two_cos + zones[1, i] + share * (zones[1, j] - zones[1, i])
-            value = scale * max(first, second) + beside[i] + share * (beside[j] - beside[i])
-            least, largest = min(least, value), max(largest, value)
-    return least, largest
-
-
-@compiled
 def _walk(
     drive: WalkedDrive, per_turn: int, turns: int, zones: Array, beside: Array, grid: Array, values: Array
 ) -> None:
@@ -271,8 +188,8 @@ def _walk(
     for g in range(per_turn):
         theta = 2 * math.pi * g / per_turn
         cos, sin = math.cos(theta), math.sin(theta)
-        one, o_one = _rims(drive, cos, sin, 1.0)
-        two, o_two = _rims(drive, cos, sin, -1.0)
+        one, o_one = rims(drive, cos, sin, 1.0)
+        two, o_two = rims(drive, cos, sin, -1.0)
         phase = advance * theta + fs_phase
         grid[0, g], grid[1, g] = one, two
         grid[2, g], grid[3, g] = a_fs * math.sin(phase + o_one), a_fs * math.cos(phase + o_one)
@@ -289,48 +206,15 @@ def _walk(
 
 
 @compiled
-def _drive_of(tip: TipGeometry, tan_alpha: float, advance: float, turns: int, scale: float, e: Array) -> WalkedDrive:
-    """All that the kinematic error at one angle needs; `e` (12) holds the errors as in ERROR_NAMES."""
+def drive_of(tip: TipGeometry, tan_alpha: float, advance: float, turns: int, scale: float, e: Array) -> WalkedDrive:
+    """All that the kinematic error at one angle needs.
+
+    `tip`, `tan_alpha` and `advance` (Z_CS/Z_FS) are the drive's, `turns` the input turns of a full relative turn,
+    `scale` is arcmin per mm of arc, times k_e, and `e` (12,) holds the errors as in ERROR_NAMES.
+    """
     motion, cs_cos, cs_sin = motion_of_row(tip, e)
     span = 2 * math.pi * turns
     return WalkedDrive(rim_constants(tip), motion, cs_cos, cs_sin, tan_alpha, e[10], e[11], advance, scale, span)
-
-
-@entry
-def extended_block(
-    tip: TipGeometry,
-    tan_alpha: float,
-    advance: float,
-    turns: int,
-    scale: float,
-    matrix: Array,
-    zones: Array,
-    beside: Array,
-    coarse_zones: Array,
-    coarse_beside: Array,
-    out: Array,
-) -> None:
-    """Fill `out` (n,) with the peak-to-peak (arcmin) of each row of `matrix` (n, 12), errors as in ERROR_NAMES.
-
-    `tip`, `tan_alpha` and `advance` (Z_CS/Z_FS) are the drive's; `scale` is arcmin per mm of arc, times k_e. `zones`
-    (d, 2, m) in mm and `beside` (d, m) in arcmin are the effects on an even grid of the relative turn of `turns` input
-    turns, for each of d directions of motion; `coarse_zones` and `coarse_beside` the same on the grid that is walked
-    first.
-    """
-    directions, walked = coarse_beside.shape
-    per_turn = walked // turns
-    values, grid = np.empty(walked), np.empty((6, per_turn))
-    best, places, every_cut = np.empty(CANDIDATES), np.empty(CANDIDATES, np.int64), np.empty(MOST_CUTS)
-    for row in range(matrix.shape[0]):
-        drive = _drive_of(tip, tan_alpha, advance, turns, scale, matrix[row])
-        cuts = every_cut[: _switches(drive, every_cut)]
-        lowest, highest = math.inf, -math.inf
-        for d in range(directions):
-            _walk(drive, per_turn, turns, coarse_zones[d], coarse_beside[d], grid, values)
-            low, high = _extremes_at_switches(drive, cuts, turns, zones[d], beside[d])
-            lowest = min(lowest, _follow(drive, cuts, values, 1.0, zones[d], beside[d], best, places, low))
-            highest = max(highest, -_follow(drive, cuts, values, -1.0, zones[d], beside[d], best, places, -high))
-        out[row] = highest - lowest
 
 
 @entry
@@ -347,11 +231,11 @@ def extended_walk(
     """Kinematic error (arcmin) of one drive on the grid of the first walk, for each direction: shape (d, walked).
 
     `row` (12,) holds its errors as in ERROR_NAMES; `tip`, `tan_alpha`, `advance`, `turns`, `scale`, `coarse_zones` and
-    `coarse_beside` as in `extended_block`.
+    `coarse_beside` as in `cell_kernel.extended_block`.
     """
     directions, walked = coarse_beside.shape
     values, grid = np.empty((directions, walked)), np.empty((6, walked // turns))
-    drive = _drive_of(tip, tan_alpha, advance, turns, scale, row)
+    drive = drive_of(tip, tan_alpha, advance, turns, scale, row)
     for d in range(directions):
         _walk(drive, walked // turns, turns, coarse_zones[d], coarse_beside[d], grid, values[d])
     return values
@@ -377,10 +261,10 @@ def extended_near(
     `way` (k), and where: shape (2, k).
 
     `row` (12,) holds the drive's errors as in ERROR_NAMES; `tip`, `tan_alpha`, `advance`, `turns`, `scale`, `zones` and
-    `beside` as in `extended_block`. `steps` is the number of golden-section steps.
+    `beside` as in `cell_kernel.extended_block`. `steps` is the number of golden-section steps.
     """
     found = np.empty((2, len(theta)))
-    drive = _drive_of(tip, tan_alpha, advance, turns, scale, row)
+    drive = drive_of(tip, tan_alpha, advance, turns, scale, row)
     every_cut = np.empty(MOST_CUTS)
     cuts = every_cut[: _switches(drive, every_cut)]
     for k in range(len(theta)):
