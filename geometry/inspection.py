@@ -59,7 +59,7 @@ def inspection_plan(job: Job) -> tuple[Check, ...]:
 
     def add(part: str, feature: str, size: tuple[float, float, float] | None, zone: float | None, source: str) -> None:
         width = zone if zone is not None else (size[2] - size[1] if size else 0.0)
-        uncertainty = UNCERTAINTY_SHARE * width
+        uncertainty = float(f"{UNCERTAINTY_SHARE * width:.6g}")  # an instrument's, without the noise of the arithmetic
         instrument = next(name for limit, name in INSTRUMENTS if uncertainty <= limit)
         nominal, low, high = size if size else (None, None, None)
         found.append(

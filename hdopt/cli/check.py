@@ -30,14 +30,24 @@ def command(study: str, json_file: Path | None) -> int:
     return 0 if found.complete else 1
 
 
+def _always_missing(found: StudyCheck) -> list[str]:
+    """The keys that everything lacks, where that is more than one calculation's concern."""
+    first, *others = [one.missing for one in found.capabilities]
+    return [key for key in first if all(key in missing for missing in others)]
+
+
 def _lines(found: StudyCheck) -> Iterator[str]:
     yield f"{found.study}:"
+    always = _always_missing(found)
+    if always:
+        yield f"  nothing can be computed without {', '.join(always)}; each line says what it needs besides"
     for one in found.capabilities:
         commands = ", ".join(f"hdopt {name}" for name in one.commands)
         if one.can:
             yield f"  yes  {one.what} ({commands})"
         elif one.missing:
-            yield f"  no   {one.what}: give {', '.join(one.missing)}"
+            besides = [key for key in one.missing if key not in always]
+            yield f"  no   {one.what}" + (f": give {', '.join(besides)}" if besides else "")
         else:
             yield f"  no   {one.what}: {one.why}"
     for said in found.defaults:

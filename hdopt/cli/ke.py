@@ -47,6 +47,10 @@ def command(
     return status(True, verdict)
 
 
+NIL_ARCMIN = 5e-5
+"""An order below it would be shown as 0.0000."""
+
+
 def _lines(result: KinematicErrorResult) -> Iterator[str]:
     yield f"{result.study}: {result.profile} wave generator, {result.structure}"
     yield f"  peak-to-peak, converged (k_e = 1)    {result.peak_to_peak_arcmin:9.4f} arcmin"
@@ -69,7 +73,10 @@ def _lines(result: KinematicErrorResult) -> Iterator[str]:
             share = 100 * lag["interference_share"]
             yield f"  flanks interfere over {share:.1f} % of the angles: this drive needs more backlash"
     yield "  order         amplitude  from"
-    for order in result.orders:
+    large = [order for order in result.orders if order["amplitude_arcmin"] >= NIL_ARCMIN]
+    for order in large:
         yield f"  {order['symbol']:12s}  {order['amplitude_arcmin']:9.4f}  {order['origin']}"
+    if few := len(result.orders) - len(large):
+        yield f"  {few} orders below {NIL_ARCMIN:g} arcmin are left out"
     for note in result.notes:
         yield f"  note: {note}"

@@ -134,6 +134,8 @@ def result_lines(result: SearchResult) -> Iterator[str]:
         title, unit = VARIABLES[name]
         yield _row(title, unit, value, baseline.variables.get(name))
     for key, value in best.quantities.items():
+        if key in best.variables:
+            continue
         yield _row(QUANTITIES[key].title, QUANTITIES[key].unit, value, baseline.quantities.get(key))
     if result.active:
         yield "  held by"

@@ -73,6 +73,10 @@ class DriveSection(Section):
         )
 
 
+MOST_DEFLECTION = 3.0
+"""Modules; makers' drives have 0.8 to 1.2, and beyond 3 the sizes are those of two drives."""
+
+
 class WaveGeneratorSection(Section):
     """[wave_generator]: profile, structure and size of the wave generator."""
 
@@ -105,6 +109,7 @@ class WaveGeneratorSection(Section):
     def build_profile(self, drive: DriveGeometry, folder: Path) -> WaveGeneratorProfile:
         undeformed = drive.flexspline_inner_radius
         semi_major = undeformed + drive.module if self.semi_major_mm is None else self.semi_major_mm
+        self._check_deflection(semi_major - undeformed, drive)
         if self.profile == "ellipse":
             if self.semi_minor_mm is None:
                 return Ellipse.of_equal_perimeter(undeformed, semi_major)
@@ -118,6 +123,16 @@ class WaveGeneratorSection(Section):
         if self.file is None:
             raise MissingValue("the measured profile", "wave_generator.file")
         return self._measured(folder / self.file)
+
+    def _check_deflection(self, deflection: float, drive: DriveGeometry) -> None:
+        """Refuse a wave generator of another drive, whose size is far from the flexspline's."""
+        if self.profile != "measured" and not 0 < deflection <= MOST_DEFLECTION * drive.module:
+            size = f"{abs(deflection):.4g} mm {'beyond' if deflection > 0 else 'below'}"
+            raise HdoptError(
+                f"semi_major_mm is {self.semi_major_mm}, {size} drive.flexspline_inner_radius_mm = "
+                f"{drive.flexspline_inner_radius:g}; a wave generator deflects the flexspline by about one module, "
+                f"{drive.module:g} mm here: give the sizes of one drive, or leave semi_major_mm and semi_minor_mm out"
+            )
 
     def _measured(self, file: Path) -> WaveGeneratorProfile:
         """The flexspline's inner wall: the measured table itself, or the bearing's thickness outside it."""

@@ -291,7 +291,7 @@ class RequirementSection(Section):
     peak_to_peak_arcmin: Positive
     """Largest converged peak-to-peak of the kinematic error that a drive may have."""
     required_yield: float = Field(default=0.9973, gt=0, lt=1, alias="yield")
-    """Share of drives that must keep it (`yield` in the file, which is no name that Python allows)."""
+    """Share of drives that must keep it."""
     homogenization: Literal["single_tooth", "contact"] = "single_tooth"
     """Whose error the limit is for: of a single tooth pair (k_e = 1), or evened out by the teeth in contact."""
 

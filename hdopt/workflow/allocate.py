@@ -89,7 +89,10 @@ def items_of(study: Study, space: InputSpace) -> tuple[list[Item], dict[str, str
     for name, row in rows.items():
         value = space.tolerances[name].value
         if value is None:
-            raise HdoptError(f"{name} has a cost but no tolerance: bound it (upper), a direction has none to pay for")
+            raise HdoptError(
+                f"{name} has a cost but no tolerance: its distribution has no end. Give it one, as in upper = 0.01; "
+                "a direction has no tolerance, so leave its cost out"
+            )
         try:
             model = row.build(gear)
         except HdoptError as error:

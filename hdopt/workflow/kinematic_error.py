@@ -13,7 +13,7 @@ from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.drive.profiles import perimeter_error, tip_radius_of_curvature
-from hdopt.errors import HdoptError, MissingValue
+from hdopt.errors import HdoptError
 from hdopt.figures import drawn
 from hdopt.kinematics.extremes import extremes_arcmin, walked_peak_to_peak_arcmin
 from hdopt.kinematics.load_sharing import misalignment_share
@@ -180,7 +180,7 @@ def figures(values: Mapping[str, object]) -> pd.DataFrame:
 
 
 class _Notes:
-    """Runs computations that may lack a number: the value, or None and a note of what is missing."""
+    """Runs computations that may fail beside the one that was asked for: the value, or None and a note of why."""
 
     def __init__(self) -> None:
         self.notes: list[str] = []
@@ -188,7 +188,7 @@ class _Notes:
     def value(self, function: Callable[..., T], *arguments: object) -> T | None:
         try:
             return function(*arguments)
-        except MissingValue as error:
+        except HdoptError as error:
             if str(error) not in self.notes:
                 self.notes.append(str(error))
             return None

@@ -114,23 +114,28 @@ def of_allocation(result: AllocateResult) -> Verdict:
 def of_search(study: Study, result: SearchResult) -> Verdict | None:
     """The best design in the `result` of a search of `study` against [requirement], in the quantity that was searched
     for; None where the study has none, where that is no peak-to-peak, or is of another share of drives."""
+    return _of_best(study, result.objective, result.setup.settings.quantile, result.best.quantities)
+
+
+def _of_best(study: Study, objective: str, share: float, quantities: Mapping[str, float]) -> Verdict | None:
+    """The best design's `quantities` against [requirement], where the `objective` is a peak-to-peak of one drive or of
+    the `share` of drives that the requirement asks for."""
     section = _requirement(study)
     if section is None or section.homogenization == "contact":
         return None
-    quantile = "quantile" in result.objective
-    if quantile and result.setup.settings.quantile != section.required_yield:
+    quantile = "quantile" in objective
+    if quantile and share != section.required_yield:
         return None
-    key = result.objective if quantile else "peak_to_peak_arcmin"
-    if key not in result.best.quantities:
+    key = objective if quantile else "peak_to_peak_arcmin"
+    if key not in quantities:
         return None
     what = f"peak-to-peak of {100 * section.required_yield:g} % of drives" if quantile else "peak-to-peak"
-    value = result.best.quantities[key]
-    return Verdict(f"{what}, best design", value, section.peak_to_peak_arcmin, "arcmin")
+    return Verdict(f"{what}, best design", quantities[key], section.peak_to_peak_arcmin, "arcmin")
 
 
 def of_run(study: Study, found: Mapping[str, Mapping[str, Any]]) -> Verdict | None:
     """The requirement of `study` against what the steps of a run `found`, their results by name: the yield of its
-    stack, else its drive's peak-to-peak."""
+    stack, else its drive's peak-to-peak, else that of the best design of its search."""
     section = _requirement(study)
     if "yield" in found.get("stack", {}):
         needed = found["stack"]["required_yield"]
@@ -139,4 +144,10 @@ def of_run(study: Study, found: Mapping[str, Mapping[str, Any]]) -> Verdict | No
         value = found["waveform"].get("peak_to_peak_arcmin")
         if isinstance(value, float):
             return Verdict("peak-to-peak", value, section.peak_to_peak_arcmin, "arcmin")
+    searched = found.get("search", {})
+    if "best" in searched:
+        from hdopt.study.search import SearchSection
+
+        share = study.section("search", SearchSection, "a search").quantile
+        return _of_best(study, searched["objective"], share, searched["best"]["quantities"])
     return None

@@ -19,7 +19,11 @@ def section_of_run(verdict: Verdict | None, found: Found) -> Section | None:
     """The verdict of a run with what its steps `found`; None where no requirement was judged."""
     if verdict is None:
         return None
-    ruling = Ruling(verdict.met, _of_yield(verdict, found["stack"]) if verdict.at_least else _of_drive(verdict))
+    if verdict.at_least:
+        says = _of_yield(verdict, found["stack"])
+    else:
+        says = _of_drive(verdict) if "waveform" in found else _of_best_design(verdict)
+    ruling = Ruling(verdict.met, says)
     reasons = [*_of_stack(found), *_of_one_drive(verdict, found), *_of_allocation(found), *_of_search(found)]
     return verdict_section(ruling, reasons)
 
@@ -36,6 +40,15 @@ def _of_drive(verdict: Verdict) -> str:
     by = f"{abs(verdict.margin):.3g} {verdict.unit}"
     return (
         f"The drive in [errors] has {verdict.value:.4g} {verdict.unit} peak-to-peak, {verdict.limit:.4g} "
+        f"{verdict.unit} is allowed: {by} {'to spare' if verdict.met else 'too much'}."
+    )
+
+
+def _of_best_design(verdict: Verdict) -> str:
+    by = f"{abs(verdict.margin):.3g} {verdict.unit}"
+    what = verdict.quantity.partition(", ")[0]
+    return (
+        f"The chosen wave generator has a {what} of {verdict.value:.4g} {verdict.unit}, {verdict.limit:.4g} "
         f"{verdict.unit} is allowed: {by} {'to spare' if verdict.met else 'too much'}."
     )
 
@@ -107,4 +120,13 @@ def _of_allocation(found: Found) -> list[str]:
 
 def _of_search(found: Found) -> list[str]:
     search = found.get("search", {})
-    return ["Another wave generator was searched for: [[trade-chosen-combinations]]."] if "best" in search else []
+    if "best" not in search:
+        return []
+    if "stack" in found or "waveform" in found:
+        return ["Another wave generator was searched for: [[trade-chosen-combinations]]."]
+    objective = search["objective"]
+    best, before = search["best"]["quantities"][objective], search["baseline"]["quantities"][objective]
+    pair = f"{before:.4g} where the chosen one has {best:.4g}"
+    says = [f"The study's own drive has {pair}: [[trade-chosen-against-baseline]]."]
+    held = [in_sentence(price["title"]) for price in search["active"]]
+    return [*says, f"What holds it is {listed(held)}: [[trade-chosen-prices]]."] if held else says

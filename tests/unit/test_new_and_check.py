@@ -284,3 +284,43 @@ def test_a_study_that_says_everything_falls_back_on_nothing():
     without = study.with_({"requirement": {"peak_to_peak_arcmin": 1.0}})
     (line,) = defaults_taken(without.sections, ("requirement",))
     assert line == "[requirement] falls back on yield = 0.9973, homogenization = single_tooth"
+
+
+def test_sizes_of_another_drive_are_said(tmp_path):
+    """Would catch a new drive that keeps the wave generator of the one that it was copied from: 'the teeth overlap'."""
+    sizes = {"flexspline_teeth": 200, "circular_spline_teeth": 202, "module_mm": 0.25}
+    changes = {f"drive.{key}": value for key, value in (sizes | {"flexspline_inner_radius_mm": 24.1}).items()}
+    with pytest.raises(HdoptError, match=r"semi_major_mm is 31\.046, 6\.946 mm beyond .*leave semi_major_mm"):
+        assert hdopt.load_study("csf-25-80").with_(changes).drive
+    own = hdopt.load_study("csf-25-80").with_(changes | {"semi_major_mm": 24.35, "semi_minor_mm": 23.85})
+    assert own.drive.wave_generator.profile.semi_major == 24.35
+
+
+def test_teeth_that_overlap_all_round_do_not_hide_the_kinematic_error():
+    """The addenda bear on the contact angle alone: a note says what is wrong with them."""
+    study = hdopt.load_study("csf-25-80").with_(flexspline_addendum_mm=0.9)
+    result = hdopt.kinematic_error(study)
+    assert result.peak_to_peak_arcmin == hdopt.kinematic_error("csf-25-80").peak_to_peak_arcmin
+    assert result.contact_angle_deg is None and "overlap all round" in " ".join(result.notes)
+
+
+def test_what_everything_lacks_is_said_once(tmp_path, capsys):
+    (tmp_path / "own.toml").write_text(
+        "[drive]\nflexspline_teeth = 200\ncircular_spline_teeth = 202\nmodule_mm = 0.25\n"
+        "[errors]\naxis_eccentricity_mm = 0.01\naxis_eccentricity_direction_deg = 0\n"
+    )
+    with pytest.raises(SystemExit):
+        main(["check", str(tmp_path / "own.toml")])
+    out = capsys.readouterr().out
+    for key in ("drive.pressure_angle_deg", "drive.flexspline_inner_radius_mm", "wave_generator.width_mm"):
+        assert out.count(key) == 1
+    assert "  no   kinematic error of one drive\n" in out
+    assert "  no   lag at reversal: give clearances.backlash_mm\n" in out
+
+
+def test_orders_that_are_nil_are_counted_not_listed(capsys):
+    with pytest.raises(SystemExit):
+        main(["ke", "csf-25-80", "--set", "fs_tooth_amplitude_mm=0", "--set", "wg_eccentricity_mm=0"])
+    out = capsys.readouterr().out
+    assert "   0.0000  " not in out and "E1, CS teeth" in out
+    assert "orders below 5e-05 arcmin are left out" in out

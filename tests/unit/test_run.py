@@ -210,3 +210,27 @@ def test_a_step_nobody_listed_is_left_out_where_the_machine_lacks_a_library(mini
     result = run_study(minimal, tmp_path / "out")
     assert "install libgl1" in result.steps["orders"].results["left_out"]
     assert result.answer
+
+
+def test_a_trade_page_begins_with_a_verdict_too():
+    """Would catch the page of a search alone, which began without a word on the requirement."""
+    quantities = {"peak_to_peak_quantile_arcmin": 0.72, "peak_to_peak_arcmin": 0.65}
+    search = {
+        "objective": "peak_to_peak_quantile_arcmin",
+        "best": {"quantities": quantities},
+        "baseline": {"quantities": {"peak_to_peak_quantile_arcmin": 1.094}},
+        "active": [{"title": "Mean flank pressure"}, {"title": "Pressure angle"}],
+    }
+    study = load_study("csf-25-80-design-trade")
+    section = section_of_run(of_run(study, {"search": search}), {"search": search})
+    ruling, points = section.items
+    assert ruling.met and ruling.text == (
+        "The chosen wave generator has a peak-to-peak of 99.73 % of drives of 0.72 arcmin, 1 arcmin is allowed: "
+        "0.28 arcmin to spare."
+    )
+    assert points.sentences == (
+        "The study's own drive has 1.094 where the chosen one has 0.72: [[trade-chosen-against-baseline]].",
+        "What holds it is mean flank pressure and pressure angle: [[trade-chosen-prices]].",
+    )
+    other = study.with_({"requirement.yield": 0.99})
+    assert of_run(other, {"search": search}) is None, "the quantile of another share of drives proves nothing"

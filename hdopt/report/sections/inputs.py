@@ -21,6 +21,9 @@ SHOWN = {
     "effects": "Effects beyond the base model",
     "operation": "Operating condition",
     "linear_stack": "Linear stack",
+    "allocate": "Allocation",
+    "export": "Wave generator as files",
+    "search": "Search",
 }
 """Sections of a study whose keys are shown as they are, with their headings."""
 SPREAD = {"tolerances": "Tolerances", "contributors": "Callouts"}

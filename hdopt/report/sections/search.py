@@ -41,8 +41,10 @@ Axis = tuple[str, str, str, Callable[[DesignRecord], float | None]]
 
 CURVES = 6
 """Combinations with a curve of their own in the figure of a front."""
-LINES = 60
+LINES = 30
 """Designs with a line of their own in parallel coordinates."""
+NIL = 1e-6
+"""A quantity below this share of the baseline's is nil: what a limit at zero leaves of rounding."""
 CHANGED = 5e-4
 """A quantity that differs by less than this share is called unchanged."""
 
@@ -136,10 +138,18 @@ def _not_modelled(result: SearchResult) -> str:
     if gaps := break_evens(result):
         structure = in_sentence(label(result.best.structure))
         more = "a further" if result.setup.trade.structure_costs else "worth"
-        words += f" The structure ({structure}) stays the choice until what it costs is {more} {', '.join(gaps)}."
+        worth = _in_words(", ".join(gaps))
+        words += f" The structure ({structure}) stays the choice until what it costs is {more} {worth}."
     if costs := structure_costs(result):
         words += f" {costs[:1].upper()}{costs[1:]}."
     return words
+
+
+def _in_words(says: str) -> str:
+    """What is said of structures by their keys, in words."""
+    for structure in DASHES:
+        says = says.replace(f"beside {structure}", f"beside {in_sentence(label(structure))}")
+    return says
 
 
 def _against_baseline(result: SearchResult) -> pd.DataFrame:
@@ -155,6 +165,7 @@ def _against_baseline(result: SearchResult) -> pd.DataFrame:
         quantity, before = QUANTITIES[key], baseline.quantities[key]
         if key == "width_mm":
             continue
+        value = 0.0 if abs(value) < NIL * abs(before) else value
         share = value / before - 1 if before else 0.0
         if abs(share) < CHANGED:
             verdict = "unchanged"
@@ -173,7 +184,7 @@ def _price_row(price: Mapping[str, Any]) -> dict[str, str]:
         "kind": price["kind"],
         "at": number(price["at"], price["unit"]),
         "one unit is worth": f"{price['per_unit']:.3g} arcmin per {price['unit'] or 'unit'}",
-        "one per cent is worth": f"{0.01 * abs(price['at']) * price['per_unit']:.2g} arcmin",
+        "one per cent is worth": f"{0.01 * abs(price['at']) * price['per_unit']:.2g} arcmin" if price["at"] else "–",
     }
 
 
@@ -305,6 +316,7 @@ def designs_section(result: SearchResult, key: str = "trade-designs") -> Section
         for k in PARALLEL
         if all(k in d.quantities for d in every)
     ]
+    axes = [axis for axis in axes if len({axis[-1](design) for design in every}) > 1]
     drawn = _thinned(shown, result.objective)
     made = _parallel(axes, drawn, result)
     fewer = (
@@ -320,7 +332,8 @@ def designs_section(result: SearchResult, key: str = "trade-designs") -> Section
                 f"{key}-parallel",
                 "Every design of the fronts over its variables and what comes of them",
                 made,
-                f"{fewer}Each line is a design, each axis runs from its least to its largest value. A line without a "
+                f"{fewer}Each line is a design, each axis runs from its least to its largest value; what never "
+                "varies has none. A line without a "
                 "wrap angle passes below that axis. Hover for the whole design.",
             ),
         ),
