@@ -47,3 +47,30 @@ def test_jacobian_is_the_slope(drive):
 def test_errors_and_cartesian_are_inverse(study):
     there = to_cartesian(study.errors, 4.5)
     np.testing.assert_allclose(to_drive_errors(there, 4.5).to_matrix(), study.errors.to_matrix(), atol=1e-12)
+
+
+@pytest.mark.parametrize("rows", [1, 127, 128, 129, 300])
+def test_every_angle_is_evaluated_as_if_alone(drive, rows):
+    """Blocks of lanes have edges; what acts in the zones goes with its own angle."""
+    rng = np.random.default_rng(rows)
+    model = CartesianModel.of(drive)
+    theta, extra = rng.uniform(0, 500, rows), rng.normal(size=(2, rows)) * 1e-3
+    errors = rng.normal(size=12) * 0.01
+    together = model.evaluate(theta, errors, extra)
+    for i in {0, rows // 2, rows - 1}:
+        alone = model.evaluate(theta[i : i + 1], errors, extra[:, i : i + 1])
+        for one, many in zip(alone, together, strict=True):
+            np.testing.assert_array_equal(one[0], many[i])
+
+
+def test_far_tips_are_met_at_their_sine(drive):
+    """Errors a hundred times too large move the tip round the spline by radians: the compiled sines are those of the
+    mathematical library there too, to 1e-12 of teeth of 10 mm."""
+    model = CartesianModel.of(drive)
+    theta = np.linspace(0, 80 * TURN, 4001)
+    cartesian = np.array([3.0, -2.0, 0.1, 0.2, 1.0, 2.0, 0.1, 0.1, 10.0, -5.0, 8.0, 3.0])
+    errors = to_drive_errors(cartesian, model.half_width)
+    value, _, _ = model.evaluate(theta, cartesian)
+    np.testing.assert_allclose(
+        value, kinematic_error_arcmin(drive, errors, theta, "closed form"), rtol=1e-11, atol=1e-8
+    )
