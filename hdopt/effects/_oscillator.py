@@ -15,15 +15,10 @@ from hdopt.arrays import Array, Index
 from hdopt.drive.geometry import ARCMIN
 from hdopt.effects.conditions import TURN, Conditions
 
-PER_PERIOD = 40
-"""Steps of the even clock in a period of the oscillator, at least: straight lines between 12 would take 2 % off a
-wave's height and put as much into damping and gain.
-"""
-MOST_STEPS = 400_000
 FEWEST_ROWS = 8
 """Rows of a piece from which it is integrated."""
-FASTEST = 2.5
-"""Circular frequency times step beyond which the clock cannot follow."""
+SAME_STEP = 1e-9
+"""Relative difference below which two steps of the clock are the same: a millionth of a turn after a thousand rows."""
 
 
 def relative_responses(
@@ -32,8 +27,8 @@ def relative_responses(
     """x - y for each of the excitations y (arcmin, (n, k)) along the times of the `conditions`, at each pair of
     `weights` (2, m) of the two dampers; shape (n, k, m).
 
-    Integrated on an even clock in each contiguous piece by Tustin's rule, prewarped at the resonance (`frequency`, Hz;
-    `damping` zeta). Zero in pieces of fewer than 8 rows.
+    Exact for excitations that are straight lines between the rows of each contiguous piece, and still before it, of an
+    oscillator at `frequency` (Hz) of `damping` ratio zeta. Zero in pieces of fewer than 8 rows.
     """
     kinds = weights.shape[1]
     lanes = np.repeat(excitations, kinds, axis=1)  # every excitation beside itself, once for each pair of weights
@@ -67,52 +62,36 @@ def _swing(
     frequency `w` (rad/s) in each of the `pieces` (q, 2) of the rows; into `result` (n, k).
     """
     for start, end in pieces:
-        rows = end - start
-        if rows < FEWEST_ROWS:
-            continue
-        span = time[end - 1] - time[start]
-        count = min(max(rows, int(span * PER_PERIOD * (w / TURN)) + 1), MOST_STEPS)
-        step = span / (count - 1)
-        if w * step > FASTEST:
-            continue
-        k = w / math.tan(w * step / 2)
-        first = k * k + 2 * damping * w * k + w * w
-        poles = ((2 * w * w - 2 * k * k) / first, (k * k - 2 * damping * w * k + w * w) / first)
-        across, outside = k * k / first, 2 * damping * w * k / first
-        zeros = np.empty((3, excitations.shape[1]))
-        zeros[0] = -across * weights[0] - outside * weights[1]
-        zeros[1] = 2 * across * weights[0]
-        zeros[2] = -across * weights[0] + outside * weights[1]
-        _filtered(time[start:end], excitations[start:end], zeros, poles, step, count, result[start:end])
+        if end - start >= FEWEST_ROWS:
+            _between_knots(time[start:end], excitations[start:end], weights, w, damping, result[start:end])
 
 
 @njit(cache=True, nogil=True)
-def _filtered(
-    time: Array, excitations: Array, zeros: Array, poles: tuple[float, float], step: float, count: int, result: Array
-) -> None:
-    """Filters of `zeros` (3, k) and the same `poles`, one for each of the `excitations` (n, k), all at once along
-    `count` even steps, straight lines between clock and rows; into `result` (n, k).
+def _between_knots(time: Array, excitations: Array, weights: Array, w: float, damping: float, result: Array) -> None:
+    """The swing of one piece into `result` (n, k); arguments as for `_swing`, on the rows of the piece.
+
+    Where y is a straight line, y'' is zero: the oscillator swings freely about the rest that the outer damper gives it
+    at this rate, -2 zeta y'/w. Where the rate of y jumps, e' jumps by as much the other way.
     """
     rows, lanes = excitations.shape
-    newer, older, before, now = np.zeros(lanes), np.zeros(lanes), np.zeros(lanes), np.zeros(lanes)
-    at, told = 0, 0
-    for i in range(count):
-        moment = time[0] + i * step
-        while at < rows - 2 and time[at + 1] <= moment:
-            at += 1
-        part = min((moment - time[at]) / max(time[at + 1] - time[at], 1e-300), 1.0)
+    free = w * math.sqrt(1 - damping * damping)
+    place, rate, slope = np.zeros(lanes), np.zeros(lanes), np.zeros(lanes)
+    known, cos, sin = -1.0, 1.0, 0.0
+    result[0] = 0.0
+    for i in range(rows - 1):
+        step = time[i + 1] - time[i]
+        if abs(step - known) > SAME_STEP * known:
+            decay = math.exp(-damping * w * step)
+            known, cos, sin = step, decay * math.cos(free * step), decay * math.sin(free * step)
+        lean, to_rate, to_place = damping * w / free * sin, w * w / free * sin, sin / free
         for c in range(lanes):
-            low = excitations[at, c]
-            y = low + part * (excitations[at + 1, c] - low) - excitations[0, c]
-            e = zeros[0, c] * y + newer[c]
-            newer[c] = zeros[1, c] * y - poles[0] * e + older[c]
-            older[c] = zeros[2, c] * y - poles[1] * e
-            before[c], now[c] = now[c], e
-        while i > 0 and told < rows and min(int((time[told] - time[0]) / step), count - 2) < i:
-            rest = (time[told] - time[0]) / step - (i - 1)
-            for c in range(lanes):
-                result[told, c] = before[c] + rest * (now[c] - before[c])
-            told += 1
+            steeper = (excitations[i + 1, c] - excitations[i, c]) / step if step > 0 else slope[c]
+            rest = -2 * damping / w * weights[1, c] * steeper
+            beyond, now = place[c] - rest, rate[c] - weights[0, c] * (steeper - slope[c])
+            place[c] = rest + (cos + lean) * beyond + to_place * now
+            rate[c] = (cos - lean) * now - to_rate * beyond
+            slope[c] = steeper
+            result[i + 1, c] = place[c]
 
 
 def settled_responses(time: Array, excitation: Array, frequency: float, damping: float) -> Array:
