@@ -21,7 +21,7 @@ from hdopt.diagnosis.orientation import Orientation, is_decisive, preference, tu
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.high_order import find_ripple, strong_ripple, subtract, subtracted_terms
 from hdopt.diagnosis.search.search_state import SearchPlan
-from hdopt.diagnosis.search.subset_search import Selection, select
+from hdopt.diagnosis.search.subset_search import Selection, first_look, select
 from hdopt.diagnosis.settings import DiagnosisSettings
 from hdopt.diagnosis.state import State
 from hdopt.effects.sines import sine_columns
@@ -235,28 +235,44 @@ def smooth_model(
 
 def better_way(state: State, turned: State, preferred: float) -> State:
     """Of `state` and its `turned` counterpart the one whose effects and base explain more together, whatever the base
-    alone `preferred`; `state`, by convention, where that is a tie.
+    alone `preferred`; `state`, by convention, where that is a tie. A first look decides where it is clear enough.
     """
-    other = fit_base_in_noise(turned)
-    sigma2 = state.problem.noise.sigma**2
-    scores = []
+    other, settings = fit_base_in_noise(turned), state.settings.orientation
+    ways = []
     for way in (state, other):
         problem = way.problem.with_noise(state.problem.noise)
         base = refine(on_problem(way.base, problem), way.settings.fit.known_iterations)
-        plan = SearchPlan(skip=way.ruled_out, clean=way.clean)
-        found = select(base, state.inflation, way.draws(), plan)
-        left = found.base.objective / sigma2 / state.inflation / 2
-        scores.append(found.best.log_bayes_factor - left)
-    if abs(scores[0] - scores[1]) < state.settings.orientation.tie:
-        return replace(state, orientation=replace(state.orientation, decided_by="convention"))
-    return state if scores[0] > scores[1] else other
+        ways.append(replace(way, base=base, inflation=state.inflation))
+    looks = [first_look(way.base, way.inflation, way.draws(), plan_of(way)) - unexplained(way) for way in ways]
+    if abs(looks[0] - looks[1]) > settings.first_look:
+        return state if looks[0] > looks[1] else other
+    ways = [search_effects(way) for way in ways]
+    scores = [way.selection.best.log_bayes_factor - unexplained(way) for way in ways]
+    if abs(scores[0] - scores[1]) < settings.tie:
+        return replace(ways[0], orientation=replace(state.orientation, decided_by="convention"))
+    # Turned round, the noise is another, and the search goes on in it from what was found.
+    return ways[0] if scores[0] > scores[1] else replace(other, selection=ways[1].selection)
+
+
+def unexplained(state: State) -> float:
+    """What the base of `state` leaves, as the log evidence against it."""
+    return state.base.objective / state.problem.noise.sigma**2 / state.inflation / 2
+
+
+def plan_of(state: State) -> SearchPlan:
+    """What a search from `state` on is to do."""
+    known = leaders_on(state.selection, state.problem)
+    return SearchPlan(skip=state.ruled_out, clean=state.clean, known=known)
 
 
 def search_effects(state: State) -> State:
-    """Which effects explain what the base leaves. `state` is where the work stands."""
+    """Which effects explain what the base leaves, unless it was looked for already: in this noise that stands, in
+    another it is where the search begins. `state` is where the work stands.
+    """
+    if state.searched:
+        return state
     rng = state.draws()
-    plan = SearchPlan(skip=state.ruled_out, clean=state.clean)
-    return replace(state.found(select(state.base, state.inflation, rng, plan)), rng=rng)
+    return replace(state.found(select(state.base, state.inflation, rng, plan_of(state))), rng=rng, searched=True)
 
 
 def measure_noise_again(state: State) -> State:

@@ -27,6 +27,7 @@ class State:
     (n,) arcmin (`ripple`, None for nothing). `inflation` says how much rougher the noise is than its model. `rng` is
     the stream of random drives: a stage draws from a copy (`draws`) and hands that on, so that it can be run again.
     `orientation` says which way the angles were counted: `recordings` and everything after stand as counted there.
+    `searched`: whether the `selection` is that of a search in the noise that stands here.
     """
 
     recordings: tuple[Recording, ...]
@@ -40,6 +41,7 @@ class State:
     inflation: float
     rng: np.random.Generator
     orientation: Orientation = AS_COUNTED
+    searched: bool = False
 
     @property
     def problem(self) -> FitProblem:

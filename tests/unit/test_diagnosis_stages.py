@@ -24,6 +24,7 @@ from hdopt.diagnosis.stages import (
     fit_base_in_noise,
     fit_time_warp,
     measure_noise_again,
+    only_base,
     search_effects,
     search_high_orders,
     search_without_ripple,
@@ -271,10 +272,52 @@ def test_a_scale_that_is_right_is_one(in_noise):
 def test_on_a_part_of_the_turns_an_open_orientation_is_not_searched_for(in_noise, monkeypatch, preferred, counted):
     """Would catch two more searches in every held-out figure, three quarters of a diagnosis's time."""
     monkeypatch.setattr(stages, "preference", lambda as_counted, turned: preferred)
-    monkeypatch.setattr(stages, "select", None)
+    monkeypatch.setattr(stages, "first_look", None)
     assert choose_orientation_by_base(in_noise).orientation.input == counted
     with pytest.raises(TypeError, match="not callable"):
         choose_orientation(in_noise)
+
+
+@pytest.mark.parametrize(("ahead", "counted"), [(1e6, 1), (-1e6, -1)])
+def test_a_clear_first_look_saves_the_search_both_ways(in_noise, monkeypatch, ahead, counted):
+    looks = iter([ahead, 0.0])
+    monkeypatch.setattr(stages, "preference", lambda as_counted, turned: 0.0)
+    monkeypatch.setattr(stages, "first_look", lambda *about: next(looks))
+    monkeypatch.setattr(stages, "select", None)
+    after = choose_orientation(in_noise)
+    assert (after.orientation.input, after.orientation.decided_by) == (counted, "data")
+    assert not after.searched
+
+
+def test_what_was_searched_for_the_orientation_is_not_searched_again(in_noise, monkeypatch):
+    """A first look that decides nothing, then a search each way: the one as counted stands in its own noise."""
+    monkeypatch.setattr(stages, "preference", lambda as_counted, turned: 0.0)
+    monkeypatch.setattr(stages, "unexplained", lambda way: 0.0)
+    monkeypatch.setattr(stages, "first_look", lambda *about: 1.0)
+    searches = []
+
+    def searched(base, inflation, rng, plan):
+        searches.append(base)
+        return only_base(base, inflation)
+
+    monkeypatch.setattr(stages, "select", searched)
+    after = choose_orientation(in_noise)
+    assert len(searches) == 2
+    assert after.searched
+    assert search_effects(after) is after
+
+
+def test_a_search_in_another_noise_goes_on_from_what_was_found(searched, monkeypatch):
+    """Would catch the whole catalogue looked at again where the recording was turned round."""
+    plans = []
+
+    def select(base, inflation, rng, plan):
+        plans.append(plan)
+        return only_base(base, inflation)
+
+    monkeypatch.setattr(stages, "select", select)
+    search_effects(replace(searched, searched=False))
+    assert [fit.terms[0].effect for fit in plans[0].known][:1] == ["encoder_input_eccentricity"]
 
 
 def test_every_stage_has_its_place():

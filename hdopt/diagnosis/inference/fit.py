@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from hdopt.diagnosis.inference.base_excitation import driven_by, excites, is_dri
 from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.newey_west import newey_west
 from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.inference.normal_equations import solved
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
 from hdopt.effects.base import Explanation
@@ -147,12 +149,12 @@ class Fit:
             excite += [excites(term)] * (len(blocks) - len(excite))
         if any(is_driven(term) for term in self.terms):
             blocks = self._all_seen(blocks, excite, keep)
-        return np.column_stack(blocks)
+        return side_by_side(blocks)
 
     def _all_seen(self, blocks: list[Array], excite: list[bool], keep: Sequence[int] | None) -> list[Array]:
         """`blocks` of columns as the output shows them: those that `excite` what swings behind it, all at once."""
         exciting = [block for block, does in zip(blocks, excite, strict=True) if does]
-        seen = self.seen(np.column_stack(exciting), keep)
+        seen = self.seen(side_by_side(exciting), keep)
         parts = iter(np.split(seen, np.cumsum([block.shape[1] for block in exciting])[:-1], axis=1))
         return [next(parts) if does else block for block, does in zip(blocks, excite, strict=True)]
 
@@ -217,6 +219,17 @@ class Fit:
             found.append(FitEstimate(values, covariance[start:end, start:end]))
             start = end
         return found
+
+
+def side_by_side(blocks: Sequence[Array]) -> Array:
+    """`blocks` of columns, each (n, k), beside each other, (n, q); every column lies in one piece, as filters and
+    products read it.
+    """
+    ends = list(accumulate((block.shape[1] for block in blocks), initial=0))
+    columns = np.empty((len(blocks[0]), ends[-1]), order="F")
+    for block, (start, end) in zip(blocks, pairwise(ends), strict=True):
+        columns[:, start:end] = block
+    return columns
 
 
 def term_columns(term: Term, zone: Index, base: CartesianModel | None) -> Array:
@@ -306,13 +319,15 @@ def _improved(fit: Fit, damping: float, move_shapes: bool) -> tuple[Fit | None, 
     normal = white.T @ white
     gradient = white.T @ problem.noise.whiten(fit.residual)
     gradient[:wb] -= precision[:wb] * fit.errors
-    normal[np.diag_indices_from(normal)] += precision
-    scale = np.sqrt(np.maximum(np.diag(normal), settings.scale_floor))
+    diagonal = slice(None, None, len(normal) + 1)
+    normal.flat[diagonal] += precision
+    scale = np.sqrt(np.maximum(normal.flat[diagonal], settings.scale_floor))
+    scaled = normal / (scale[:, None] * scale)
     for _ in range(settings.damping_tries):
-        damped = normal / np.outer(scale, scale)
-        damped[np.diag_indices_from(damped)] += damping
+        damped = scaled.copy()
+        damped.flat[diagonal] += damping
         try:
-            step = np.linalg.solve(damped, gradient / scale) / scale
+            step = solved(damped, gradient / scale) / scale
         except np.linalg.LinAlgError:
             damping *= settings.damping_singular
             continue

@@ -47,38 +47,42 @@ class Noise:
         """`values` (n,) or (n, q), filtered and weighted along the first axis."""
         if not len(self.ar):
             return values * (self.root_weight if values.ndim == 1 else self.root_weight[:, None])
-        table = np.ascontiguousarray(values.reshape(len(values), -1))
-        white: Array = _filtered(table, self.ar, self.root_weight).reshape(values.shape)
+        table = np.asfortranarray(values.reshape(len(values), -1))
+        white: Array = _filtered(table.T, self.ar, self.root_weight).T.reshape(values.shape, order="A")
         return white
 
 
-SIDE_BY_SIDE = 8
-"""Columns from which the filter's sums are taken for all columns side by side: speed alone, the sums are the same."""
 ROUNDING = 1e-9
 """Imaginary part below which a pole is real."""
 
 
 @njit(cache=True, nogil=True)
-def _filtered(values: Array, ar: Array, root_weight: Array) -> Array:
-    """(x_t - sum a_k x_{t-k}) times the weight of row t, for each column of `values` (n, q)."""
-    rows, columns = values.shape
-    result = np.empty((rows, columns))
-    for t in range(rows):
-        lags = min(len(ar), t)
-        if columns < SIDE_BY_SIDE:
-            for q in range(columns):
-                white = values[t, q]
-                for k in range(lags):
-                    white -= ar[k] * values[t - 1 - k, q]
-                result[t, q] = white * root_weight[t]
-            continue
-        for q in range(columns):
-            result[t, q] = values[t, q]
-        for k in range(lags):
-            for q in range(columns):
-                result[t, q] -= ar[k] * values[t - 1 - k, q]
-        for q in range(columns):
-            result[t, q] *= root_weight[t]
+def _filtered(columns: Array, ar: Array, root_weight: Array) -> Array:
+    """(x_t - sum a_k x_{t-k}) times the weight of row t, for each of the `columns` (q, n), rows of which lie side by
+    side."""
+    count, rows = columns.shape
+    # Four lags in one pass, by shifted views in place of shifted indices: several rows are worked on at once.
+    groups = -(-len(ar) // 4)
+    weights = np.zeros(4 * groups)
+    weights[: len(ar)] = ar
+    lags = min(4 * groups, rows)
+    result = np.empty((count, rows))
+    for q in range(count):
+        column, white = columns[q], result[q]
+        for t in range(lags):
+            white[t] = column[t]
+            for k in range(min(len(ar), t)):
+                white[t] -= ar[k] * column[t - 1 - k]
+            white[t] *= root_weight[t]
+        for g in range(groups):
+            a, b, c, d = weights[4 * g], weights[4 * g + 1], weights[4 * g + 2], weights[4 * g + 3]
+            at = lags - 4 * g
+            now = column[lags:] if g == 0 else white[lags:]
+            one, two, three, four = column[at - 1 :], column[at - 2 :], column[at - 3 :], column[at - 4 :]
+            later, weight = white[lags:], root_weight[lags:]
+            for t in range(rows - lags):
+                left = now[t] - a * one[t] - b * two[t] - c * three[t] - d * four[t]
+                later[t] = left * weight[t] if g == groups - 1 else left
     return result
 
 

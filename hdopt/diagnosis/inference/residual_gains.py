@@ -13,6 +13,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.diagnosis.inference.base_excitation import excites, is_driven
 from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.inference.normal_equations import solved
 from hdopt.diagnosis.numerical import RANK, RIDGE, TINY
 from hdopt.effects.term import Term
 from hdopt.recordings.read import TURN
@@ -104,8 +105,9 @@ class FitProbe:
         gram, absorbed, moment = self._products(term)
         scale = np.sqrt(np.maximum(np.diag(gram), TINY))
         # A column that the base absorbs to a millionth has nothing left to say.
-        gram = (gram - absorbed) / np.outer(scale, scale) + RIDGE * np.eye(len(gram))
-        coefficients = np.linalg.solve(gram, moment / scale) / scale
+        gram = (gram - absorbed) / (scale[:, None] * scale)
+        gram.flat[:: len(gram) + 1] += RIDGE
+        coefficients = solved(gram, moment / scale) / scale
         return float(moment @ coefficients) / self.noise.sigma**2, coefficients
 
     def gain(self, term: Term) -> float:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from hdopt.diagnosis.inference.base_fit import fit_base
 from hdopt.diagnosis.inference.catalogue import is_outside
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, extend, refine
+from hdopt.diagnosis.inference.normal_equations import gains_of_subsets, solved
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import SMALL_RIDGE, TINY
 from hdopt.diagnosis.search.penalty import NOTHING_SUBTRACTED, Scale, SubtractedTerms, penalty
@@ -78,8 +78,8 @@ def rank_subsets(probe: FitProbe, terms: Sequence[Term], scale: Scale, most: int
     if not terms:
         return []
     settings = probe.fit.problem.settings.search
-    gain_of = _SubsetGains(probe, terms)
-    scored: dict[tuple[int, ...], float] = {(i,): gain_of((i,)) for i in range(len(terms))}
+    gains_of = _SubsetGains(probe, terms)
+    scored = gains_of([(i,) for i in range(len(terms))])
     frontier = list(scored)
     for _ in range((settings.most_effects if most is None else most) - 1):
         frontier = sorted(frontier, key=lambda s: -scored[s])[: settings.frontier]
@@ -90,7 +90,7 @@ def rank_subsets(probe: FitProbe, terms: Sequence[Term], scale: Scale, most: int
             if terms[i].effect not in {terms[j].effect for j in subset}
         }
         frontier = [subset for subset in grown if subset not in scored]
-        scored |= {subset: gain_of(subset) for subset in frontier}
+        scored |= gains_of(frontier)
     top_gain = max(scored.values())
     ranked = [
         (gain / scale.inflation / 2 - penalty([terms[i] for i in subset], top_gain, scale), gain, subset)
@@ -105,22 +105,24 @@ def rank_subsets(probe: FitProbe, terms: Sequence[Term], scale: Scale, most: int
 
 
 class _SubsetGains:
-    """Gain, in noise variances, of any subset of terms from one table of inner products."""
+    """Gains, in noise variances, of any subsets of terms from one table of inner products."""
 
     def __init__(self, probe: FitProbe, terms: Sequence[Term]):
         columns = [probe.columns(term) for term in terms]
-        ends = np.cumsum([0, *(block.shape[1] for block in columns)])
-        self.blocks = [np.arange(a, b) for a, b in pairwise(ends)]
+        self.ends = np.cumsum([0, *(block.shape[1] for block in columns)])
         matrix = np.column_stack(columns)
         gram, moment = matrix.T @ matrix, matrix.T @ probe.white_residual
         scale = np.sqrt(np.maximum(np.diag(gram), TINY))
         self.gram, self.moment = gram / np.outer(scale, scale), moment / scale
         self.variance = probe.noise.sigma**2
 
-    def __call__(self, subset: tuple[int, ...]) -> float:
-        index = np.concatenate([self.blocks[i] for i in subset])
-        part = self.gram[np.ix_(index, index)] + SMALL_RIDGE * np.eye(len(index))
-        return float(self.moment[index] @ np.linalg.solve(part, self.moment[index])) / self.variance
+    def __call__(self, subsets: Sequence[tuple[int, ...]]) -> dict[tuple[int, ...], float]:
+        if not subsets:
+            return {}
+        most = max(len(subset) for subset in subsets)
+        table = np.array([subset + (-1,) * (most - len(subset)) for subset in subsets])
+        gains = gains_of_subsets(self.gram, self.moment, self.ends, table) / self.variance
+        return dict(zip(subsets, gains.tolist(), strict=True))
 
 
 def joint_fit(start: Fit, terms: Sequence[Term], rng: np.random.Generator | None = None) -> Fit:
@@ -131,7 +133,7 @@ def joint_fit(start: Fit, terms: Sequence[Term], rng: np.random.Generator | None
     gram = columns.T @ columns
     target = probe.project(start.problem.noise.whiten(start.residual + start.contributions))
     ridge = SMALL_RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram))
-    solution = np.linalg.solve(gram + ridge, columns.T @ target)
+    solution = solved(gram + ridge, columns.T @ target)
     parts, position = [], 0
     for term in terms:
         parts.append(solution[position : position + term.width])

@@ -71,6 +71,14 @@ def select(base: Fit, inflation: float, rng: np.random.Generator, plan: SearchPl
     return Selection(state.base, (replace(best, fit=fuller), *candidates[1:]), inflation)
 
 
+def first_look(base: Fit, inflation: float, rng: np.random.Generator, plan: SearchPlan) -> float:
+    """The log Bayes factor of the leader after one look about `base` alone, 0 where none leads; `inflation`, `rng` and
+    `plan` as for `select`.
+    """
+    leader = explore_base(SearchState(base, plan, inflation, rng)).leader
+    return 0.0 if leader is None else leader.log_bayes_factor
+
+
 def refit_known(state: SearchState) -> SearchState:
     """The leaders of an earlier search, refitted on these rows and this noise. `state` is where the work stands."""
     iterations = state.base.problem.settings.fit.known_iterations

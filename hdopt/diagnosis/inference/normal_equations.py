@@ -1,0 +1,71 @@
+"""Small symmetric systems, solved many thousand times: by Cholesky's factors, and for many subsets of one table."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from scipy.linalg.lapack import dposv
+
+from hdopt.arrays import Array, Index
+from hdopt.diagnosis.numerical import SMALL_RIDGE
+
+
+def solved(matrix: Array, moment: Array) -> Array:
+    """x of `matrix` x = `moment` for a symmetric `matrix` (n, n), whose upper triangle counts, and `moment` (n,): by
+    Cholesky's factors (LAPACK's `dposv`), and in general where rounding left it no longer positive.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        if the matrix is singular.
+    """
+    _, solution, failed = dposv(matrix, moment)
+    return np.asarray(np.linalg.solve(matrix, moment) if failed else solution, np.float64)
+
+
+def gains_of_subsets(gram: Array, moment: Array, ends: Index, subsets: Index) -> Array:
+    """m' G^-1 m of each of the `subsets` (s, k) of blocks of columns, -1 where one has fewer than k: block i holds the
+    columns from `ends`[i] to `ends`[i + 1] of the Gram matrix `gram` (n, n) of unit columns and of their `moment` (n,)
+    with what is explained. A small ridge keeps parallel columns solvable.
+    """
+    gains: Array = _gains(gram, moment, ends, subsets, SMALL_RIDGE)
+    return gains
+
+
+@njit(cache=True, nogil=True)
+def _gains(gram: Array, moment: Array, ends: Index, subsets: Index, ridge: float) -> Array:
+    count, most = subsets.shape
+    widest = 0
+    for i in range(len(ends) - 1):
+        widest = max(widest, ends[i + 1] - ends[i])
+    column = np.empty(widest * most, np.int64)
+    factor, part = np.empty((widest * most, widest * most)), np.empty(widest * most)
+    gains = np.empty(count)
+    for s in range(count):
+        n = 0
+        for block in subsets[s]:
+            if block < 0:
+                continue
+            for at in range(ends[block], ends[block + 1]):
+                column[n] = at
+                n += 1
+        gain = 0.0
+        # The factor L of L L' = G + ridge, row by row, and with it L^-1 m, whose square is the gain.
+        for i in range(n):
+            rest = moment[column[i]]
+            for j in range(i):
+                total = gram[column[i], column[j]]
+                for k in range(j):
+                    total -= factor[i, k] * factor[j, k]
+                factor[i, j] = total / factor[j, j]
+                rest -= factor[i, j] * part[j]
+            square = gram[column[i], column[i]] + ridge
+            for k in range(i):
+                square -= factor[i, k] * factor[i, k]
+            factor[i, i] = math.sqrt(max(square, ridge * ridge))
+            part[i] = rest / factor[i, i]
+            gain += part[i] * part[i]
+        gains[s] = gain
+    return gains

@@ -1,0 +1,48 @@
+"""Small systems and the gains of subsets: the same as NumPy's general solution."""
+
+import numpy as np
+import pytest
+
+from hdopt.diagnosis.inference.normal_equations import gains_of_subsets, solved
+from hdopt.diagnosis.numerical import SMALL_RIDGE
+
+
+@pytest.fixture(scope="module")
+def columns():
+    table = np.random.default_rng(3).normal(size=(40, 9))
+    return table / np.linalg.norm(table, axis=0)
+
+
+def test_a_system_is_solved(columns):
+    gram, moment = columns.T @ columns, np.arange(9.0)
+    np.testing.assert_allclose(gram @ solved(gram, moment), moment, atol=1e-12)
+
+
+def test_rounding_that_leaves_a_matrix_not_positive_stops_nothing():
+    matrix, moment = np.diag([1.0, -1e-12]), np.array([1.0, 1e-12])
+    np.testing.assert_allclose(solved(matrix, moment), [1.0, -1.0])
+
+
+def test_a_singular_matrix_is_refused():
+    with pytest.raises(np.linalg.LinAlgError):
+        solved(np.zeros((2, 2)), np.ones(2))
+
+
+def test_gains_of_subsets_are_those_of_their_columns(columns):
+    """Blocks of two, three, one and three columns, alone and together; each against least squares of its own."""
+    target = np.random.default_rng(4).normal(size=40)
+    ends = np.array([0, 2, 5, 6, 9])
+    subsets = np.array([[0, -1, -1], [2, -1, -1], [0, 3, -1], [1, 2, 3], [0, 1, 3]])
+    found = gains_of_subsets(columns.T @ columns, columns.T @ target, ends, subsets)
+    for subset, gain in zip(subsets, found, strict=True):
+        own = np.concatenate([np.arange(ends[i], ends[i + 1]) for i in subset if i >= 0])
+        fitted = columns[:, own] @ np.linalg.lstsq(columns[:, own], target, rcond=None)[0]
+        # The ridge takes its share of the gain, at most its ratio to the smallest eigenvalue.
+        least = np.linalg.eigvalsh(columns[:, own].T @ columns[:, own])[0]
+        assert gain == pytest.approx(fitted @ fitted, rel=2 * SMALL_RIDGE / least)
+
+
+def test_a_column_twice_gains_as_much_as_once():
+    gram, moment = np.ones((2, 2)), np.array([0.6, 0.6])
+    found = gains_of_subsets(gram, moment, np.array([0, 1, 2]), np.array([[0, -1], [0, 1]]))
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
