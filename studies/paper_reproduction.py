@@ -11,7 +11,8 @@ import pandas as pd
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics.extremes import extremes_arcmin, walked_peak_to_peak_arcmin
-from hdopt.mechanics.contact import contact_angle, homogenization_coefficient, meshing_teeth
+from hdopt.mechanics.contact import contact_angle
+from hdopt.mechanics.contact_model import contact_of
 from hdopt.report import Section, Table, Text
 from hdopt.report.sections.published import published_section
 from hdopt.studies.jia_2021 import (
@@ -67,8 +68,8 @@ def profile_table(drive: Drive, errors: DriveErrors) -> pd.DataFrame:
     for row in PROFILES:
         profile = row.profile(drive)
         design = replace(drive, wave_generator=replace(drive.wave_generator, profile=profile))
-        angle = contact_angle(drive.geometry, profile)
-        k_e = homogenization_coefficient(meshing_teeth(drive.geometry, angle))
+        contact = contact_of(design)
+        angle, k_e = contact.angle, contact.homogenization()
         single = sampled(design, errors)
         rows.append(
             {

@@ -37,6 +37,8 @@ class DriveGeometry:
     flexspline_addendum: float | None = None
     circular_spline_addendum: float | None = None
     flexspline_wall: float | None = None
+    contact: str | None = None
+    """What counts as contact, "tips" or "flanks" (`hdopt.mechanics.contact`); None leaves it to what is computed."""
 
     def __post_init__(self) -> None:
         z_fs, z_cs = self.flexspline_teeth, self.circular_spline_teeth

@@ -21,7 +21,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
 from hdopt.drive.teeth import MeasuredTeeth
-from hdopt.mechanics.contact import contact_angle
+from hdopt.mechanics.contact_model import contact_of
 
 TAPER = 0.5
 """Share of the window that falls off, both ends together."""
@@ -39,7 +39,7 @@ class LoadSharing:
     @classmethod
     def of(cls, drive: Drive, taper: float = TAPER) -> LoadSharing:
         """The window of `drive` for which independent teeth give 1/sqrt(Z_mp), with this `taper`."""
-        angle = contact_angle(drive.geometry, drive.wave_generator.profile)
+        angle = contact_of(drive).angle
         # (integral of w)^2 over integral of w^2, for a window of width 1.
         effective = (1 - taper / 2) ** 2 / (1 - 5 * taper / 8)
         return cls(angle / effective, taper)

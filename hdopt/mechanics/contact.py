@@ -1,19 +1,23 @@
-"""Where flexspline and circular spline overlap: contact angle, meshing teeth, homogenization, mean flank pressure.
+"""Which teeth are in contact, and what follows from it: contact angle, meshing teeth, homogenization, flank pressure.
 
-Overlap of the tips is necessary for contact, not yet contact of the flanks: the numbers here are upper bounds of it.
+Overlap of the tips is necessary for contact, not yet contact of the flanks. Jia 2021 counts tips that overlap; flanks
+that carry are fewer. Whatever counts, k_e and flank pressure count the same teeth: those of one `Contact`.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from hdopt.arrays import Array
-from hdopt.drive.geometry import Drive, DriveGeometry
+from hdopt.drive.geometry import DriveGeometry
 from hdopt.drive.profiles import WaveGeneratorProfile
 from hdopt.errors import HdoptError, MissingValue
+
+TIPS, FLANKS = "tips", "flanks"
+"""What counts as contact: tips that overlap, as Jia 2021 counts, or flanks that carry (`Mesh.carrying_angle`)."""
 
 
 def tip_overlap(geometry: DriveGeometry, profile: WaveGeneratorProfile, phi: ArrayLike) -> Array:
@@ -71,28 +75,40 @@ def homogenization_coefficient(teeth_in_mesh: float, base: float = 1.0) -> float
     return base / math.sqrt(teeth_in_mesh)
 
 
-def mean_flank_pressure(drive: Drive, torque: float | None = None) -> float:
-    """Mean pressure on the engaged tooth flanks under the output `torque` (N mm; the drive's own if None), N/mm^2.
+@dataclass(frozen=True)
+class Contact:
+    """The teeth that are in contact: k_e and the mean flank pressure both count these and no others.
 
-    The wear check of Shen and Ye, "Theory and design of harmonic gear drives" (1985): p = 2 T/(d b h z), load over
-    engaged area, with pitch diameter d = m Z_FS, tooth face width b, and h z the summed depth of all engaged teeth,
-    here the tip overlap summed over the approaching flank of both zones. Load and area are both per cos(alpha), which
-    cancels. Valid while all overlapped teeth of the `drive` share the load, a lower bound of the true pressure; load
-    factor 1. Raises `MissingValue` where torque, face width or an addendum is not given.
+    `angle` is the half angle (rad) from the major axis up to which teeth count, `summed_depth` the depth of engagement
+    summed over the teeth up to there on the approaching flank of both zones, mm; `counts` says what was counted, `TIPS`
+    that overlap or `FLANKS` that carry. Made by `hdopt.mechanics.tooth_path.Mesh.contact`.
     """
-    geometry, load = drive.geometry, drive.load
-    torque = load.torque if torque is None else torque
-    if torque is None:
-        raise MissingValue("the flank pressure", "load.torque_nm")
-    if load.tooth_face_width is None:
-        raise MissingValue("the flank pressure", "load.tooth_face_width_mm")
-    profile = drive.wave_generator.profile
-    angle = contact_angle(geometry, profile)
-    nodes, weights = np.polynomial.legendre.leggauss(32)
-    phi = angle / 2 * (1 + nodes)
-    mean_depth = float(weights @ tip_overlap(geometry, profile, phi)) / 2
-    summed_depth = 2 * meshing_teeth(geometry, angle) * mean_depth
-    return 2 * torque / (geometry.module * geometry.flexspline_teeth * load.tooth_face_width * summed_depth)
+
+    geometry: DriveGeometry
+    angle: float
+    summed_depth: float
+    counts: str
+
+    @property
+    def teeth(self) -> float:
+        """Teeth in contact in one zone, one side counted (`meshing_teeth`)."""
+        return meshing_teeth(self.geometry, self.angle)
+
+    def homogenization(self, base: float = 1.0) -> float:
+        """k_e of these teeth, with k_B `base` (`homogenization_coefficient`)."""
+        return homogenization_coefficient(self.teeth, base)
+
+    def flank_pressure(self, torque: float, face_width: float) -> float:
+        """Mean pressure on the flanks of these teeth under the output `torque` (N mm), N/mm^2; infinite without teeth.
+
+        The wear check of Shen and Ye, "Theory and design of harmonic gear drives" (1985): p = 2 T/(d b h z), load over
+        engaged area, with pitch diameter d = m Z_FS, tooth face width b (`face_width`, mm), and h z the summed depth.
+        Load and area are both per cos(alpha), which cancels. Valid while all these teeth share the load, a lower bound
+        of the true pressure; load factor 1.
+        """
+        if self.angle <= 0:
+            return math.inf  # no flank runs free: none carries
+        return 2 * torque / (self.geometry.module * self.geometry.flexspline_teeth * face_width * self.summed_depth)
 
 
 def _addenda(geometry: DriveGeometry) -> tuple[float, float]:

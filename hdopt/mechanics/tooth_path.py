@@ -26,7 +26,7 @@ from hdopt.drive.geometry import DriveGeometry
 from hdopt.drive.profiles import WaveGeneratorProfile, perimeter_error, polar_curvature
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.mechanics.bending import ring_wall
-from hdopt.mechanics.contact import contact_angle
+from hdopt.mechanics.contact import TIPS, Contact, contact_angle
 from hdopt.mechanics.tooth_gap import (
     CELL,
     LEADING,
@@ -106,7 +106,7 @@ class Mesh:
         """By how much tips would miss each other without deflection, mm: overlap is w less this."""
         gear = self.geometry
         if gear.flexspline_addendum is None or gear.circular_spline_addendum is None:
-            raise MissingValue("the mesh", "drive.flexspline_addendum_mm", "drive.circular_spline_addendum_mm")
+            raise MissingValue("the contact angle", "drive.flexspline_addendum_mm", "drive.circular_spline_addendum_mm")
         pitch_lines = gear.module * (gear.circular_spline_teeth - gear.flexspline_teeth) / 2
         return pitch_lines - gear.circular_spline_addendum - gear.flexspline_addendum
 
@@ -145,16 +145,16 @@ class Mesh:
         overlap = deflection_at(self._sampled, angle)[2] - angle * self._clearance
         return 2 * self.geometry.circular_spline_teeth / (2 * math.pi) * overlap
 
-    def flank_pressure(self, torque: float, face_width: float, angle: float) -> float:
-        """Mean pressure on the flanks up to `angle`, N/mm^2: p = 2 T/(d b h z), as `contact.mean_flank_pressure` has it
-        (Shen and Ye 1985), with h z summed over the teeth that can carry instead of all whose tips overlap.
-
-        Infinite for an angle of 0, where no flank carries.
-        """
-        pitch_diameter = self.geometry.module * self.geometry.flexspline_teeth
-        if angle <= 0:
-            return math.inf  # no flank runs free: none carries
-        return 2 * torque / (pitch_diameter * face_width * self.summed_depth(angle))
+    def contact(self, counts: str, pressure_angle: float, backlash: float | None) -> Contact:
+        """The teeth in contact: all whose tips overlap, or where `counts` is `FLANKS`, those whose flanks carry at this
+        `pressure_angle` (rad) and `backlash` (mm). Raises `MissingValue` where flanks count without a backlash."""
+        if counts == TIPS:
+            angle = self.contact_angle
+        elif backlash is None:
+            raise MissingValue("contact of the flanks", "clearances.backlash_mm")
+        else:
+            angle = self.carrying_angle(pressure_angle, backlash)
+        return Contact(self.geometry, angle, self.summed_depth(angle), counts)
 
     @cached_property
     def stretch(self) -> float:

@@ -31,7 +31,7 @@ from hdopt.mechanics.bearing_life import (
     ring_force,
 )
 from hdopt.mechanics.bending import bending_stress, fatigue_safety, ring_wall
-from hdopt.mechanics.contact import homogenization_coefficient
+from hdopt.mechanics.contact import FLANKS, Contact
 from hdopt.mechanics.lag import cross_slide_lag_arcmin
 from hdopt.optimize.design_space import Combination, Design, DesignSpace
 
@@ -374,6 +374,13 @@ def carrying_angle(trade: DesignConditions, design: Design) -> float:
     return design.mesh.carrying_angle(design.drive.geometry.pressure_angle, backlash)
 
 
+def contact(trade: DesignConditions, design: Design) -> Contact:
+    """The teeth of `design` in contact under the backlash of `trade`, which k_e and flank pressure both count: flanks
+    that carry, unless the study's drive says tips."""
+    counts = trade.reference.geometry.contact or FLANKS
+    return design.mesh.contact(counts, design.drive.geometry.pressure_angle, trade.backlash)
+
+
 def face_width(trade: DesignConditions, drive: Drive) -> float | None:
     """Width of the tooth faces of `drive` that carries, mm: that of `trade` is the reference's, and it follows the wave
     generator's width, which backs it; None where it is not given."""
@@ -383,12 +390,12 @@ def face_width(trade: DesignConditions, drive: Drive) -> float | None:
 
 
 def flank_pressure(trade: DesignConditions, design: Design) -> float:
-    """Mean pressure, N/mm^2, on the flanks of `design` that can carry under the torque, face width and backlash of
-    `trade` (`Mesh.flank_pressure`)."""
+    """Mean pressure, N/mm^2, on the flanks of the teeth of `design` in `contact` under the torque and face width of
+    `trade` (`Contact.flank_pressure`)."""
     torque, face = trade.needed("torque", "the flank pressure"), face_width(trade, design.drive)
     if face is None:
         face = trade.needed("face_width", "the flank pressure")
-    return design.mesh.flank_pressure(torque, face, carrying_angle(trade, design))
+    return contact(trade, design).flank_pressure(torque, face)
 
 
 def carrying_teeth(trade: DesignConditions, design: Design) -> float:
@@ -480,10 +487,9 @@ def ring_load(trade: DesignConditions, drive: Drive) -> float:
 
 
 def evened_out(trade: DesignConditions, design: Design) -> float:
-    """Peak-to-peak of `design` with the errors of `trade`, times k_e of its teeth in mesh (Jia 2021, Eq. (13)),
+    """Peak-to-peak of `design` with the errors of `trade`, times k_e of its teeth in `contact` (Jia 2021, Eq. (13)),
     arcmin. With measured teeth k_e is for sines beside them only, and misalignment has its own mean."""
-    teeth = design.drive.geometry.circular_spline_teeth * design.mesh.contact_angle / (2 * math.pi)
-    k_e = homogenization_coefficient(teeth, trade.k_b)
+    k_e = contact(trade, design).homogenization(trade.k_b)
     rows = trade.of(trade.rows, design)
     if trade.added is not None:
         return trade.added.peak_to_peak_arcmin(design.drive, rows[0], k_e)

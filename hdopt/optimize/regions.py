@@ -46,10 +46,12 @@ LOSS = 0.01
 """Today's numbers no longer hold where another design is better by this share."""
 BROKEN = 1e-4
 """Excess over a limit, as a share of it, from which a design breaks it."""
-DISTANT = 0.25
+DISTANT = 0.15
 """Combinations that are worse than today's by more than this share are not looked at."""
-HOPELESS = 0.05
-"""A search that ends with limits broken by less than this share is tried again, from the study's own drive."""
+HOPELESS = 0.25
+"""A search that loses its limits, but by less than this share, is tried again, and longer."""
+PATIENT = 40
+"""Evaluations of such a second trial: a search that stalls outside its limits mostly finds back within these."""
 HELD = 1e-5
 """A limit nearer to its bound than this share holds a design."""
 UNCHANGED = 1e-8
@@ -115,8 +117,9 @@ class Ground:
         asked = (problem.combination, *_signature(problem, self.today[problem.combination]))
         if asked not in self._known:
             found = solve(problem, self.method, [start.values])
-            if BROKEN < found.violation < HOPELESS:
-                again = solve(problem, self.method, [problem.space.baseline_values])
+            if _keeps(start) and BROKEN < found.violation < HOPELESS:
+                patient = replace(self.method, warm_evaluations=PATIENT)
+                again = solve(problem, patient, [start.values])
                 found = min(found, again, key=lambda s: _rank(s.violation, s.objective))
             self._known[asked] = found
         return replace(self._known[asked], problem=problem)
@@ -192,7 +195,7 @@ def follow(ground: Ground, constant: Constant) -> Followed:
     rivals: dict[Combination, None] = {}
     for end in (1 / reach, reach):
         points = _walk(ground, constant, end)
-        boundaries += _choice_boundaries(ground, constant, points)
+        boundaries += _merged(list(_choice_boundaries(ground, constant, points)))
         boundaries += _design_boundary(ground, constant, end, points)
         for _, bests in points:
             rivals |= dict.fromkeys(contenders(bests, share=RIVALS))
@@ -262,6 +265,18 @@ def _choice_boundaries(ground: Ground, constant: Constant, points: list[tuple[fl
             if _level(level, ground.choice(other[1])) != own:
                 yield _between(ground, constant, level, one, other)
                 break
+
+
+def _merged(found: list[Boundary]) -> list[Boundary]:
+    """`found` with boundaries that cannot be told apart from one beyond which nothing keeps the limits turned into that
+    one: the last combination to lose its limits is then a matter of rounding."""
+    lost = [b for b in found if b.becomes == NONE_LEFT]
+    return [
+        replace(b, factor=lost[0].factor, becomes=NONE_LEFT)
+        if lost and abs(math.log(b.factor / lost[0].factor)) <= 2 * CLOSE
+        else b
+        for b in found
+    ]
 
 
 def _between(

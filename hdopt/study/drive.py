@@ -59,6 +59,9 @@ class DriveSection(Section):
     """Addendum of the circular spline's teeth; for the same."""
     flexspline_wall_mm: Size | None = None
     """Thickness of the flexspline's wall under the teeth; for curvature and bending."""
+    contact: Literal["tips", "flanks"] | None = None
+    """What counts as contact, for k_e and flank pressure alike: tips that overlap, as published, or flanks that carry
+    under the backlash; if omitted, tips, and in a search flanks."""
 
     def build(self) -> DriveGeometry:
         return DriveGeometry(
@@ -70,6 +73,7 @@ class DriveSection(Section):
             flexspline_addendum=self.flexspline_addendum_mm,
             circular_spline_addendum=self.circular_spline_addendum_mm,
             flexspline_wall=self.flexspline_wall_mm,
+            contact=self.contact,
         )
 
 

@@ -150,9 +150,9 @@ def _verdict(study: Study) -> None:
 
 
 def _contact(study: Study) -> None:
-    from hdopt.mechanics.contact import contact_angle
+    from hdopt.mechanics.contact_model import contact_of
 
-    contact_angle(study.drive.geometry, study.drive.wave_generator.profile)
+    contact_of(study.drive)
 
 
 def _lag(study: Study) -> None:
@@ -174,7 +174,7 @@ def _stress(study: Study) -> None:
 
 
 def _pressure(study: Study) -> None:
-    from hdopt.mechanics.contact import mean_flank_pressure
+    from hdopt.mechanics.contact_model import mean_flank_pressure
 
     mean_flank_pressure(study.drive)
 

@@ -19,7 +19,7 @@ from hdopt.kinematics.extremes import extremes_arcmin, walked_peak_to_peak_arcmi
 from hdopt.kinematics.load_sharing import misalignment_share
 from hdopt.kinematics.waveform import DEFAULT_METHOD, geometry_for
 from hdopt.mechanics.bending import curvature_change, max_bending_stress, max_curvature_change
-from hdopt.mechanics.contact import contact_angle, homogenization_coefficient, mean_flank_pressure, meshing_teeth
+from hdopt.mechanics.contact_model import contact_of, mean_flank_pressure
 from hdopt.mechanics.lag import lag
 from hdopt.recordings.orders import OrderSpectrum, order_spectrum
 from hdopt.report.cells import heading
@@ -213,12 +213,10 @@ def kinematic_error(
     """
     study = _study_of(study, errors)
     drive, errors = study.drive, study.errors
-    gear = drive.geometry
     _check_method(drive, method)
     notes = _Notes()
-    angle = notes.value(contact_angle, gear, drive.wave_generator.profile)
-    teeth = None if angle is None else meshing_teeth(gear, angle)
-    k_e = None if teeth is None else homogenization_coefficient(teeth)
+    contact = notes.value(contact_of, drive)
+    k_e = None if contact is None else contact.homogenization()
     base_low, base_high = extremes_arcmin(drive, errors, method)
     low, high, base = base_low, base_high, base_high - base_low
     if study.effects:
@@ -238,8 +236,8 @@ def kinematic_error(
         maximum_arcmin=high,
         sampled_peak_to_peak_arcmin=_sampled(study, sampling_deg, turns, method),
         nonuniform_arcmin=None if k_e is None else _nonuniform(study, method, k_e, high - low),
-        contact_angle_deg=None if angle is None else math.degrees(angle),
-        meshing_teeth=teeth,
+        contact_angle_deg=None if contact is None else math.degrees(contact.angle),
+        meshing_teeth=None if contact is None else contact.teeth,
         homogenization_coefficient=k_e,
         orders=_order_rows(shown, spectrum),
         lag_arcmin=None if lost is None else lost.to_dict(),
@@ -388,8 +386,7 @@ def profile(study: AnyStudy = None) -> ProfileResult:
     drive = study.drive
     gear, curve = drive.geometry, drive.wave_generator.profile
     notes = _Notes()
-    angle = notes.value(contact_angle, gear, curve)
-    teeth = None if angle is None else meshing_teeth(gear, angle)
+    contact = notes.value(contact_of, drive)
     phi = np.linspace(0, 2 * math.pi, POINTS_OF_A_PROFILE)
     return ProfileResult(
         study=study.name,
@@ -398,9 +395,9 @@ def profile(study: AnyStudy = None) -> ProfileResult:
         semi_minor_mm=curve.semi_minor,
         tip_radius_of_curvature_mm=tip_radius_of_curvature(curve),
         perimeter_error_mm=perimeter_error(curve, gear.flexspline_inner_radius),
-        contact_angle_deg=None if angle is None else math.degrees(angle),
-        meshing_teeth=teeth,
-        homogenization_coefficient=None if teeth is None else homogenization_coefficient(teeth),
+        contact_angle_deg=None if contact is None else math.degrees(contact.angle),
+        meshing_teeth=None if contact is None else contact.teeth,
+        homogenization_coefficient=None if contact is None else contact.homogenization(),
         max_curvature_change_per_mm=notes.value(max_curvature_change, gear, curve),
         max_bending_stress_mpa=notes.value(max_bending_stress, drive),
         max_bending_stress_plate_mpa=notes.value(max_bending_stress, drive, True),

@@ -195,11 +195,9 @@ def _homogenization(study: Study, kind: str) -> float:
             "measured teeth on a measured wave generator are not evened out in a stack; take "
             'requirement.homogenization = "single_tooth"'
         )
-    from hdopt.mechanics.contact import contact_angle, homogenization_coefficient, meshing_teeth
+    from hdopt.mechanics.contact_model import contact_of
 
-    geometry = study.drive.geometry
-    angle = contact_angle(geometry, study.drive.wave_generator.profile)
-    return homogenization_coefficient(meshing_teeth(geometry, angle))
+    return contact_of(study.drive).homogenization()
 
 
 def stack(

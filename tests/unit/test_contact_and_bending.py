@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from cases import CSF_25_80, PROFILES, drive
 
-from hdopt.drive.geometry import Load, Material
+from hdopt.drive.geometry import Clearances, Load, Material
 from hdopt.drive.profiles import Ellipse
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.mechanics.bending import (
@@ -18,12 +18,15 @@ from hdopt.mechanics.bending import (
     max_curvature_change,
 )
 from hdopt.mechanics.contact import (
+    FLANKS,
+    TIPS,
     contact_angle,
     homogenization_coefficient,
-    mean_flank_pressure,
     meshing_teeth,
     tip_overlap,
 )
+from hdopt.mechanics.contact_model import contact_of, mean_flank_pressure
+from hdopt.mechanics.tooth_path import Mesh
 
 EVERY = pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES.keys())
 STEEL = Material(206_000.0, 0.3)
@@ -70,6 +73,34 @@ def test_more_teeth_in_mesh_even_out_more():
     assert homogenization_coefficient(25.0, 0.8) == pytest.approx(0.16)
     with pytest.raises(HdoptError, match=r"k_B is 0.5; .* gives 0.8 to 1.0"):
         homogenization_coefficient(25.0, 0.5)
+
+
+@pytest.mark.parametrize("counts", [None, TIPS, FLANKS])
+def test_k_e_and_flank_pressure_count_the_same_teeth(counts):
+    """Would catch k_e over tips that overlap beside a pressure over flanks that carry, as a search once had it."""
+    design = replace(
+        drive(),
+        geometry=replace(CSF_25_80, contact=counts),
+        load=Load(torque=63_000.0, tooth_face_width=15.0),
+        clearances=Clearances(backlash=0.01),
+    )
+    mesh = Mesh(design.geometry, design.wave_generator.profile)
+    angle = mesh.carrying_angle(CSF_25_80.pressure_angle, 0.01) if counts == FLANKS else mesh.contact_angle
+    assert (angle < mesh.contact_angle) == (counts == FLANKS)
+    teeth = CSF_25_80.circular_spline_teeth * angle / (2 * np.pi)
+    contact = contact_of(design)
+    assert contact.homogenization() == pytest.approx(teeth**-0.5, rel=1e-12)
+    # By the midpoint rule over 20,000 places, right to 1e-9.
+    phi = (np.arange(20_000) + 0.5) * angle / 20_000
+    depth = 2 * teeth * tip_overlap(CSF_25_80, mesh.profile, phi).mean()
+    force = 63_000.0 / (CSF_25_80.module * CSF_25_80.flexspline_teeth / 2)
+    assert mean_flank_pressure(design) == pytest.approx(force / (15.0 * depth), rel=1e-7)
+
+
+def test_flanks_that_carry_need_a_backlash():
+    design = replace(drive(), geometry=replace(CSF_25_80, contact=FLANKS), clearances=Clearances())
+    with pytest.raises(MissingValue, match=r"contact of the flanks needs clearances.backlash_mm"):
+        contact_of(design)
 
 
 def test_flank_pressure_is_load_over_the_summed_overlap():

@@ -56,7 +56,7 @@ def test_teeth_within_an_angle_are_its_share_of_a_turn(problem, design):
     angle = of("carrying_angle_deg", problem, design)
     teeth = design.drive.geometry.circular_spline_teeth
     assert of("carrying_teeth", problem, design) == pytest.approx(teeth * angle / 360)
-    meshing = teeth * of("contact_angle_deg", problem, design) / 360
+    meshing = of("carrying_teeth", problem, design)
     evened = of("evened_out_arcmin", problem, design) / of("peak_to_peak_arcmin", problem, design)
     assert evened == pytest.approx(problem.trade.k_b / sqrt(meshing))
 

@@ -139,3 +139,10 @@ def test_the_bars_end_at_the_boundaries(ground, lag):
     assert wide.base[0] == pytest.approx(boundary.per_cent)
     assert wide.base[0] + wide.x[0] == pytest.approx(100 * (lag.range.highest - 1))
     assert "integral" in table.frame["structure"][0]
+
+
+def test_a_boundary_that_rounding_puts_before_the_end_of_all_designs_is_that_end():
+    near = [Boundary("structure", 0.9612, "one_way_major"), Boundary("profile", 0.9581, NONE_LEFT)]
+    assert {(b.factor, b.becomes) for b in regions._merged(near)} == {(0.9581, NONE_LEFT)}
+    apart = [Boundary("structure", 0.9642, "one_way_major"), Boundary("profile", 0.8576, NONE_LEFT)]
+    assert regions._merged(apart) == apart

@@ -75,12 +75,14 @@ def test_tilts_beyond_the_closed_form_have_no_proven_bound(homogenization):
 def test_no_flank_carries_where_none_runs_free():
     import math
 
+    from hdopt.mechanics.contact import FLANKS, Contact
     from hdopt.mechanics.tooth_path import Mesh
 
     own = load_study("csf-25-80").drive
     mesh = Mesh(own.geometry, own.wave_generator.profile)
-    assert mesh.flank_pressure(1000.0, 9.0, 0.0) == math.inf
-    assert 0 < mesh.flank_pressure(1000.0, 9.0, 0.5) < math.inf
+    none, some = (Contact(mesh.geometry, angle, mesh.summed_depth(angle), FLANKS) for angle in (0.0, 0.5))
+    assert none.flank_pressure(1000.0, 9.0) == math.inf
+    assert 0 < some.flank_pressure(1000.0, 9.0) < math.inf
 
 
 def test_a_search_with_zero_backlash_has_an_answer():

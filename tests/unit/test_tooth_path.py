@@ -13,7 +13,8 @@ from scipy.integrate import quad
 from hdopt.drive.geometry import Load
 from hdopt.drive.profiles import TwoDisk
 from hdopt.mechanics.bending import curvature_change, max_curvature_change
-from hdopt.mechanics.contact import contact_angle, mean_flank_pressure
+from hdopt.mechanics.contact import TIPS, contact_angle
+from hdopt.mechanics.contact_model import mean_flank_pressure
 from hdopt.mechanics.tooth_gap import LEADING, TRAILING, Flanks, gap_at, tooth_place
 from hdopt.mechanics.tooth_path import Mesh
 
@@ -199,7 +200,7 @@ def test_contact_and_pressure_agree_with_the_physics_where_all_overlapped_teeth_
     mesh = Mesh(CSF_25_80, PROFILES[profile])
     assert mesh.contact_angle == pytest.approx(contact_angle(CSF_25_80, PROFILES[profile]), abs=1e-12)
     loaded = replace(drive(PROFILES[profile]), load=Load(63_000.0, 200.0, 15.0))
-    assert mesh.flank_pressure(63_000.0, 15.0, mesh.contact_angle) == pytest.approx(mean_flank_pressure(loaded))
+    assert mesh.contact(TIPS, 0.2, None).flank_pressure(63_000.0, 15.0) == pytest.approx(mean_flank_pressure(loaded))
     assert mesh.carrying_angle(math.radians(12), 0.01) < mesh.contact_angle
     assert mesh.carrying_angle(math.radians(44), 0.5) == mesh.contact_angle
 

@@ -14,7 +14,7 @@ from hdopt.drive.profiles import Ellipse, Resal, TwoDisk, WaveGeneratorProfile, 
 from hdopt.errors import MissingValue
 from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin
 from hdopt.mechanics.bending import curvature_change, max_bending_stress
-from hdopt.mechanics.contact import contact_angle, homogenization_coefficient, meshing_teeth
+from hdopt.mechanics.contact_model import contact_of
 from hdopt.report.sections.profiles import profiles_section
 from hdopt.study import Study
 from hdopt.study.drive import WaveGeneratorSection
@@ -62,8 +62,8 @@ def profiles(study: Study, context: Context) -> StepResult:
 
 def _merits(drive: Drive, study: Study) -> dict[str, float]:
     profile = drive.wave_generator.profile
-    angle = _given(lambda: contact_angle(drive.geometry, profile))
-    k_e = homogenization_coefficient(meshing_teeth(drive.geometry, angle)) if math.isfinite(angle) else math.nan
+    angle = _given(lambda: contact_of(drive).angle)
+    k_e = _given(lambda: contact_of(drive).homogenization())
     single = converged_peak_to_peak_arcmin(drive, study.errors)
     return {
         "contact_angle_deg": math.degrees(angle),
