@@ -47,7 +47,8 @@ LOSS = 0.01
 BROKEN = 1e-4
 """Excess over a limit, as a share of it, from which a design breaks it."""
 DISTANT = 0.15
-"""Combinations that are worse than today's by more than this share are not looked at."""
+"""Combinations that are worse than today's by more than this share are not looked at, but for the best of each
+structure and of each profile."""
 HOPELESS = 0.25
 """A search that loses its limits, but by less than this share, is tried again, and longer."""
 PATIENT = 40
@@ -208,8 +209,7 @@ def follow(ground: Ground, constant: Constant) -> Followed:
 def _walk(ground: Ground, constant: Constant, end: float) -> list[tuple[float, Bests]]:
     """Factors from 1 to `end` with the best designs there: of all but distant combinations at the end, of
     contenders between."""
-    least = ground.chosen.weighed
-    start = {c: s for c, s in ground.today.items() if not _keeps(s) or s.weighed <= (1 + DISTANT) * least}
+    start = {c: ground.today[c] for c in (*contenders(ground.today, share=DISTANT), *_best_of_each(ground.today))}
     at_end = ground.best(constant.scaled(ground.setup, end), start)
     if all(solution.values == ground.today[combination].values for combination, solution in at_end.items()):
         return [(1.0, ground.today), (end, at_end)]
@@ -242,13 +242,17 @@ def _watched(today: Bests, at_end: Bests) -> list[Combination]:
     profile today, of which any may be the last that does."""
     found = dict.fromkeys(contenders(today, at_end))
     if not any(map(_keeps, at_end.values())):
-        for level in ("structure", "profile"):
-            ordered = sorted(today.values(), key=lambda s: _rank(s.violation, s.weighed))
-            least: dict[str, Combination] = {}
-            for solution in ordered:
-                least.setdefault(_level(level, solution.combination), solution.combination)
-            found |= dict.fromkeys(c for c in least.values() if c in at_end)
+        found |= dict.fromkeys(c for c in _best_of_each(today) if c in at_end)
     return list(found)
+
+
+def _best_of_each(today: Bests) -> list[Combination]:
+    """The best combination of each structure and of each profile."""
+    least: dict[str, Combination] = {}
+    for solution in sorted(today.values(), key=lambda s: _rank(s.violation, s.weighed)):
+        for level in ("structure", "profile"):
+            least.setdefault(_level(level, solution.combination), solution.combination)
+    return list(dict.fromkeys(least.values()))
 
 
 def _level(level: str, combination: Combination | None) -> str:
