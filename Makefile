@@ -56,12 +56,16 @@ lock:
 clean:
 	rm -rf $(VENV) build dist $(OUT) *.egg-info
 
-$(VENV)/ready: requirements.lock pyproject.toml
+# uv unpacks packages side by side; where it does not reach them (a mirror that only pip knows), pip does.
+PIP = $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check
+INSTALL = $(VENV)/bin/uv pip install --python $(VENV)/bin/python
+$(VENV)/ready: requirements.lock requirements-test.lock pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
-	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
+	$(PIP) -c requirements-test.lock uv
+	$(INSTALL) -r requirements.lock || $(PIP) -r requirements.lock
+	$(PIP) --no-deps -e .
 	touch $@
 
 $(VENV)/ready-to-test: $(VENV)/ready requirements-test.lock
-	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-test.lock
+	$(INSTALL) -r requirements-test.lock || $(PIP) -r requirements-test.lock
 	touch $@

@@ -25,11 +25,13 @@ def installed(tmp_path_factory):
     )
     assert built.returncode == 0, built.stderr
     (wheel,) = folder.glob("hdopt-*.whl")
-    venv.create(folder / "environment", with_pip=True)
+    venv.create(folder / "environment")
     commands = folder / "environment" / ("Scripts" if sys.platform == "win32" else "bin")
-    install = run(
-        commands / "python", "-m", "pip", "install", "-q", wheel, "-c", ROOT / "requirements.lock", cwd=folder
-    )
+    uv, python = Path(sys.executable).with_name("uv"), commands / "python"
+    tool = [uv, "pip", "install", "--python", python] if uv.exists() else [python, "-m", "pip", "install"]
+    if not uv.exists():
+        assert run(python, "-m", "ensurepip", cwd=folder).returncode == 0
+    install = run(*tool, "-q", wheel, "-c", ROOT / "requirements.lock", cwd=folder)
     assert install.returncode == 0, install.stderr
     return folder, commands / "hdopt"
 
