@@ -425,6 +425,9 @@ class VerdictSettings:
 
     significance: float = threshold(0.01, "1", "choice: family-wise chance of a false alarm below which is named")
     tie: float = threshold(5.0, "1", "paper: Kass, Raftery 1995: log evidence above 5 is 'very strong'")
+    listed_beside_a_tie: float = threshold(
+        10.0, "1", "choice: log evidence within which a set that fits no worse is listed where there is a tie anyway"
+    )
     fewest_blocks: int = threshold(6, "input turns", "choice: turns (or parts between reversals) that can be held out")
     fewest_turns: float = threshold(2.0, "input turns", "choice: turns that a record must span")
     fewest_rows: float = threshold(

@@ -6,14 +6,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_verdict_rules import CLEAN, FIRED, held
+from test_verdict_rules import CLEAN, FIRED, NAMED, held
 
 from hdopt.diagnosis.checks.repeated_passes import NOTHING_REPEATED, RepeatedPasses
 from hdopt.diagnosis.inference.catalogue import SCALE
 from hdopt.diagnosis.inference.cross_validation import HeldOut
 from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut
 from hdopt.diagnosis.settings import DEFAULT
-from hdopt.diagnosis.verdict.facts import found_again, own_gain, stands_out, too_little, unseen_rms
+from hdopt.diagnosis.verdict.facts import found_again, own_gain, stands_out, too_little, unseen_gain, unseen_rms
 from hdopt.diagnosis.verdict.named_effect import confidences
 from hdopt.diagnosis.verdict.residual_structure import clearly_unexplained, left_over_passes, outside_share
 from hdopt.diagnosis.verdict.rivals import placebo_as_good, rivals, scale_is_as_good
@@ -85,12 +85,13 @@ def test_effects_gain_what_they_carry_themselves():
     assert own_gain(evidence(candidate({"hysteresis": 0.1, SCALE: 5.0}))) == pytest.approx(0.2)
 
 
-def test_effects_gain_no_more_than_on_turns_that_no_stage_saw():
+def test_turns_that_no_stage_saw_must_show_what_is_named():
     """Fault caught: a set that was chosen on all turns and predicts the hidden ones worse than the base is named."""
-    large = candidate({"hysteresis": 2.0})
-    assert own_gain(evidence(large, nested=NestedHeldOut(1.2, 1.0, 5, ()))) == pytest.approx(0.44)
-    assert own_gain(evidence(large, nested=NestedHeldOut(0.9, 1.0, 5, ()))) < 0
-    assert own_gain(evidence(large, nested=NestedHeldOut(9.0, 1.0, 5, ()))) == pytest.approx(2.0)
+    assert unseen_gain(evidence(nested=NestedHeldOut(1.2, 1.0, 5, ()))) == pytest.approx(0.44)
+    assert unseen_gain(evidence(nested=NestedHeldOut(0.9, 1.0, 5, ()))) < 0
+    assert unseen_gain(evidence()) == np.inf
+    assert replace(NAMED, unseen_gain=2.0, own_gain=2.0).carry_most
+    assert not replace(NAMED, unseen_gain=0.5, own_gain=2.0).carry_most
 
 
 def test_what_is_left_is_that_of_turns_that_no_stage_saw():
@@ -139,6 +140,18 @@ def test_rivals_are_other_sets_within_a_tie():
         candidate({}, 98.0),
     ]
     assert rivals(evidence(best, *others), None) == (("hysteresis", "thermal_drift"), ("channel_delay",))
+
+
+def test_where_there_is_a_tie_all_that_fit_no_worse_are_listed():
+    """Play, a delay and friction within a row: friction fits a little better and pays for its length. Fault caught: a
+    tie without the truth in it.
+    """
+    best, tied = candidate({"channel_delay": 1.0}, 100.0), candidate({"lost_motion": 1.0}, 96.0)
+    better, worse = candidate({"hysteresis": 1.0}, 91.0), candidate({"thermal_drift": 1.0}, 91.0)
+    better.gain, worse.gain, far = 201.0, 199.0, candidate({"resonance": 1.0}, 89.0)
+    far.gain = 201.0
+    assert rivals(evidence(best, tied, better, worse, far), None) == (("lost_motion",), ("hysteresis",))
+    assert rivals(evidence(best, better), None) == ()
 
 
 @pytest.mark.parametrize(("behind", "said"), [(4.0, True), (6.0, False)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -38,8 +39,9 @@ from hdopt.diagnosis.verdict.rivals import (
 class Facts:
     """What a recording shows.
 
-    `explained`: the best set has effects; `false_alarm_p`: the chance that noise alone does as well; `own_gain`: the
-    held-out power that the effects themselves predict, over what is left; `high`: orders above the averaged rows stand
+    `explained`: the best set has effects; `false_alarm_p`: the chance that noise alone does as well; `log_evidence` of
+    the best set in the noise as it was measured; `own_gain`: the held-out power that the effects themselves predict,
+    over what is left, and `unseen_gain` what turns that no stage saw show of it; `high`: orders above the rows stand
     out. `outside_share` and `high_outside_share`: share of what the best set, and the set of high orders, explain that
     descriptions without physics carry. `momentary`: something happened at one moment only; `unsteady`: something
     changes in time as no noise does; `generic_wins`: a basis without physics clearly predicts better, with a t of
@@ -67,6 +69,8 @@ class Facts:
     too_little: bool
     rivals: Sets
     scale_as_good: bool = False
+    log_evidence: float = 0.0
+    unseen_gain: float = math.inf
     heldout_over_floor: float = 1.0
     found_again: bool = True
     noise_over_neighbours: float = 1.0
@@ -79,11 +83,28 @@ class Facts:
         return self.false_alarm_p <= self.settings.significance
 
     @property
-    def named(self) -> bool:
-        """Whether the best set's effects may be named."""
+    def found(self) -> bool:
+        """Whether the best set is there, by the chance that noise alone does as well."""
+        return self.worth_a_word and self.significant
+
+    @property
+    def described(self) -> bool:
+        """Whether the best set is there, as a description: noise of a narrow band, whose flipped turns are as narrow,
+        is no chance by signs of turns, but no noise that a bench has either.
+        """
+        return self.worth_a_word and (self.significant or self.log_evidence > self.settings.momentary_evidence)
+
+    @property
+    def worth_a_word(self) -> bool:
+        """Whether the best set carries enough, and could be judged at all."""
         worth = self.own_gain > self.settings.smallest_share
         possible = self.turns_suffice and self.explained and self.above_resolution
-        return possible and self.significant and worth and not self.scale_as_good
+        return possible and worth and not self.scale_as_good
+
+    @property
+    def named(self) -> bool:
+        """Whether the best set's effects may be named: turns that no stage saw must show them too."""
+        return self.found and self.unseen_gain > self.settings.smallest_share
 
     @property
     def said(self) -> bool:
@@ -93,7 +114,7 @@ class Facts:
     @property
     def carry_most(self) -> bool:
         """Whether the effects to name predict more of the held-out power than they leave."""
-        return self.said and self.own_gain > self.settings.most_is_carried
+        return self.said and min(self.own_gain, self.unseen_gain) > self.settings.most_is_carried
 
 
 @dataclass(frozen=True)
@@ -144,6 +165,8 @@ def find(evidence: Evidence) -> Findings:
         too_little=too_little(evidence),
         rivals=(),
         scale_as_good=scale_is_as_good(evidence),
+        log_evidence=best.log_bayes_factor,
+        unseen_gain=unseen_gain(evidence),
         heldout_over_floor=unseen_rms(evidence) / evidence.noise_floor,
         noise_over_neighbours=evidence.extended_held_out.rms
         / max(evidence.neighbours_arcmin, evidence.sensor_arcmin, TINY),
@@ -194,14 +217,19 @@ def above_resolution(evidence: Evidence) -> bool:
 
 def own_gain(evidence: Evidence) -> float:
     """How much better the effects predict, over what is left, and do so themselves: not by a better drive that was
-    found beside them; no more than on turns that no stage saw, where some could be spared. `evidence` is that of the
-    diagnosis.
+    found beside them. `evidence` is that of the diagnosis.
     """
     base, extended = evidence.base_held_out.variance, evidence.extended_held_out.variance
     own = sum(effect_powers(evidence.selection.best))
-    gain = min(base - extended, evidence.settings.verdict.own_power * own) / extended
+    return min(base - extended, evidence.settings.verdict.own_power * own) / extended
+
+
+def unseen_gain(evidence: Evidence) -> float:
+    """How much better turns that no stage saw are predicted, over what is left there; infinite where none could be
+    spared. `evidence` is that of the diagnosis.
+    """
     nested = evidence.nested
-    return gain if nested is None else min(gain, (nested.base / nested.extended) ** 2 - 1)
+    return math.inf if nested is None else (nested.base / nested.extended) ** 2 - 1
 
 
 def stands_out(high: Candidate, evidence: Evidence) -> bool:

@@ -20,19 +20,25 @@ Sets = tuple[tuple[str, ...], ...]
 
 
 def rivals(evidence: Evidence, high: Candidate | None) -> Sets:
-    """Other sets of effects, no larger, whose evidence is within a tie of the best; each with what was found in `high`
-    orders beside it.
+    """Other sets of effects, no larger, whose evidence is within a tie of the best, and, where there is a tie, those
+    that fit no worse and are a little behind for their freedom alone; each with what was found in `high` orders beside
+    it. `evidence` is that of the diagnosis.
     """
     settings = evidence.settings.verdict
     best, *others = evidence.selection.candidates
     tail = [] if high is None else list(high.effects)
     said = {name for name in (*best.effects, *tail) if is_effect(name)}
-    found = []
+    tied, fit_as_well = [], []
     for other in others:
         if not other.fit.terms or (other.outside and not best.outside) or len(other.fit.terms) > len(best.fit.terms):
             continue
-        if best.log_bayes_factor - other.log_bayes_factor <= settings.tie:
-            found.append(tuple(name for name in (*other.effects, *tail) if is_effect(name)))
+        behind = best.log_bayes_factor - other.log_bayes_factor
+        names = tuple(name for name in (*other.effects, *tail) if is_effect(name))
+        if behind <= settings.tie:
+            tied.append(names)
+        elif behind <= settings.listed_beside_a_tie and other.gain >= best.gain:
+            fit_as_well.append(names)
+    found = [*tied, *fit_as_well] if tied else []
     different = (names for names in dict.fromkeys(found) if names and set(names) != said)
     return tuple(different)[: settings.most_rivals]
 

@@ -56,7 +56,7 @@ def no_physics_explains(facts: Facts) -> bool:
     `facts` are those of the recording.
     """
     share = facts.settings.remainder_share
-    return (facts.named and facts.outside_share > share) or (facts.high and facts.high_outside_share > share)
+    return (facts.described and facts.outside_share > share) or (facts.high and facts.high_outside_share > share)
 
 
 def changes_in_time(facts: Facts) -> bool:
