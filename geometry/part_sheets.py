@@ -21,6 +21,7 @@ from hdopt.geometry.drawing import (
     draw_first_angle,
     draw_view,
 )
+from hdopt.geometry.mating_drawing import fill_mating_sheet
 from hdopt.geometry.part import Part, Prism
 from hdopt.geometry.sheet import FRAME_HEIGHT, SMALL, TEXT, Point, Sheet, Solid, text_width
 from hdopt.geometry.step import ProductData
@@ -63,10 +64,11 @@ NOTES = (
 
 
 def sheets(job: Job) -> list[Sheet]:
-    """The sheets of a `job`: the assembly first, then every part in the order of the parts list."""
+    """The sheets of a `job`: the assembly, every part in the order of the parts list, what mating parts must keep."""
     made = job.made
     drawn = [_assembly(job)]
-    return drawn + [_part_sheet(job, part, solid, number) for number, (part, solid) in enumerate(made, 1)]
+    drawn += [_part_sheet(job, part, solid, number) for number, (part, solid) in enumerate(made, 1)]
+    return [*drawn, _mating(job, len(made) + 1)]
 
 
 def mass(part: Part) -> float:
@@ -278,6 +280,14 @@ def _limits(sheet: Sheet, job: Job, part: Part) -> None:
     top = TITLE_TOP + 2
     sheet.text((BORDER + 4, top - 2), "Limits", TEXT, bold=True)
     sheet.table((BORDER + 4, top), (62, 22, 70, 24, 24), rows, min(4.7, 66.0 / len(rows)))
+
+
+def _mating(job: Job, number: int) -> Sheet:
+    sheet = Sheet(WIDTH, HEIGHT, f"mating parts, {job.identity.title}", job.identity.description)
+    _frame(sheet)
+    fill_mating_sheet(sheet, job)
+    _title(sheet, job, "mating parts", part_number(job, number), 1.0, None)
+    return sheet
 
 
 def _title(sheet: Sheet, job: Job, name: str, number: str, scale: float, part: Part | None) -> None:

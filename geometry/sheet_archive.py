@@ -17,7 +17,8 @@ from hdopt.geometry.sheet_dxf import dxf_of
 
 def names(job: Job) -> list[str]:
     """Names of the sheets of a `job`, without their endings."""
-    return ["00-assembly", *(f"{number:02d}-{part.name}" for number, (part, _) in enumerate(job.made, 1))]
+    made = [f"{number:02d}-{part.name}" for number, (part, _) in enumerate(job.made, 1)]
+    return ["00-assembly", *made, f"{len(made) + 1:02d}-mating-parts"]
 
 
 def write_drawings(path: Path, job: Job) -> None:

@@ -12,13 +12,15 @@ from hdopt.drive.geometry import Structure
 from hdopt.geometry.callouts import callouts_of
 from hdopt.geometry.export import export_drive
 from hdopt.geometry.job import make_job
+from hdopt.geometry.mating_drawing import fill_mating_sheet
 from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.part_sheets import HEIGHT, WIDTH, sheets
-from hdopt.geometry.sheet import label_box, text_width
+from hdopt.geometry.sheet import Sheet, label_box, text_width
 
 pytestmark = pytest.mark.slow
 
 BOUNDS = {"wg_eccentricity_mm": 0.0075, "wg_tilt_major_deg": 0.1, "wg_tilt_minor_deg": 0.1}
+AXIS = {"axis_eccentricity_mm": 0.015, "axis_tilt_y_deg": 0.2, "axis_tilt_x_deg": 0.2}
 
 CASES = [
     ("ellipse", Structure.INTEGRAL, 1.0),
@@ -32,14 +34,14 @@ CASES = [
 
 def job_of(profile, structure, scale):
     made = drive(profile, structure)
-    return make_job(made if scale == 1.0 else scaled(made, scale), ExportOptions(), "csf-25-80", BOUNDS)
+    return make_job(made if scale == 1.0 else scaled(made, scale), ExportOptions(), "csf-25-80", BOUNDS | AXIS)
 
 
 @pytest.mark.parametrize(("profile", "structure", "scale"), CASES)
 def test_no_text_lies_on_another_or_off_the_sheet(profile, structure, scale):
     job = job_of(profile, structure, scale)
     drawn = sheets(job)
-    assert len(drawn) == 1 + len(job.made)
+    assert len(drawn) == 2 + len(job.made)
     for sheet in drawn:
         boxes = [(label.content, label_box(label)) for label in sheet.labels if label.content]
         for content, (left, top, right, low) in boxes:
@@ -85,7 +87,7 @@ def test_sheets_as_pdf_and_as_archive(tmp_path, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1790000000")
     files = {"pdf": tmp_path / "wave.pdf", "drawings": tmp_path / "wave.zip"}
     result = export_drive(drive(), files, bounds=BOUNDS)
-    assert result.checks["pdf"]["pages"] == result.checks["drawings"]["sheets"] == 3
+    assert result.checks["pdf"]["pages"] == result.checks["drawings"]["sheets"] == 4
     # A3 in points.
     box = re.search(rb"/MediaBox \[\s*0 0 ([\d.]+) ([\d.]+)\s*\]", files["pdf"].read_bytes())
     assert [float(value) * 25.4 / 72 for value in box.groups()] == pytest.approx([WIDTH, HEIGHT], abs=0.1)
@@ -97,3 +99,16 @@ def test_sheets_as_pdf_and_as_archive(tmp_path, monkeypatch):
     for said in ("M3-6H", "keyway 5 JS9", "corners R", "ISO 13715", "ISO 22081", "mass", "2026-09-21", "ISO 5459"):
         assert said in text, said
     assert first[:2] == b"PK"
+
+
+def test_mating_sheet_says_every_row_and_spends_the_bound():
+    job = job_of("ellipse", Structure.INTEGRAL, 1.0)
+    drawn = Sheet(WIDTH, HEIGHT, "mating parts", "")
+    fill_mating_sheet(drawn, job)
+    said = [label.content for label in drawn.labels]
+    for row in job.mating:
+        assert row.feature in said and row.requirement in said
+    # Four shares of e1 = 15 um, each 7.5 um on diameter; two of the tilts' 0.2 deg.
+    assert said.count("0.0075") == 4 and said.count("0.00375 mm") == 4 and said.count("0.1 deg") == 2
+    assert any(line.startswith("e1") and line.endswith(": 0.015 mm") for line in said)
+    assert any(line.endswith(": 0.2 deg") for line in said)
