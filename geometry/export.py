@@ -16,7 +16,7 @@ import numpy as np
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, MissingLibrary, unknown_name
 from hdopt.figures import drawn
-from hdopt.files import JsonReady, replacing_all
+from hdopt.files import JsonReady, ShownAsTable, replacing_all
 from hdopt.geometry.budget import CalloutTables
 from hdopt.geometry.dimensions import Dimension
 from hdopt.geometry.formats import FORMATS
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class ExportResult:
+class ExportResult(ShownAsTable):
     """What was written, as it was found in the files."""
 
     files: Mapping[str, Path]

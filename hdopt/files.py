@@ -196,6 +196,17 @@ class HasTables(Protocol):
     def tables(self) -> dict[str, pd.DataFrame]: ...
 
 
+class ShownAsTable:
+    """A result that a notebook shows by its main table instead of the text of a record."""
+
+    def to_frame(self) -> pd.DataFrame:
+        """The main table."""
+        raise NotImplementedError(type(self).__name__)
+
+    def _repr_html_(self) -> str:
+        return self.to_frame().to_html(max_rows=20, notebook=True)
+
+
 def write_tables(result: HasTables, path: str | Path, kind: str | None = None) -> None:
     """Write the tables of a `result` to `path` by `kind`: "xlsx", an Excel workbook of all of them, a sheet each, or
     "csv", the main one; by the ending of `path` if None.

@@ -12,6 +12,7 @@ from hdopt.allocation.cost import GradeTable
 from hdopt.allocation.rules import Allocation
 from hdopt.errors import HdoptError
 from hdopt.figures import drawn
+from hdopt.files import ShownAsTable
 from hdopt.tolerance.intervals import IntervalEstimate
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class RuleOutcome:
 
 
 @dataclass(frozen=True)
-class AllocateResult:
+class AllocateResult(ShownAsTable):
     """Tolerances at least cost by one rule, verified once."""
 
     study: str

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hdopt.arrays import Array
+from hdopt.errors import HdoptError, unknown_name
 
 Values = float | Array
 """One value, or an array of them."""
@@ -81,7 +82,10 @@ class DriveErrors:
         return cls(*np.moveaxis(matrix, -1, 0))
 
     def with_(self, **changes: Values) -> DriveErrors:
-        """A copy with the named errors replaced."""
+        """A copy with the named errors replaced, in mm and rad. Raises `HdoptError` for a name that is none."""
+        for name in changes:
+            if name not in ERROR_NAMES:
+                raise HdoptError(unknown_name("error", name, ERROR_NAMES))
         return replace(self, **changes)
 
 

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 from hdopt.figures import drawn
+from hdopt.files import ShownAsTable
 from hdopt.optimize.region_records import Regions
 from hdopt.optimize.setup import Setup
 from hdopt.optimize.solve import Solution
@@ -49,7 +50,7 @@ class Front:
 
 
 @dataclass(frozen=True)
-class SearchResult:
+class SearchResult(ShownAsTable):
     """What a search found. `best` is feasible unless `feasible` says no; then it is the design nearest to the limits.
 
     `active` lists limits and bounds that hold the best design, with the price of each; `optimality_residual` is how far

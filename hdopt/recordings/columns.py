@@ -141,6 +141,19 @@ def default_columns(table: Table) -> tuple[dict[str, Column], list[str]]:
     return layout | found, [_by_name(channel, column) for channel, column in found.items()]
 
 
+def not_read(table: Table, told: Mapping[str, Column]) -> list[str]:
+    """A sentence on each column of a `table` that by its name is the time, torque or temperature, where who `told` the
+    columns named none for it: without a clock much cannot be seen."""
+    said = []
+    for channel in ("time", "torque", "temperature"):
+        names = dict.fromkeys((*table.channels, *table.others))
+        fits = [name for name in names if _speaks_of(name, NAME_PATTERNS[channel])]
+        if channel not in told and len(fits) == 1 and fits[0] not in {column.name for column in told.values()}:
+            of = f"by its name it is the {channel}: add {channel}={fits[0]} to --columns"
+            said.append(f"{fits[0]!r} is not read, although {of}")
+    return said
+
+
 def _unit_stated(channel: str, column: str, table: Table) -> str:
     """The unit that the file or the column's own name states; empty where neither does."""
     source = table.channels.get(column)
@@ -208,10 +221,12 @@ def with_units(
             said.append(f"{channel} is in {unit}, as the {'file' if by_file else 'column name'} says")
         complete[channel] = replace(column, unit=unit)
     if open_units:
+        given = ",".join(open_units)
+        given = given if re.fullmatch(r"[\w.,:=/-]+", given) else f'"{given}"'  # a shell would cut it at a blank
         choices = "deg, rad, arcmin, arcsec, turn, counts/COUNTS_PER_TURN" if _asks_angle(open_units) else "s, ms, us"
         raise HdoptError(
             f"{name}: no unit is stated for {', '.join(entry.split('=')[0] for entry in open_units)}; give it with "
-            f"--columns {','.join(open_units)} ({choices})"
+            f"--columns {given} ({choices})"
         )
     return complete, said, doubts
 

@@ -62,6 +62,8 @@ def parse_limits(text: str | None) -> dict[str, float]:
             continue
         name, equals, rest = (part.strip() for part in item.partition("="))
         match = re.fullmatch(r"([0-9.]+(?:[eE][-+]?\d+)?)\s*([a-z/]*)", rest)
+        if not equals and re.fullmatch(r"\d+\s*[a-z/]*", name):
+            raise HdoptError(f"--limit {text!r} has a decimal comma; write a point, such as peak_to_peak=1.0arcmin")
         if not equals or match is None:
             raise HdoptError(f"--limit holds {item.strip()!r}; write NAME=NUMBERarcmin, such as peak_to_peak=1.0arcmin")
         if name not in LIMIT_NAMES:

@@ -17,7 +17,7 @@ from hdopt.errors import HdoptError
 from hdopt.recordings.bench import Bench
 from hdopt.recordings.channels import Channels, mapped_channels, sensor_uncertainty_arcmin
 from hdopt.recordings.checks import checked_recording
-from hdopt.recordings.columns import Column, choose_columns, default_columns, parse_columns
+from hdopt.recordings.columns import Column, choose_columns, default_columns, not_read, parse_columns
 from hdopt.recordings.formats import read_table
 from hdopt.recordings.recording import TURN, Recording
 from hdopt.recordings.table import Channel, Table
@@ -84,7 +84,9 @@ def _told(columns: str | None, bench: Bench | None) -> dict[str, Column] | None:
 
 def _channels(table: Table, told: dict[str, Column] | None, name: str) -> Channels:
     if told is not None:
-        return mapped_channels(table, told, False, name)
+        channels = mapped_channels(table, told, False, name)
+        left = [f"{name}: {sentence}" for sentence in not_read(table, told)]
+        return replace(channels, understood=(*channels.understood, *left))
     plain = {"input_angle_deg", "output_angle_deg"} & set(table.channels)
     chosen, said = default_columns(table) if plain else choose_columns(table, name)
     channels = mapped_channels(table, chosen, True, name)

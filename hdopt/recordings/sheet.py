@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 from hdopt.arrays import Array
 from hdopt.figures import drawn
+from hdopt.files import ShownAsTable
 from hdopt.recordings.capability import Gauge, Performance
 from hdopt.recordings.decision import Decision
 from hdopt.recordings.figures import Cells, Return
@@ -42,7 +43,7 @@ class OrderLine:
 
 
 @dataclass(frozen=True)
-class Inspection:
+class Inspection(ShownAsTable):
     """The acceptance sheet of one drive; all figures in arcmin at the output unless another unit is named."""
 
     names: tuple[str, ...]
@@ -191,7 +192,7 @@ class Unit:
 
 
 @dataclass(frozen=True)
-class Batch:
+class Batch(ShownAsTable):
     """The drives of a batch in the order of their files, the `limit` of the peak-to-peak (arcmin) and the performance
     against it (None with fewer than eight drives or no limit)."""
 

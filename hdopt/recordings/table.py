@@ -23,10 +23,12 @@ class Channel:
 
 @dataclass(frozen=True)
 class Table:
-    """The channels of one file by their name or path, and what was noticed on reading it, a sentence each."""
+    """The channels of one file by their name or path, and what was noticed on reading it, a sentence each; `others` are
+    names of columns that were left unread."""
 
     channels: Mapping[str, Channel]
     notes: tuple[str, ...] = field(default=())
+    others: tuple[str, ...] = field(default=())
 
     @property
     def rows(self) -> int:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 from hdopt.figures import drawn
+from hdopt.files import ShownAsTable
 from hdopt.kinematics.model_error import ModelError
 from hdopt.tolerance.sensitivity import Shapley, Sobol
 from hdopt.tolerance.stack import Stack
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class StackResult:
+class StackResult(ShownAsTable):
     """A stack with what was asked for beside it."""
 
     study: str
@@ -83,7 +84,7 @@ class StackResult:
 
 
 @dataclass(frozen=True)
-class SobolResult:
+class SobolResult(ShownAsTable):
     """Sobol' indices of independent inputs, or Shapley effects; either may be absent."""
 
     study: str

@@ -18,6 +18,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.figures import drawn
+from hdopt.files import ShownAsTable
 from hdopt.parallel.engine import Engine, engine_from
 from hdopt.tolerance.response import Response, evaluate
 from hdopt.tolerance.sampling import ScrambledSobol
@@ -51,7 +52,7 @@ class Method:
 
 
 @dataclass(frozen=True)
-class Screening:
+class Screening(ShownAsTable):
     """What one of SALib's methods says of each input. `inputs` holds its measures by input, intervals as `_conf` (half
     width at 95 %); `X` (n, d) in the unit cube and `Y` (n,) are what it was computed from."""
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any  # Any: parsed TOML and JSON
 
 from hdopt.errors import HdoptError, IncompleteStudy, MissingValue
+from hdopt.files import ShownAsTable
 from hdopt.study import DEFAULT_STUDY, AnyStudy, Study, load_study, study_document, study_of, with_values
 from hdopt.study.defaults import USED, defaults_taken
 
@@ -36,7 +37,7 @@ class Capability:
 
 
 @dataclass(frozen=True)
-class StudyCheck:
+class StudyCheck(ShownAsTable):
     """What a study allows. `defaults` says, a line a section, what holds where it says nothing."""
 
     study: str

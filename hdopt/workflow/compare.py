@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal  # Any: values of JSON
 
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.figures import drawn
-from hdopt.files import replacing_all, write_text
+from hdopt.files import ShownAsTable, replacing_all, write_text
 from hdopt.geometry.compare import CamFit, FitMethod, fit_cam, read_cam, table_of
 from hdopt.geometry.contour import Contour
 from hdopt.geometry.dimensions import tolerance_bounds
@@ -31,7 +31,7 @@ FILES = ("csv", "xlsx", "plot", "study")
 
 
 @dataclass(frozen=True)
-class CompareResult:
+class CompareResult(ShownAsTable):
     """How a measured cam lies against its zone. `zone` is the full width of the profile's tolerance zone, mm.
 
     `eccentricity_allowed` (mm) is what the study's tolerance of the wave generator's eccentricity lets the cam lie off

@@ -18,7 +18,7 @@ from hdopt.compensation.writers import FORMATS, homing_arcmin, written
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
 from hdopt.figures import drawn
-from hdopt.files import write_text
+from hdopt.files import ShownAsTable, write_text
 from hdopt.recordings.recording import TURN, Recording
 from hdopt.recordings.rows import Rows, gather, neighbours_for
 from hdopt.workflow.output_files import Files, checked_files
@@ -54,7 +54,7 @@ class PerRecording:
 
 
 @dataclass(frozen=True)
-class Compensated:
+class Compensated(ShownAsTable):
     """A compensation, and what it leaves on parts that the fit did not see; peak-to-peak in arcmin.
 
     `before` and `after` of the held-out parts together, each part scored by a choice made without it; `predicted` for a

@@ -14,7 +14,7 @@ from hdopt.drive.errors import ERROR_NAMES, PHASE_OF, DriveErrors, study_key
 from hdopt.drive.geometry import Drive, Structure
 from hdopt.drive.profiles import TwoDisk
 from hdopt.errors import HdoptError
-from hdopt.files import claim_output, write_text
+from hdopt.files import ShownAsTable, claim_output, write_text
 from hdopt.recordings.orders import model_orders
 from hdopt.report.explorer import render_explorer
 from hdopt.report.sections.words import ERROR_LABELS, ERROR_SYMBOLS, label
@@ -53,7 +53,7 @@ PREFIXES = ("Axis ", "WG ", "CS tooth ", "FS tooth ")
 
 
 @dataclass(frozen=True)
-class ExploreResult:
+class ExploreResult(ShownAsTable):
     """The page that was written: its `file`, how many `drives` of the tolerances its cloud has, and `notes` of what it
     leaves out. `cloud` are their errors in the units of a study file with their peak-to-peak (arcmin) in the last
     column, shape (drives, 13)."""

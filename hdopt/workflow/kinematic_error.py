@@ -15,6 +15,7 @@ from hdopt.drive.geometry import Drive
 from hdopt.drive.profiles import perimeter_error, tip_radius_of_curvature
 from hdopt.errors import HdoptError
 from hdopt.figures import drawn
+from hdopt.files import ShownAsTable
 from hdopt.kinematics.extremes import extremes_arcmin, walked_peak_to_peak_arcmin
 from hdopt.kinematics.load_sharing import misalignment_share
 from hdopt.kinematics.waveform import DEFAULT_METHOD, geometry_for
@@ -41,7 +42,7 @@ POINTS_OF_A_PROFILE = 721
 
 
 @dataclass(frozen=True)
-class KinematicErrorResult:
+class KinematicErrorResult(ShownAsTable):
     """Kinematic error of one drive. A value that needs a number nobody gave is None, and `notes` says which number.
 
     `method` names the geometry: "exact" or "closed form". `peak_to_peak_arcmin` is converged, of a single tooth pair
@@ -110,7 +111,7 @@ class KinematicErrorResult:
 
 
 @dataclass(frozen=True)
-class ProfileResult:
+class ProfileResult(ShownAsTable):
     """What a wave generator's profile asks of the flexspline. None where a number is missing; `notes` says which."""
 
     study: str

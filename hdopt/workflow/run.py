@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, cast  # Any: values of JSON
 
 from hdopt.errors import HdoptError, MissingLibrary, MissingValue, unknown_name
 from hdopt.figures import drawn
-from hdopt.files import make_folder, to_json, write_bytes, write_text
+from hdopt.files import ShownAsTable, make_folder, to_json, write_bytes, write_text
 from hdopt.parallel.engine import engine_from, engine_in_force
 from hdopt.parallel.kept import Kept
 from hdopt.report import REPORT_FILE, RESULTS_FILE, Figure, Item, Report, Section, Table, Text
@@ -40,7 +40,7 @@ Progress = Callable[[Iterable[str]], Iterable[str]]
 
 
 @dataclass(frozen=True)
-class RunResult:
+class RunResult(ShownAsTable):
     """What a run left: the page, and what each step found, by its name."""
 
     study: str

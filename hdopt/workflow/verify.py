@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 from hdopt.errors import HdoptError
-from hdopt.files import read_json
+from hdopt.files import ShownAsTable, read_json
 from hdopt.report import REPORT_FILE, RESULTS_FILE
 from hdopt.study import load_study
 from hdopt.workflow.provenance import provenance
@@ -25,7 +25,7 @@ MOST_TOLD = 5
 
 
 @dataclass(frozen=True)
-class Verification:
+class Verification(ShownAsTable):
     """What a repetition gave. `same` and `differing` are file names; `numbers` those of results.json that differ, as
     (place, then, now); `changes` what has changed since: study, inputs, libraries, machine."""
 

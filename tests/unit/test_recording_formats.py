@@ -186,11 +186,12 @@ def test_counts_gear_and_turns(truth, tmp_path):
         ("input=a:counts,output=b:deg", "write input=NAME:counts/16384"),
         ("input=a:counts/0,output=b:deg", "counts per turn '0'; give a finite number above 0"),
         ("input=a:deg/gearx,output=b:deg", "gear 'x'"),
+        ("input=a b,output=b:deg", r'--columns "input=a b:UNIT" '),
         ("input=a,output=b:deg", r"no unit is stated for input; give it with --columns input=a:UNIT"),
     ],
 )
 def test_units_that_do_not_do(tmp_path, columns, message):
-    pd.DataFrame({"a": np.arange(100), "b": np.arange(100)}).to_csv(tmp_path / "x.csv", index=False)
+    pd.DataFrame(dict.fromkeys(("a", "b", "a b"), np.arange(100))).to_csv(tmp_path / "x.csv", index=False)
     with pytest.raises(HdoptError, match=message):
         read_recording(tmp_path / "x.csv", RATIO, columns)
 
@@ -427,3 +428,24 @@ def test_swapped_stamps_are_sorted_and_a_long_counter_is_counted_on(truth):
     same(recording, truth)
     assert any("3 rows were out of order" in w for w in recording.warnings)
     assert any("runs over after 3 turns" in w for w in recording.warnings)
+
+
+def test_a_clock_that_the_layout_left_out_is_said(truth, tmp_path):
+    """Who must state the units of two columns and forgets the time is told; told nothing, much cannot be seen."""
+    time, theta, output = truth
+    start = pd.Timestamp("2026-05-03T09:00:00")
+    stamps = [(start + pd.Timedelta(seconds=float(t))).isoformat() for t in time]
+    table = pd.DataFrame({"Zeit": stamps, "Motor [Inc]": theta / TURN * 65536, "Abtrieb": output / TURN})
+    table.to_csv(tmp_path / "r.csv", index=False, sep=";", decimal=",", float_format="%.12f")
+    columns = "input=Motor [Inc]:counts/65536,output=Abtrieb:turn"
+    said = read_recording(tmp_path / "r.csv", RATIO, columns).understood
+    assert "r.csv: 'Zeit' is not read, although by its name it is the time: add time=Zeit to --columns" in said
+    said = read_recording(tmp_path / "r.csv", RATIO, f"time=Zeit,{columns}").understood
+    assert not any("is not read" in sentence for sentence in said)
+
+
+def test_a_decimal_comma_in_a_limit_is_named():
+    from hdopt.recordings.decision import parse_limits
+
+    with pytest.raises(HdoptError, match=r"has a decimal comma; write a point"):
+        parse_limits("peak_to_peak=1,5arcmin")

@@ -167,3 +167,16 @@ def test_a_sweep_does_not_leave_effects_out_in_silence():
     lobing = {"effects": {"circular_spline_lobing": {"lobes": 6, "radial_amplitude_um": 8.0, "phase_deg": 0.0}}}
     with pytest.raises(HdoptError, match=r"take hdopt\.kinematic_error"):
         hdopt.peak_to_peak(hdopt.load_study("csf-25-80").with_(lobing))
+
+
+def test_an_error_that_is_none_is_named():
+    with pytest.raises(HdoptError, match="unknown error 'axis_eccentricity_mm'; did you mean 'axis_eccentricity'"):
+        hdopt.load_study().errors.with_(axis_eccentricity_mm=0.01)
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_a_notebook_shows_the_table_of_a_result(name):
+    """Would catch a result that fills the notebook with the text of a record."""
+    result = RESULTS[name]()
+    shown = result._repr_html_()
+    assert "<table" in shown and all(f"<th>{column}</th>" in shown for column in result.to_frame().columns)

@@ -14,6 +14,7 @@ from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.diagnosis.verdict.where import Where
 from hdopt.effects.estimate import Parameter
 from hdopt.figures import drawn
+from hdopt.files import ShownAsTable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,7 +41,7 @@ class FitNumbers(TypedDict):
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(ShownAsTable):
     """A verdict with everything that carries it; `to_dict` is the JSON contract, and `rule` the name of the rule that
     gave the verdict.
     """

@@ -68,7 +68,8 @@ def read(path: Path, wanted: Sequence[str] | None) -> Table:
     channels: dict[str, Channel] = {}
     for name in [str(column) for column in frame]:
         channels[name] = Channel(_values(frame.pop(name), layout.decimal), units.get(name, ""))
-    return Table(channels, (*_notes(layout), *left_out))
+    others = tuple(name for name in names if name not in channels)
+    return Table(channels, (*_notes(layout), *left_out), others)
 
 
 def _frame(path: Path, layout: Layout, use: list[str] | None) -> tuple[pd.DataFrame, tuple[str, ...]]:
