@@ -45,7 +45,9 @@ docs: $(VENV)/ready-to-test
 	$(VENV)/bin/python -m sphinx -W --keep-going -b html docs build/site
 
 benchmark: $(VENV)/ready-to-test
-	$(VENV)/bin/python -m pytest tests/benchmarks --benchmark-only
+	mkdir -p build
+	$(VENV)/bin/python -m pytest tests/benchmarks --benchmark-only --benchmark-json build/benchmark.json
+	$(VENV)/bin/python -m tests.benchmarks.ratios build/benchmark.json docs/verification.md
 
 # What `hdopt` needs to run, and what its tests need besides, at the same versions.
 LOCK := uv pip compile --universal --python-version 3.11 --no-header --no-annotate pyproject.toml

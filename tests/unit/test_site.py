@@ -184,3 +184,17 @@ def test_every_table_of_a_study_has_an_example_that_loads(tmp_path):
             assert [cost.build((0.396, 63.36)) for cost in study.sections["tolerances"].costs().values()] or (
                 "cost" not in text
             )
+
+
+def test_ratios_of_benchmarks_are_for_one_drive_and_of_the_shortest_time():
+    """Would catch a mean in place of the shortest time, a ratio turned round, and drives that are not counted."""
+    from tests.benchmarks.ratios import END, START, renewed
+
+    def one(name, least, **extra):
+        return {"name": name, "stats": {"min": least, "mean": 9 * least}, "extra_info": extra}
+
+    slow = one("test_walk_of_80_turns_in_numpy", 0.3, drives=1)
+    run = {"benchmarks": [slow, one("test_kernel[1]", 0.6, drives=1_000_000)]}
+    page = renewed(f"before {START}\nold\n{END} after", run)
+    assert "over the compiled kernel | 5e5 |" in page and "old" not in page
+    assert page.startswith("before ") and page.endswith(" after")
