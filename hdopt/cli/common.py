@@ -248,9 +248,10 @@ engine_option = click.option(
 
 
 @contextmanager
-def finished_parts_kept(study: Study, resume: bool) -> Iterator[None]:
+def finished_parts_kept(inputs: str, resume: bool) -> Iterator[None]:
     """Keep the finished parts of work of more than some seconds in the user's cache folder until it is done, so that
-    the same command with --resume goes on with them: the same study, options, seed and version."""
+    the same command with --resume goes on with them: the same `inputs` (hashes of the study or the recordings),
+    options, seed and version."""
     import hashlib
     from importlib import metadata
 
@@ -259,7 +260,7 @@ def finished_parts_kept(study: Study, resume: bool) -> Iterator[None]:
 
     context = click.get_current_context()
     asked = {name: value for name, value in context.params.items() if name not in ("json_file", "resume")}
-    key = f"{context.info_name} {study.sha256} {asked} {metadata.version('hdopt')}"
+    key = f"{context.info_name} {inputs} {asked} {metadata.version('hdopt')}"
     forget_old(cache_folder())
     parts = Parts.open(cache_folder() / hashlib.sha256(key.encode()).hexdigest()[:32], key, resume)
     with engine_in_force(Kept(engine_from(None), parts, quiet_s=QUIET_S, needed=False)):

@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any, TypeVar  # Any: what the command's other 
 
 import click
 
-from hdopt.cli.common import OutputFile, answer_options, emit, engine_option, table_options
+from hdopt.cli.common import (
+    OutputFile,
+    answer_options,
+    emit,
+    engine_option,
+    finished_parts_kept,
+    resume_option,
+    table_options,
+)
 from hdopt.cli.recorded import RecordingOptions, recording_options
 
 if TYPE_CHECKING:
@@ -102,17 +110,30 @@ def sheet_options(command: Callable[..., R]) -> Callable[..., R]:
 @sheet_options
 @click.option("--each", is_flag=True, help="Each file is a drive of its own: one table, one plot, Ppk.")
 @click.option("--check", is_flag=True, help="End with status 1 where a limit is missed (not where it is undecided).")
+@resume_option
 @engine_option
 @answer_options
 def command(
-    given: RecordingOptions, asked: SheetOptions, each: bool, check: bool, json_file: Path | None, seed: int
+    given: RecordingOptions,
+    asked: SheetOptions,
+    each: bool,
+    check: bool,
+    resume: bool,
+    json_file: Path | None,
+    seed: int,
 ) -> int:
     """The acceptance sheet of a drive: peak-to-peak, return error, repeatability, slope, orders, checks, limits.
 
     REC are files of one drive (with --each, of one drive each): .csv and other text, .parquet, .mat, .h5, .tdms, .mcap,
     ROS bags, PHD2 guide logs, .mf4. Exit status 1 with --check where a limit is missed.
     """
-    missed = _each(given, asked, json_file, seed) if each else _one(given, asked, json_file, seed)
+    if not each:
+        if resume:
+            raise click.UsageError("--resume goes on with many drives; give it with --each")
+        missed = _one(given, asked, json_file, seed)
+    else:
+        with finished_parts_kept(given.fingerprint(), resume):
+            missed = _each(given, asked, json_file, seed)
     return 1 if check and missed else 0
 
 

@@ -36,6 +36,17 @@ class RecordingOptions:
 
         return recorded_drive(self.drive, self.ratio, self.columns, self.bench_file)
 
+    def fingerprint(self) -> str:
+        """Paths and hashes of all that the work reads: study, bench file and every recording, read or not yet. They
+        stand in the provenance then, whatever process reads the recordings."""
+        from hdopt.files import files_of_work, note_input
+
+        self.source()
+        for recording in self.recordings:
+            note_input(recording)
+        work = files_of_work()
+        return "" if work is None else repr(sorted(work.inputs.items()))
+
 
 def recording_options(command: Callable[..., R]) -> Callable[..., R]:
     """REC..., --drive, --ratio, --columns and --bench of a `command`, which gets them as its first argument, a

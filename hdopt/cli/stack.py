@@ -50,7 +50,7 @@ def command(asked: StudyOptions, resume: bool, json_file: Path | None, **options
     from hdopt.workflow.stack import stack
 
     loaded = asked.load()
-    with finished_parts_kept(loaded, resume):
+    with finished_parts_kept(loaded.sha256, resume):
         result = stack(loaded, engine=watched("samples"), **options)
     verdict = of_stack(result)
     emit(result.to_dict(), json_file, _lines(result), verdict, tables=result)

@@ -293,3 +293,43 @@ def test_a_page_of_many_drives_gives_no_figures_to_what_was_not_read():
     assert figures.values == {"Drives": "2", "Limit of the peak-to-peak": "1 arcmin", "Met": "1", "Missed": "1",
                               "Not read": "1"}  # fmt: skip
     assert list(table.frame["drive"]) == ["a", "b"] and list(unread.frame["why"]) == ["c: holds no rows"]
+
+
+def test_many_drives_go_on_where_they_were_interrupted(tmp_path, capsys, monkeypatch):
+    """Would catch drives inspected twice, and parts of a file that has changed since taken for its own."""
+    import hdopt.workflow.inspect_many as many
+    from hdopt.cli import common
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(common, "QUIET_S", 0.0)
+    paths = [write(tmp_path, f"d{k}.csv", recorded(wave, turns=3, seed=k)) for k in range(4)]
+    sheet, asked = many.acceptance_sheet, []
+
+    def interrupted_at(count):
+        def inspected(recordings, *others, **options):
+            asked.append(recordings[0].name)
+            if len(asked) == count:
+                raise KeyboardInterrupt
+            return sheet(recordings, *others, **options)
+
+        return inspected
+
+    gear = ("inspect", *paths, "--each", "--drive", "none", "--ratio", "80", "--engine", "process")
+    monkeypatch.setattr(many, "acceptance_sheet", interrupted_at(3))
+    assert run(*gear) == 130
+    write(tmp_path, "d1.csv", recorded(wave, turns=3, seed=9))
+    asked.clear()
+    monkeypatch.setattr(many, "acceptance_sheet", interrupted_at(0))
+    assert run(*gear, "--resume", "--json", str(tmp_path / "changed.json")) == 0
+    assert asked == ["d0.csv", "d1.csv", "d2.csv", "d3.csv"], "another file is other work"
+    asked.clear()
+    monkeypatch.setattr(many, "acceptance_sheet", interrupted_at(3))
+    assert run(*gear) == 130
+    asked.clear()
+    monkeypatch.setattr(many, "acceptance_sheet", interrupted_at(0))
+    assert run(*gear, "--resume", "--json", str(tmp_path / "again.json")) == 0
+    assert asked == ["d2.csv", "d3.csv"]
+    found = [json.loads((tmp_path / f"{name}.json").read_text()) for name in ("changed", "again")]
+    assert found[0]["drives"] == found[1]["drives"]
+    assert {f"d{k}.csv" for k in range(4)} <= set(found[1]["provenance"]["inputs"])
+    assert run("inspect", paths[0], "--drive", "none", "--ratio", "80", "--resume") == 2

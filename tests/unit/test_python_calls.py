@@ -47,7 +47,7 @@ OTHERWISE = {
     "allocate": OF_A_STUDY,
     "inspect": OF_RECORDINGS
     | dict.fromkeys(("report_file", "bench_out"), "files")
-    | {"each": "inspect_many", "serial": "label", "conditions": "label", "check": "result.missed"},
+    | {"each": "inspect_many", "resume": "engine", "serial": "label", "conditions": "label", "check": "result.missed"},
     "compensate": OF_RECORDINGS | {"output": "files", "form": "files"},
     "diagnose": OF_RECORDINGS | dict.fromkeys(("report_file", "study_file"), "files"),
     "search": OF_A_STUDY | {"study_file": "files"},
