@@ -310,7 +310,7 @@ def _model_surface(fit: WaveformFit) -> Surface:
     """The fitted model's waveform over input and output angle."""
     inputs, outputs = grid_angles()
     a, b = inputs.ravel(), (inputs + outputs).ravel()
-    rotation = np.column_stack([np.cos(a), np.sin(a), np.cos(b), np.sin(b)])
+    rotation = np.stack([np.cos(a), np.sin(a), np.cos(b), np.sin(b)])
     values = fit.sign * fit.model.evaluate_at(rotation, fit.errors)[0].reshape(inputs.shape)
     return Surface(values - values.mean())
 
