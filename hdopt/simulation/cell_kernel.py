@@ -60,13 +60,6 @@ class Circle(NamedTuple):
     turn_sin: Array
 
 
-class Extremes(NamedTuple):
-    """The least and the largest deviation found so far, mm of arc."""
-
-    low: float
-    high: float
-
-
 @inlined
 def _deeper(drive: WalkedDrive, cos: float, sin: float, s: float) -> tuple[float, float, float]:
     """Deviation of zone s (+1, -1) without its FS teeth at the deeper rim, the FS offset there, and the depths'
@@ -235,31 +228,31 @@ def _refined(drive: WalkedDrive, low: float, high: float, sign: float, fine: Arr
 
 
 class Piece(NamedTuple):
-    """Part of the cell `cell` from `low` to `high`, rad of one input turn."""
+    """Part of a cell from `low` to `high`, rad of one input turn."""
 
-    cell: int
     low: float
     high: float
 
 
 @compiled
 def _bounds(at: Array, to: Array, table: CellTable, g: int, a_fs: float) -> tuple[float, float]:
-    """What no turn and no FS phase goes below, and above, between two columns `at` and `to` of a grid in cell `g`."""
+    """What the driving deviation, and its negative, do not go below in any turn and FS phase, between two columns `at`
+    and `to` of a grid in cell `g`."""
     apart = abs(at[U_SIN] + at[W_SIN]) + abs(at[U_COS] + at[W_COS])
     apart = max(apart, abs(to[U_SIN] + to[W_SIN]) + abs(to[U_COS] + to[W_COS]))
     mean = 0.5 * (min(at[U] + at[W], to[U] + to[W]) - apart) + table.least[2, g]
     one, two = min(at[U], to[U]) - a_fs + table.least[0, g], min(at[W], to[W]) - a_fs + table.least[1, g]
     high_one = max(at[U], to[U]) + a_fs + table.largest[0, g]
     high_two = max(at[W], to[W]) + a_fs + table.largest[1, g]
-    return max(mean, one, two), max(high_one, high_two)
+    return max(mean, one, two), -max(high_one, high_two)
 
 
 @compiled
 def _fill_estimates(
     at: Array, to: Array, first: float, last: float, table: CellTable, g: int, circle: Circle, out: Array
 ) -> None:
-    """Fill `out` (2, t) with the chords' least and largest driving deviation in every turn, between two columns `at`
-    and `to` of a grid at the shares `first` and `last` of cell `g`."""
+    """Fill `out` (2, t) with the chords' least driving deviation in every turn, and with that of its negative, between
+    two columns `at` and `to` of a grid at the shares `first` and `last` of cell `g`."""
     left, right = 1.0 - first, 1.0 - last
     one, one_next, two, two_next = table.edges[0, g], table.edges[0, g + 1], table.edges[1, g], table.edges[1, g + 1]
     low_one, low_two, high_one, high_two = table.below[0, g], table.below[1, g], table.above[0, g], table.above[1, g]
@@ -269,7 +262,7 @@ def _fill_estimates(
         w0 = at[W] + c * at[W_SIN] + s * at[W_COS] + left * two[t] + first * two_next[t]
         u1 = to[U] + c * to[U_SIN] + s * to[U_COS] + right * one[t] + last * one_next[t]
         w1 = to[W] + c * to[W_SIN] + s * to[W_COS] + right * two[t] + last * two_next[t]
-        out[1, t] = max(max(u0, u1) + high_one[t], max(w0, w1) + high_two[t])
+        out[1, t] = -max(max(u0, u1) + high_one[t], max(w0, w1) + high_two[t])
         u0, u1, w0, w1 = u0 + low_one[t], u1 + low_one[t], w0 + low_two[t], w1 + low_two[t]
         d0, d1 = u0 - w0, u1 - w1
         crosses = d0 * d1 < 0.0
@@ -279,24 +272,18 @@ def _fill_estimates(
 
 
 @compiled
-def _extremes_of_piece(
-    drive: WalkedDrive, piece: Piece, estimates: Array, slack: float, fine: Array, found: Extremes
-) -> Extremes:
-    """The extremes `found` and those of a `piece` in the turns whose `estimates` (2, t) may go beyond them by `slack`;
-    the most promising turn of either side first."""
-    low, high = found.low, found.high
-    turns = estimates.shape[1]
-    best, top = int(np.argmin(estimates[0])), int(np.argmax(estimates[1]))
-    for k in range(-1, turns):
+def _least_of_piece(
+    drive: WalkedDrive, piece: Piece, estimates: Array, slack: float, sign: float, fine: Array, least: float
+) -> float:
+    """The lower of `least` and sign times the driving deviation of a `piece`, in the turns whose `estimates` (t,) may
+    go below by `slack`; the most promising turn first."""
+    best = int(np.argmin(estimates))
+    for k in range(-1, len(estimates)):
         t = best if k < 0 else k
-        if estimates[0, t] - slack < low and (k < 0 or k != best):
+        if estimates[t] - slack < least and (k < 0 or k != best):
             start = 2 * math.pi * t
-            low = min(low, _refined(drive, start + piece.low, start + piece.high, 1.0, fine))
-        t = top if k < 0 else k
-        if estimates[1, t] + slack > high and (k < 0 or k != top):
-            start = 2 * math.pi * t
-            high = max(high, _refined(drive, start + piece.low, start + piece.high, -1.0, fine))
-    return Extremes(low, high)
+            least = min(least, sign * _refined(drive, start + piece.low, start + piece.high, sign, fine))
+    return least
 
 
 @compiled
@@ -312,10 +299,10 @@ def _curvature(drive: WalkedDrive) -> float:
 
 
 @compiled
-def _extremes_at_changes(
-    drive: WalkedDrive, cuts: Array, cells: int, slack: float, table: CellTable, circle: Circle, found: Extremes
-) -> Extremes:
-    """The extremes `found` and those of the cells in which the deeper rim changes at one of `cuts`, part by part."""
+def _least_at_changes(
+    drive: WalkedDrive, cuts: Array, cells: int, slack: float, table: CellTable, circle: Circle, least: Array
+) -> None:
+    """Lower `least` (2,) to what the cells hold in which the deeper rim changes at one of `cuts`, part by part."""
     step = 2 * math.pi / cells
     at, to, estimates = np.empty(ROWS), np.empty(ROWS), np.empty((2, len(circle.turn_cos)))
     for k in range(len(cuts)):
@@ -329,18 +316,20 @@ def _extremes_at_changes(
                 continue
             _fill_edge(drive, low, at)
             _fill_edge(drive, high, to)
-            least, largest = _bounds(at, to, table, g, drive.a_fs)
-            if least - slack < found.low or largest + slack > found.high:
-                _fill_estimates(at, to, low / step - g, high / step - g, table, g, circle, estimates)
-                found = _extremes_of_piece(drive, Piece(g, low, high), estimates, slack, table.fine, found)
-    return found
+            bounds = _bounds(at, to, table, g, drive.a_fs)
+            for side in range(2):
+                if (bounds[1] if side else bounds[0]) - slack < least[side]:
+                    _fill_estimates(at, to, low / step - g, high / step - g, table, g, circle, estimates)
+                    sign, piece = (-1.0 if side else 1.0), Piece(low, high)
+                    least[side] = _least_of_piece(drive, piece, estimates[side], slack, sign, table.fine, least[side])
 
 
 @compiled
-def _extremes_of_turns(
-    drive: WalkedDrive, grid: Array, cuts: Array, table: CellTable, circle: Circle, found: Extremes
-) -> Extremes:
-    """The extremes `found` (mm of arc) and those of one drive in one direction, over all turns."""
+def _least_of_turns(
+    drive: WalkedDrive, grid: Array, cuts: Array, table: CellTable, circle: Circle, least: Array
+) -> None:
+    """Lower `least` (2,), mm of arc, to the driving deviation of one drive in one direction and to its negative, over
+    all turns: cell by cell, the lowest bound first, until no bound is below what was found."""
     cells = grid.shape[1] - 1
     step = 2 * math.pi / cells
     slack = 0.125 * step * step * _curvature(drive)
@@ -348,17 +337,18 @@ def _extremes_of_turns(
     for g in range(cells):
         bounds[0, g], bounds[1, g] = _bounds(grid[:, g], grid[:, g + 1], table, g, drive.a_fs)
     for k in range(len(cuts)):
-        g = min(int(cuts[k] / step), cells - 1)
-        bounds[0, g], bounds[1, g] = math.inf, -math.inf
-    first, top = int(np.argmin(bounds[0])), int(np.argmax(bounds[1]))
-    for k in range(-2, cells):
-        g = first if k == -2 else (top if k == -1 else k)
-        if bounds[0, g] - slack < found.low or bounds[1, g] + slack > found.high:
+        bounds[:, min(int(cuts[k] / step), cells - 1)] = math.inf
+    for side in range(2):
+        sign = -1.0 if side else 1.0
+        for _ in range(cells):
+            g = int(np.argmin(bounds[side]))
+            if bounds[side, g] - slack >= least[side]:
+                break
             _fill_estimates(grid[:, g], grid[:, g + 1], 0.0, 1.0, table, g, circle, estimates)
-            piece = Piece(g, g * step, (g + 1) * step)
-            found = _extremes_of_piece(drive, piece, estimates, slack, table.fine, found)
-            bounds[0, g], bounds[1, g] = math.inf, -math.inf
-    return _extremes_at_changes(drive, cuts, cells, slack, table, circle, found)
+            piece = Piece(g * step, (g + 1) * step)
+            least[side] = _least_of_piece(drive, piece, estimates[side], slack, sign, table.fine, least[side])
+            bounds[side, g] = math.inf
+    _least_at_changes(drive, cuts, cells, slack, table, circle, least)
 
 
 @compiled
@@ -423,15 +413,15 @@ def extended_block(
     """
     directions, _, edges, turns = tables.edges.shape
     circle = _circle(edges - 1, turns, advance)
-    grid, every_cut = np.empty((ROWS, edges)), np.empty(MOST_CUTS)
+    grid, every_cut, least = np.empty((ROWS, edges)), np.empty(MOST_CUTS), np.empty(2)
     for row in range(matrix.shape[0]):
         drive = drive_of(tip, tan_alpha, advance, turns, scale, matrix[row])
         _fill_grid(drive, circle, grid)
         cuts = every_cut[: _changes(drive, grid, every_cut)]
-        found = Extremes(math.inf, -math.inf)
+        least[:] = math.inf
         for d in range(directions):
             table = CellTable(
                 tables.edges[d], tables.below[d], tables.above[d], tables.least[d], tables.largest[d], tables.fine[d]
             )
-            found = _extremes_of_turns(drive, grid, cuts, table, circle, found)
-        out[row] = scale * (found.high - found.low)
+            _least_of_turns(drive, grid, cuts, table, circle, least)
+        out[row] = -scale * (least[0] + least[1])
