@@ -45,6 +45,7 @@ docs: $(VENV)/ready-to-test
 	$(VENV)/bin/python -m sphinx -W --keep-going -b html docs build/site
 
 benchmark: $(VENV)/ready-to-test
+	$(VENV)/bin/python -m tests.benchmarks.page
 	mkdir -p build
 	$(VENV)/bin/python -m pytest tests/benchmarks --benchmark-only --benchmark-json build/benchmark.json
 	$(VENV)/bin/python -m tests.benchmarks.ratios build/benchmark.json docs/verification.md
