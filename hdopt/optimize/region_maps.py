@@ -19,7 +19,8 @@ MAPS = 2
 COARSE, FINE = 4, 2
 """Cells a side of the coarse grid, and into how many a coarse cell is divided where its corners differ."""
 ALIKE = 0.01
-"""Constants whose nearest boundary is the same to this share, or its inverse, do the same: one of them is drawn."""
+"""Constants whose nearest boundary is the same to this share, or its inverse, with the same beyond it, do the same: one
+of them is drawn."""
 LEAST_REACH = math.log(1.1)
 BEYOND = 2.0
 """How far a map reaches, in distances of the nearest boundary: it shows as much behind it as before."""
@@ -41,7 +42,8 @@ def _nearest(followed: Sequence[Followed]) -> list[Followed]:
     bounded = [(f, b) for f in followed if (b := f.range.nearest("structure", "profile")) is not None]
     taken: list[tuple[Followed, Boundary]] = []
     for one, boundary in sorted(bounded, key=lambda pair: _distance(pair[1])):
-        if not any(abs(_distance(boundary) - _distance(known)) < ALIKE for _, known in taken):
+        alike = (k for _, k in taken if k.becomes == boundary.becomes)
+        if not any(abs(_distance(boundary) - _distance(known)) < ALIKE for known in alike):
             taken.append((one, boundary))
     return [one for one, _ in taken]
 
