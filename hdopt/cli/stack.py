@@ -39,19 +39,26 @@ if TYPE_CHECKING:
     show_default=True,
     help="'sobol', 16 scramblings, or 'monte-carlo', independent points.",
 )
+@click.option(
+    "--geometry",
+    default="closed form",
+    metavar="KIND",
+    show_default=True,
+    help="Of the sampled drives: 'closed form', 'exact' for up to 4096, or 'auto', exact where the former errs.",
+)
 @resume_option
 @work_options
-def command(asked: StudyOptions, resume: bool, json_file: Path | None, **options: Any) -> int:
+def command(asked: StudyOptions, resume: bool, geometry: str, json_file: Path | None, **options: Any) -> int:
     """Monte Carlo stack of the tolerances: distribution, yield, Ppk; tails and worst case on request.
 
     STUDY is a study file or a shipped study; without one, the shipped drive csf-25-80 is taken.
     """
     from hdopt.workflow.requirement import of_stack
-    from hdopt.workflow.stack import stack
+    from hdopt.workflow.stack import stack, study_problem
 
     loaded = asked.load()
     with finished_parts_kept(loaded.sha256, resume):
-        result = stack(loaded, engine=watched("samples"), **options)
+        result = stack(study_problem(loaded).by(geometry), engine=watched("samples"), **options)
     verdict = of_stack(result)
     emit(result.to_dict(), json_file, _lines(result), verdict, tables=result)
     return status(True, verdict)

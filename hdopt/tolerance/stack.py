@@ -254,7 +254,7 @@ class StackRequest:
 
     `limit` is the upper limit in `unit`, `required_yield` the share that must keep it, `n` the samples in all, drawn by
     `sampling` with `seed`; `quantiles` are reported beside the usual ones; `engine` computes the replicates. `fused`:
-    one compiled pass makes the drives where it can.
+    one compiled pass makes the drives where it can. `linearised` takes the place of a response that is dear.
     """
 
     limit: float
@@ -266,6 +266,7 @@ class StackRequest:
     quantiles: Sequence[float] = ()
     unit: str = "arcmin"
     fused: bool = True
+    linearised: Response | None = None
 
 
 def run_stack(response: Response, space: InputSpace, request: StackRequest) -> Stack:
@@ -290,7 +291,8 @@ def run_stack(response: Response, space: InputSpace, request: StackRequest) -> S
     )
     pooled = merge(part.values for part in parts)
     two_sided = isinstance(response, Signed)
-    line = linearise(response.signed if isinstance(response, Signed) else response, space, seed)
+    straight = request.linearised or response
+    line = linearise(straight.signed if isinstance(straight, Signed) else straight, space, seed)
     z = float(special.ndtri((1 + required) / 2 if two_sided else required))
     performance, notes = _performance(parts, pooled, sampling, request.limit)
     return Stack(

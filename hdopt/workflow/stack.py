@@ -19,6 +19,7 @@ from hdopt.study.tolerances import ContributorsSection, LinearStackSection, Requ
 from hdopt.tolerance.copula import CorrelationGroup
 from hdopt.tolerance.distributions import Distribution
 from hdopt.tolerance.drive_inputs import DriveProblem, DriveResponse, drive_problem
+from hdopt.tolerance.exact_response import MOST_DRIVES, ExactResponse
 from hdopt.tolerance.linear_stack import LinearResponse
 from hdopt.tolerance.response import Response
 from hdopt.tolerance.results import SobolResult, StackResult
@@ -35,6 +36,7 @@ SOBOL_N = 2**14
 PILOT_N, PILOT_MEASURED = 512, 32
 """Drives of which the pilot for the model error takes the largest and some others; with measured teeth, which take
 long."""
+STACK_GEOMETRIES = (CLOSED_FORM, EXACT, "auto")
 SHAPLEY_INPUTS = 8
 """Up to here every input is a Shapley player of its own; beyond, their groups are."""
 
@@ -43,7 +45,7 @@ SHAPLEY_INPUTS = 8
 class ToleranceProblem:
     """What is asked of tolerances: the `response` to the inputs of a `space`, its upper `limit` in `unit`, and the
     share of drives that must keep it. `study` is its name, `notes` what is to be said of it, `pitch` by spline the
-    figures of teeth that are drawn from tolerances of pitch."""
+    figures of teeth that are drawn from tolerances of pitch, `geometry` that of a stack's sampled drives (see `by`)."""
 
     study: str
     response: Response
@@ -53,6 +55,15 @@ class ToleranceProblem:
     unit: str
     notes: tuple[str, ...] = ()
     pitch: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    geometry: str = CLOSED_FORM
+
+    def by(self, geometry: str) -> ToleranceProblem:
+        """The problem with the drives that a stack samples by another `geometry`: 'closed form', 'exact' for up to
+        `MOST_DRIVES`, or 'auto', exact where a pilot finds the closed form too far off and the drives are that few.
+        Raises `HdoptError` for one that is none."""
+        if geometry not in STACK_GEOMETRIES:
+            raise HdoptError(unknown_name("geometry", geometry, STACK_GEOMETRIES))
+        return replace(self, geometry=geometry)
 
     @classmethod
     def of_drive(
@@ -221,8 +232,10 @@ def stack(
     problem = study_problem(study)
     if sampling not in SAMPLINGS:
         raise HdoptError(unknown_name("sampling", sampling, SAMPLINGS))
+    method, distance = _method(problem, seed)
+    exact = _exact_response(problem, n, distance)
     result = run_stack(
-        problem.response,
+        exact or problem.response,
         problem.space,
         StackRequest(
             limit=problem.limit,
@@ -233,6 +246,7 @@ def stack(
             engine=engine,
             quantiles=quantiles,
             unit=problem.unit,
+            linearised=problem.response,
         ),
     )
     worst = rare = None
@@ -250,10 +264,29 @@ def stack(
         rare = tail_probability(problem.response, problem.space, tail, seed=seed, engine=engine)
     if worst is not None:
         notes += _exact_at(problem, worst)
-    method, distance = _method(problem, seed)
     if distance is not None and distance.says is not None:
         notes.append(distance.says)
+    if exact is not None:
+        method = EXACT
+        notes.append("the sampled drives are computed by the exact geometry; worst case and tail by the closed form")
     return StackResult(problem.study, result, worst, rare, tuple(notes), method, distance, problem.pitch)
+
+
+def _exact_response(problem: ToleranceProblem, n: int, distance: ModelError | None) -> ExactResponse | None:
+    """The response of `problem` by the exact geometry where it asks for it, for `n` drives whose closed form is at a
+    `distance` from it; None where the closed form is taken. Raises `HdoptError` where there is none, or `n` is too
+    many."""
+    response, asked = problem.response, problem.geometry
+    too_far = distance is not None and distance.says is not None
+    if asked == CLOSED_FORM or (asked != EXACT and (n > MOST_DRIVES or not too_far)):
+        return None
+    if not isinstance(response, DriveResponse) or response.teeth or response.drive.has_measured_teeth:
+        if asked != EXACT:
+            return None
+        raise HdoptError("the exact geometry of a stack is for drives without effects whose teeth are sines")
+    if n > MOST_DRIVES:
+        raise HdoptError(f"{n} drives by the exact geometry take too long; ask for up to {MOST_DRIVES}, with -n")
+    return ExactResponse(response)
 
 
 def _method(problem: ToleranceProblem, seed: int) -> tuple[str | None, ModelError | None]:

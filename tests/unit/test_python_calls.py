@@ -42,7 +42,7 @@ OTHERWISE = {
     "check": {},
     "ke": OF_A_STUDY | {"seed": "nothing is random"},
     "profile": OF_A_STUDY | {"profile": "study.with_(profile=...)", "seed": "nothing is random"},
-    "stack": OF_A_STUDY | {"resume": "engine"},
+    "stack": OF_A_STUDY | {"resume": "engine", "geometry": "study_problem(study).by(...)"},
     "sobol": OF_A_STUDY | {"no_second_order": "second_order"},
     "allocate": OF_A_STUDY,
     "inspect": OF_RECORDINGS
