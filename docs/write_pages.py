@@ -22,6 +22,7 @@ ROOMS = {
     ),
     "Mechanics": (
         "hdopt.mechanics.contact",
+        "hdopt.mechanics.contact_model",
         "hdopt.mechanics.bending",
         "hdopt.mechanics.lag",
         "hdopt.mechanics.tooth_path",
