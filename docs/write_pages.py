@@ -48,9 +48,10 @@ ROOMS = {
 def write_pages(folder: Path) -> None:
     """Write every derived page into `folder`; a page that did not change keeps its time."""
     folder.mkdir(exist_ok=True)
-    pages = {"study-file.md": study_file(), "commands.md": commands(), "api.rst": api()}
+    pages = {"study-file.md": study_file(), **commands(), "api.rst": api()}
     for name, text in pages.items():
         path = folder / name
+        path.parent.mkdir(exist_ok=True)
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
 
@@ -109,32 +110,56 @@ def _safe(text: str) -> str:
     )
 
 
-def commands() -> str:
-    """Every command with its arguments and options, from the command line itself."""
+def commands() -> dict[str, str]:
+    """A page for each command, from how-to.md, python.md and the command line itself, and the page that lists them."""
+    from hdopt.cli.app import COMMANDS
+
+    lines = ["# A page for each command", "", "How to, options, exit status and the same from Python.", ""]
+    lines += ["```{toctree}", ":maxdepth: 1", "", *(f"commands/{name}" for name in COMMANDS), "```", ""]
+    return {"commands.md": "\n".join(lines)} | {f"commands/{name}.md": command_page(name) for name in COMMANDS}
+
+
+def command_page(name: str) -> str:
+    """The page of the command `name`."""
     import click
 
     from hdopt.cli.app import COMMANDS
 
-    lines = [
-        "# Options of every command",
-        "",
-        "Written from the command line; `hdopt COMMAND --help` says the same.",
-        "",
-    ]
-    for name, says in COMMANDS.items():
-        command = import_module(f"hdopt.cli.{name}").command
-        usage = command.collect_usage_pieces(click.Context(command))
-        lines += [f"## hdopt {name}", "", says, "", "```text", f"hdopt {name} {' '.join(usage)}", "```", ""]
-        lines += ["| option | what it does | if left out |", "|---|---|---|"]
-        for param in command.params:
-            if isinstance(param, click.Option):
-                names = ", ".join(f"`{part}`" for part in (*param.opts, *param.secondary_opts))
-                metavar = "" if param.is_flag else f" {_safe(param.metavar or param.type.name.upper())}"
-                default = "" if param.is_flag or param.default in (None, (), "") else f"`{param.default}`"
-                default = default if param.show_default else ""
-                lines.append(f"| {names}{metavar} | {_safe(param.help or '')} | {default} |")
-        lines.append("")
+    command = import_module(f"hdopt.cli.{name}").command
+    usage = command.collect_usage_pieces(click.Context(command))
+    lines = [f"# hdopt {name}", "", f"{COMMANDS[name]}", "", _how_to(name), ""]
+    lines += ["## Options", "", "```text", f"hdopt {name} {' '.join(usage)}", "```", ""]
+    lines += ["| option | what it does | if left out |", "|---|---|---|"]
+    for param in command.params:
+        if isinstance(param, click.Option):
+            names = ", ".join(f"`{part}`" for part in (*param.opts, *param.secondary_opts))
+            metavar = "" if param.is_flag else f" {_safe(param.metavar or param.type.name.upper())}"
+            default = "" if param.is_flag or param.default in (None, (), "") else f"`{param.default}`"
+            default = default if param.show_default else ""
+            lines.append(f"| {names}{metavar} | {_safe(param.help or '')} | {default} |")
+    lines += ["", "## Exit status", ""]
+    lines += ["0: done. 1: the answer is no. 2: unusable input, with one message that says what to do.", ""]
+    lines += ["## From Python", "", f"{_call(name)} More: [from Python](../../python.md).", ""]
     return "\n".join(lines)
+
+
+HERE = Path(__file__).parent
+
+
+def _how_to(name: str) -> str:
+    """The paragraph of a command in how-to.md, its links as they are from two folders further down."""
+    text = (HERE / "how-to.md").read_text(encoding="utf-8")
+    paragraph = text.partition(f"\n## hdopt {name}\n")[2].partition("\n## ")[0].strip()
+    paragraph = paragraph.replace("](generated/", "](../")
+    return re.sub(r"\]\((?!\.\./)([\w/-]+\.md|examples/index)", r"](../../\1", paragraph)
+
+
+def _call(name: str) -> str:
+    """The row of a command in the table of python.md, as a sentence."""
+    text = (HERE / "python.md").read_text(encoding="utf-8")
+    row = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
+    _, _, call, gives, _ = (part.strip() for part in row.split("|"))
+    return f"{call} gives {gives}."
 
 
 def api() -> str:

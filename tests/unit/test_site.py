@@ -36,6 +36,9 @@ def test_the_site_builds_without_a_warning(tmp_path):
     for page in ("index", "tutorial", "generated/study-file", "generated/api", "examples/index", "verification"):
         assert (tmp_path / "site" / f"{page}.html").exists()
     assert broken_links(tmp_path / "site") == []
+    for command in COMMANDS:
+        page = (tmp_path / "site" / "generated" / "commands" / f"{command}.html").read_text(encoding="utf-8")
+        assert "From Python" in page and "Exit status" in page and "--" in page, command
     theory = (tmp_path / "site" / "theory.html").read_text(encoding="utf-8")
     assert [name for name, _ in equations() if f'href="generated/api.html#{name}"' not in theory
             and f'href="generated/api.html#module-{name}"' not in theory] == []  # fmt: skip
