@@ -66,7 +66,7 @@ def test_noise_does_not_come_again(colour):
 
 
 def test_a_wander_over_many_turns_does_not_look_like_something_that_comes_again():
-    wander = 0.2 * np.sin(TURN * np.arange(len(THETA)) / len(THETA) * 1.3 + 0.4)
+    wander = 0.2 + 0.05 * np.sin(TURN * np.arange(len(THETA)) / len(THETA) * 1.3 + 0.4)
     assert repeated_passes(fit_of(wander + noise(0.03))).t < 4.0
 
 
