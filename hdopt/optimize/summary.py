@@ -43,11 +43,11 @@ def break_evens(result: SearchResult) -> tuple[str, ...]:
     unit = QUANTITIES[result.objective].unit
     if not result.feasible:
         return ()
-    at_best = _weighed(result, result.best)
+    at_best = weighed(result, result.best)
     others: dict[str, float] = {}
     for design in result.combinations:
         if design.feasible and design.structure != result.best.structure:
-            value = _weighed(result, design)
+            value = weighed(result, design)
             others[design.structure] = min(value, others.get(design.structure, value))
     return tuple(
         f"{number(abs(value - at_best), unit)} ({100 * abs(value / at_best - 1):.2g} %) beside {structure}"
@@ -55,7 +55,8 @@ def break_evens(result: SearchResult) -> tuple[str, ...]:
     )
 
 
-def _weighed(result: SearchResult, design: DesignRecord) -> float:
+def weighed(result: SearchResult, design: DesignRecord) -> float:
+    """The objective of a `design` of `result` with what its structure costs."""
     factor = result.setup.trade.structure_factor(Structure(design.structure))
     return factor * design.quantities[result.objective]
 

@@ -11,7 +11,15 @@ from hdopt.optimize.design_space import VARIABLES
 from hdopt.optimize.objectives import NOMINAL, QUANTITIES, ROBUST, Quantity, find_quantity
 from hdopt.optimize.records import DesignRecord, Front, SearchResult, Verification
 from hdopt.optimize.region_records import Regions
-from hdopt.optimize.summary import NOT_MODELLED, break_evens, nearest_boundary, number, ring_share, structure_costs
+from hdopt.optimize.summary import (
+    NOT_MODELLED,
+    break_evens,
+    nearest_boundary,
+    number,
+    ring_share,
+    structure_costs,
+    weighed,
+)
 from hdopt.optimize.views import DesignMap, Rings, TradeViews
 from hdopt.report import Figure, KeyFigures, Section, Table, Text
 from hdopt.report.sections.design_map import Design, design_map, words_on_limits
@@ -97,12 +105,13 @@ def chosen_section(result: SearchResult, file: str, key: str = "trade-chosen") -
     at_bound = [in_sentence(p["title"]) for p in result.active if "bound" in p["kind"]]
     others = sorted(
         (d for d in result.combinations if d.feasible and d.name != best.name),
-        key=lambda d: d.quantities[result.objective],
+        key=lambda d: weighed(result, d),
     )
-    why = f"{name_of(best)} has the least {in_sentence(objective.title)} of all designs that keep every limit"
+    costs = " (with what structures cost)" if result.setup.trade.structure_costs else ""
+    why = f"{name_of(best)} has the least {in_sentence(objective.title)}{costs} of all designs that keep every limit"
     if others:
         next_best = others[0]
-        gap = next_best.quantities[result.objective] / after - 1
+        gap = weighed(result, next_best) / weighed(result, best) - 1
         why += f"; the next combination, {in_sentence(name_of(next_best))}, is {100 * gap:.2g} % above it"
     why += f". It is held by {listed(held)}. " if held else ". "
     if at_bound:
@@ -468,6 +477,7 @@ def confidence_section(
 ) -> Section:
     """The choice of a `result` as `checked` by other means, and the `regions` of the trade's constants in which it
     holds; `key` names the section."""
+    said = nearest_boundary(regions)
     return Section(
         key,
         "How sure the choice is",
@@ -480,7 +490,7 @@ def confidence_section(
                 f"impossible; stopped because: {result.stopped_because}."
             ),
         ),
-        nearest_boundary(regions),
+        f"{said[:1].upper()}{said[1:]}.",
     )
 
 
