@@ -44,6 +44,17 @@ class ExportOptions:
     """Fit of the bore on the shaft, as "H6/n5"; None: the loosest that keeps the budget."""
     seat_fit: str | None = None
     """Fit of the cam or the discs on their hub."""
+    part_number: str | None = None
+    """What the numbers of assembly and parts begin with, before their place in the parts list."""
+    cam_material: str | None = None
+    """Of the cam or both discs, as the sheets and the STEP file name it."""
+    cam_density_g_cm3: float | None = None
+    hub_material: str | None = None
+    hub_density_g_cm3: float | None = None
+    input_disc_material: str | None = None
+    input_disc_density_g_cm3: float | None = None
+    floating_disc_material: str | None = None
+    floating_disc_density_g_cm3: float | None = None
     cam_resolution_deg: float | None = None
     wheel_radius_mm: float | None = None
     race_share: float | None = None
@@ -76,6 +87,15 @@ RULES: dict[str, str] = {
     "journal_clearance_mm": "none: the fit of disc and journal is chosen from the budget",
     "journal_radius_mm": "bore or keyway, eccentricity and twice the least wall, next size of DIN 471's rings",
     "profile_tolerance_mm": "profile of a surface (ISO 1101), width of the zone; 10 um, at most what the budget gives",
+    "part_number": "WG and eight digits of the fingerprint",
+    "cam_material": "100Cr6, hardened",
+    "cam_density_g_cm3": "that of steel, 7.85",
+    "hub_material": "42CrMo4, quenched and tempered",
+    "hub_density_g_cm3": "that of steel, 7.85",
+    "input_disc_material": "CuSn12-C",
+    "input_disc_density_g_cm3": "that of bronze, 8.8",
+    "floating_disc_material": "42CrMo4, nitrided",
+    "floating_disc_density_g_cm3": "that of steel, 7.85",
     "cam_resolution_deg": "step of the cam's table",
     "wheel_radius_mm": "radius of the grinding wheel that the G-code is for",
     "race_share": "thickness of either race as a share of the bearing's",

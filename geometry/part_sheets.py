@@ -21,6 +21,7 @@ from hdopt.geometry.drawing import (
     draw_first_angle,
     draw_view,
 )
+from hdopt.geometry.materials import mass, material
 from hdopt.geometry.mating_drawing import fill_mating_sheet
 from hdopt.geometry.part import Part, Prism
 from hdopt.geometry.sheet import FRAME_HEIGHT, SMALL, TEXT, Point, Sheet, Solid, text_width
@@ -43,19 +44,6 @@ STACK = 8.0
 APART = math.radians(12)
 """Least angle between two numbers beside a view."""
 
-STEEL_DENSITY, BRONZE_DENSITY = 7.85e-6, 8.8e-6
-"""kg/mm^3."""
-
-MATERIALS = {
-    "hub": ("42CrMo4 (1.7225), quenched and tempered, 28-32 HRC", STEEL_DENSITY),
-    "eccentric_hub": ("42CrMo4 (1.7225), quenched and tempered, 28-32 HRC", STEEL_DENSITY),
-    "input_disc": ("CuSn12-C (CC483K), 90 HB", BRONZE_DENSITY),
-    "floating_disc": ("42CrMo4 (1.7225), nitrided, 600 HV", STEEL_DENSITY),
-}
-"""Part -> material and density; the others are of `CARRIER`. Assumed: the study does not name them."""
-
-CARRIER = ("100Cr6 (1.3505), hardened 58-62 HRC", STEEL_DENSITY)
-
 NOTES = (
     "general tolerances: lengths ISO 2768-1 m; ISO 22081: profile of a surface 0.1 to the first datum",
     "edges ISO 13715: outside -0.1 to -0.3, inside +0.2 max; surfaces Ra 1.6 where not said otherwise",
@@ -71,27 +59,21 @@ def sheets(job: Job) -> list[Sheet]:
     return [*drawn, _mating(job, len(made) + 1)]
 
 
-def mass(part: Part) -> float:
-    """Mass of a `part`, kg, of the assumed material."""
-    return part.volume * material(part)[1]
-
-
-def material(part: Part) -> tuple[str, float]:
-    """Name and density (kg/mm^3) of the material assumed for a `part`."""
-    return MATERIALS.get(part.name, CARRIER)
-
-
 def part_number(job: Job, number: int) -> str:
-    """Number of a part of a `job`: the fingerprint and its `number` in the parts list (0: the assembly)."""
-    return f"WG-{job.identity.fingerprint[:8].upper()}-{number:02d}"
+    """Number of a part of a `job`: the study's own or the fingerprint, and its `number` in the parts list (0: the
+    assembly)."""
+    return f"{job.options.part_number or f'WG-{job.identity.fingerprint[:8].upper()}'}-{number:02d}"
 
 
 def product_data(job: Job) -> dict[str, ProductData]:
     """Number, material and callouts of each part of a `job` that is made, by its name; and the assembly's number."""
     whole = {job.identity.title: ProductData(part_number(job, 0))}
     return whole | {
-        part.name: ProductData(part_number(job, number), *material(part), callouts_of(part, job.model))
+        part.name: ProductData(
+            part_number(job, number), made_of.name, made_of.density, callouts_of(part, job.model), made_of.assumed
+        )
         for number, part in enumerate((part for part in job.model.parts if not part.context), 1)
+        for made_of in (material(part, job.options),)
     }
 
 
@@ -300,10 +282,10 @@ def _title(sheet: Sheet, job: Job, name: str, number: str, scale: float, part: P
         f"number {number}   revision {job.identity.fingerprint}   date {moment().date().isoformat()}   scale {ratio}"
     ]
     if part is not None:
-        lines.append(f"material (assumed): {material(part)[0]}")
-        lines.append(f"mass {1e3 * mass(part):.4g} g   volume {part.volume:.2f} mm³")
+        lines.append(material(part, job.options).label)
+        lines.append(f"mass {1e3 * mass(part, job.options):.4g} g   volume {part.volume:.2f} mm³")
     else:
-        total = sum(mass(item) for item, _ in job.made)
+        total = sum(mass(item, job.options) for item, _ in job.made)
         lines.append(f"mass of all parts {1e3 * total:.4g} g")
     lines += [*NOTES, f"{job.identity.description}; first-angle projection"]
     for row, line in enumerate(lines):
@@ -360,11 +342,11 @@ def _numbers(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], top
 
 
 def _parts_list(sheet: Sheet, job: Job) -> None:
-    rows = [("no.", "part", "number", "material (assumed)", "mass, g")]
+    rows = [("no.", "part", "number", "material", "mass, g")]
     for number, (part, _) in enumerate(job.made, 1):
         name = part.name.replace("_", " ")
-        grams = f"{1e3 * mass(part):.4g}"
-        rows.append((f"{number}", name, part_number(job, number), material(part)[0], grams))
+        grams, made_of = f"{1e3 * mass(part, job.options):.4g}", material(part, job.options)
+        rows.append((f"{number}", name, part_number(job, number), made_of.name + " *" * made_of.assumed, grams))
     thread = next((a.value for a in job.model.assumptions if a.key == "export.bolt_thread"), job.options.bolt_thread)
     hub = next((part for part, _ in job.made if part.name == "hub" and part.bolts), None)
     if hub is not None and hub.bolts is not None:
@@ -375,7 +357,7 @@ def _parts_list(sheet: Sheet, job: Job) -> None:
                 ring = ring_of(piece.outline.perimeter / math.pi)
                 rows.append((f"{len(rows)}", "retaining ring", ring.name if ring else "", "spring steel", ""))
     top = TITLE_TOP + 2
-    sheet.text((BORDER + 4, top - 2), "Parts list", TEXT, bold=True)
+    sheet.text((BORDER + 4, top - 2), "Parts list (*: assumed, the study names no material)", TEXT, bold=True)
     sheet.table((BORDER + 4, top), (10, 50, 44, 88, 18), rows, min(4.7, 40.0 / len(rows)))
 
 

@@ -67,6 +67,8 @@ class ProductData:
     material: str = ""
     density: float = 0.0
     callouts: tuple[Callout, ...] = ()
+    assumed: bool = True
+    """Whether the material was assumed."""
 
 
 def write_step(
@@ -182,7 +184,7 @@ def _add_product(document: TDocStd_Document, name: str, product: ProductData) ->
         TCollection_HAsciiString(_ascii(text))
         for text in (
             product.material,
-            "assumed where the study names none",
+            "assumed, the study names none" if product.assumed else "named by the study",
             "density measure",
             "POSITIVE_RATIO_MEASURE",
         )

@@ -6,10 +6,15 @@ Every key may be left out; whoever exports is told which sizes were then found b
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import Field
 
 from hdopt.geometry.options import ExportOptions, Mount, Schema, Thread
 from hdopt.study.base import NotNegative, Positive, Section
+
+Words = Annotated[str, Field(min_length=1, max_length=60)]
+"""A text that has its place in a title block."""
 
 
 class ExportSection(Section):
@@ -39,6 +44,15 @@ class ExportSection(Section):
     profile_tolerance_mm: Positive | None = None
     shaft_fit: str | None = None
     seat_fit: str | None = None
+    part_number: Words | None = None
+    cam_material: Words | None = None
+    cam_density_g_cm3: Positive | None = None
+    hub_material: Words | None = None
+    hub_density_g_cm3: Positive | None = None
+    input_disc_material: Words | None = None
+    input_disc_density_g_cm3: Positive | None = None
+    floating_disc_material: Words | None = None
+    floating_disc_density_g_cm3: Positive | None = None
     cam_resolution_deg: Positive | None = None
     wheel_radius_mm: Positive | None = None
     race_share: float | None = Field(default=None, gt=0, lt=0.5)
