@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from hdopt.cli import main
-from hdopt.compensation.path import path_of
+from hdopt.compensation.path import crossing_of, path_of, paths_of
 from hdopt.compensation.surface import Harmonics, surface_of
 from hdopt.compensation.writers import written
 from hdopt.drive.errors import DriveErrors
@@ -187,6 +187,16 @@ def test_play_crosses_at_once():
     made = compensate([swinging(seed, 0.0) for seed in (1, 2)])
     assert made.found.crossing_deg == 0
     assert made.found.back == pytest.approx(0.1, abs=0.002)
+
+
+def test_noise_has_no_crossing():
+    """Would catch the crossing that fits best taken without asking whether it fits better than chance: of 12 tried on
+    noise one always does."""
+    rows = gather([swinging(7, 0.0)])
+    paths, zeros = paths_of(rows), np.ones((len(rows), 1))
+    assert len(paths) == 13
+    noise = np.random.default_rng(8).normal(size=(20, len(rows)))
+    assert {crossing_of(one, zeros, paths, 1.0) for one in noise} == {0.0}
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
