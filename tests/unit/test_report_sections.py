@@ -238,3 +238,23 @@ def test_a_front_shades_the_side_on_which_its_limit_is_broken(at_least):
     shade = next(shape for shape in made.layout.shapes if shape.type == "rect")
     assert (shade.x0 < 7.5, shade.x1 > 7.5) == (at_least, not at_least)
     assert 7.5 in (shade.x0, shade.x1)
+
+
+def test_structures_are_said_in_words_on_the_page_of_a_trade():
+    """Would catch the keys of a study file in a sentence for people."""
+    from hdopt.report.sections.search import _in_words
+
+    says = _in_words("0.0015 arcmin beside one_way_major, 0.056 arcmin beside integral")
+    assert says == "0.0015 arcmin beside one-way, major axis, 0.056 arcmin beside integral"
+
+
+def test_lines_of_designs_are_thinned_evenly_with_both_ends():
+    """Would catch a front drawn whole, which nobody can read, and one without its best design."""
+    from hdopt.report.sections.search import LINES, _thinned
+
+    designs = [SimpleNamespace(quantities={"peak_to_peak_arcmin": float(i)}) for i in range(378)]
+    drawn = [d.quantities["peak_to_peak_arcmin"] for d in _thinned(designs[::-1], "peak_to_peak_arcmin")]
+    assert len(drawn) == LINES == 30 and drawn[0] == 0 and drawn[-1] == 377
+    steps = np.diff(drawn)
+    assert max(steps) - min(steps) <= 1
+    assert len(_thinned(designs[:5], "peak_to_peak_arcmin")) == 5
