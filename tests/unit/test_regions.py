@@ -146,3 +146,18 @@ def test_a_boundary_that_rounding_puts_before_the_end_of_all_designs_is_that_end
     assert {(b.factor, b.becomes) for b in regions._merged(near)} == {(0.9581, NONE_LEFT)}
     apart = [Boundary("structure", 0.9642, "one_way_major"), Boundary("profile", 0.8576, NONE_LEFT)]
     assert regions._merged(apart) == apart
+
+
+def test_a_boundary_lies_between_the_factors_searched(lag):
+    """The first of them is 1.5^(-1/4) = 0.904: the boundary is bisected, not taken there."""
+    assert 0.91 < lag.range.at("structure", upward=False).factor < 0.99
+
+
+def test_designs_are_compared_with_what_their_structure_costs(ground):
+    own = ground.chosen
+    trade = replace(own.problem.trade, structure_costs=((own.combination.structure, 0.25),))
+    costly = replace(own, problem=replace(own.problem, trade=trade))
+    assert costly.weighed == pytest.approx(1.25 * own.objective, rel=1e-12)
+    assert own.weighed == own.objective
+    others = {c: s for c, s in ground.today.items() if c != own.combination}
+    assert ground.choice({**others, own.combination: costly}) in others
