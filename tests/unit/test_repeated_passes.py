@@ -93,6 +93,14 @@ def test_one_pass_shows_nothing():
     assert repeated_passes(fit_of(noise(0.03, size=len(theta)), theta)) == NOTHING_REPEATED
 
 
+def test_rows_that_lie_close_in_one_pass_are_not_repeated():
+    """A slow start puts rows of one and the same pass nearer to each other than half the usual step."""
+    steps = np.r_[np.full(5 * RATE, 0.1), np.full(15 * RATE, 1.0)] * TURN / RATE
+    theta = np.cumsum(steps)
+    one, _ = pairs_at_same_angle(fit_of(noise(0.03, size=len(theta)), theta).problem.rows)
+    assert len(one) == 0
+
+
 def test_few_repeated_turns_show_nothing():
     short = THETA[: int(1.5 * TURNS * RATE)]
     assert repeated_passes(fit_of(noise(0.03, size=len(short)), short)) == NOTHING_REPEATED
