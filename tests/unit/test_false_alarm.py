@@ -98,6 +98,17 @@ def test_what_is_there_is_found_at_once():
     assert (hardly, len(asked)) == (1 / (1 + SETTINGS.flips), SETTINGS.flips)
 
 
+def test_spectra_are_those_of_the_flipped_turns():
+    """Lines are looked for in them. Fault caught: the recording's own spectrum, kept or taken again."""
+    rows, orders = noisy(20), np.arange(3.0, 20.0, 0.25)
+    probe = probe_of(rows)
+    before = probe.spectrum(orders)
+    signs = np.where(rows.block % 3, 1.0, -1.0)
+    flipped = probe.flipped(signs).spectrum(orders)
+    assert flipped == pytest.approx(probe_of(replace(rows, error=signs * rows.error)).spectrum(orders))
+    assert np.abs(flipped - before).max() > 0.1 * before.max()
+
+
 def test_a_record_without_anything_to_look_for_alarms_nobody():
     assert false_alarm_chance(probe_of(noisy(10)), lambda one: -np.inf, np.random.default_rng(0), -np.inf) == 1.0
 
