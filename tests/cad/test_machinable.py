@@ -122,6 +122,7 @@ def test_journals_without_a_ring_are_said_to_have_none():
 def test_rings_follow_the_standard():
     """Rows of DIN 471 as makers print them; and what every row has in common."""
     assert (ring_of(16).groove, ring_of(16).groove_width, ring_of(16).land) == (15.2, 1.1, 1.2)
+    assert ring_of(16).depth == pytest.approx(0.4)
     assert (ring_of(10).groove, ring_of(10).groove_class) == (9.6, "h10")
     assert (ring_of(20).groove, ring_of(20).groove_class) == (19.0, "h11")
     assert ring_of(26.6) is None
