@@ -18,7 +18,7 @@ test:
 	$(TEST_VENV)/bin/python -m pytest -n 2 --benchmark-disable $(PYTEST_ARGS)
 
 check: lint types
-	$(VENV)/bin/python -m pytest -q -m "not slow and not browser" --benchmark-disable -x -n 2 $(PYTEST_ARGS)
+	$(VENV)/bin/python -m pytest -q -m "not slow and not timed and not browser" --benchmark-disable -x -n 2 $(PYTEST_ARGS)
 
 lint: $(VENV)/ready-to-test
 	$(VENV)/bin/ruff check .

@@ -32,7 +32,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     listed = slow_tests()
     for item in items:
         if item.nodeid in listed:
-            item.add_marker(pytest.mark.slow)
+            item.add_marker(pytest.mark.timed)
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:

@@ -4,8 +4,8 @@
     python -m tests.slow build/tests.xml
 
 Where many tests wait for one compilation, the first pays for all: of those the list may name one more by hand. A test
-on the list is marked `slow` beside those that say so themselves; one that is new is quick until the list is
-written anew.
+on the list is marked `timed`, beside those that call themselves `slow`; one that is new is quick until the list is
+written anew. Faults that are put in (`tests.mutants`) are asked of timed tests too: time is no reason not to notice.
 """
 
 from __future__ import annotations
