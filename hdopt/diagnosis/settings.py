@@ -288,7 +288,7 @@ class HeldOutSettings:
     nested_training: int = threshold(6, "input turns", "choice: turns that are left to it at least")
     flips: int = threshold(99, "1", "theorem: resolves a chance of 1 in 100")
     enough_reached: int = threshold(
-        3, "1", "choice: flips that reach a score until their share is told; Besag, Clifford 1991 take any number"
+        1, "1", "choice: flips that reach a score until their share is told; Besag, Clifford 1991 take any number"
     )
     fewest_flips: int = threshold(5, "1", "choice: flips from which the spread of the best scores is taken")
     tail_safety: float = threshold(

@@ -109,6 +109,17 @@ def test_spectra_are_those_of_the_flipped_turns():
     assert np.abs(flipped - before).max() > 0.1 * before.max()
 
 
+def test_another_residual_is_looked_at_as_if_it_were_the_fits():
+    """Fault caught: the chance asked of turns with the effect still in them, flipped to and fro."""
+    rows, other = noisy(20), noisy(20, 9)
+    probe = probe_of(rows)
+    before = probe.spectrum(np.arange(3.0, 20.0, 0.25))
+    looked, own = probe.on(other.error), probe_of(other)
+    term = Term("output_coupling", {}, columns=waves(rows, [4.3])[0])
+    assert looked.gain(term) == pytest.approx(own.gain(term), rel=1e-3)  # the other's own mean is a constant more
+    assert np.abs(looked.spectrum(np.arange(3.0, 20.0, 0.25)) - before).max() > 0.1 * before.max()
+
+
 def test_a_record_without_anything_to_look_for_alarms_nobody():
     assert false_alarm_chance(probe_of(noisy(10)), lambda one: -np.inf, np.random.default_rng(0), -np.inf) == 1.0
 

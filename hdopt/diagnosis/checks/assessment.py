@@ -118,7 +118,7 @@ def assess(state: State) -> Evidence:
         across_conditions=across_conditions(base, best),
         remainder=remainder,
         noise_floor=float(np.sqrt(min(remainder.held_out.variance, best_out.variance))),
-        false_alarm_p=false_alarm_chance(probe, searched_anew, rng, observed),
+        false_alarm_p=false_alarm_chance(probe.on(best.residual), searched_anew, rng, observed),
         inflation=inflation,
         lacking=lacking_effects(state, strange),
         below_detection=detection_limits(FitProbe(best), pool, scale),

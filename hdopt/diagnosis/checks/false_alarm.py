@@ -29,7 +29,9 @@ def false_alarm_chance(
     probe: FitProbe, score: Callable[[FitProbe], float], rng: np.random.Generator, observed: float
 ) -> float:
     """Chance that noise alone reaches `observed`, by random sign flips of whole turns, drawn by `rng`, of what `probe`
-    leaves; `score` searches anew under each flip, so that shapes are as free there as they were in the recording.
+    looks at: the noise, that is what the best explanation leaves (Freedman, Lane, J. Bus. Econ. Stat. 1, 1983; an
+    effect whose turns were flipped would be no noise). `score` searches anew under each flip, so that shapes are as
+    free there as they were in the recording.
 
     Under no effect the turns are as likely with one sign as with the other, whatever the noise's colour within a turn,
     and the best score over the whole catalogue pays for having looked at all of it (Westfall, Young 1993). Flips go on

@@ -53,11 +53,23 @@ class FitProbe:
         """The same with what is left times `signs` (n,), one of each row: noise that is as likely as what was seen,
         where the rows of a turn share one.
         """
+        other = self._anew()
+        other.residual = signs * self.residual
+        other.white_residual = self.project(signs * self.white_residual)
+        return other
+
+    def on(self, residual: Array) -> FitProbe:
+        """The same with another `residual` (n,), arcmin, in place of what the fit leaves."""
+        other = self._anew()
+        other.residual = residual
+        other.white_residual = self.project(self.noise.whiten(residual))
+        return other
+
+    def _anew(self) -> FitProbe:
+        """A copy without the spectra of its residual."""
         other = copy.copy(self)
         for name in ("_by_input", "_by_output"):
             other.__dict__.pop(name, None)
-        other.residual = signs * self.residual
-        other.white_residual = self.project(signs * self.white_residual)
         return other
 
     @property
