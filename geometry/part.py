@@ -18,7 +18,7 @@ from hdopt.geometry.features import (
     countersink_volume,
     cylinder,
 )
-from hdopt.geometry.solids import Station, loft, turn
+from hdopt.geometry.solids import Station, joined, loft, turn
 from hdopt.geometry.undercut import RingGroove, Stretch, Undercut
 
 if TYPE_CHECKING:
@@ -204,8 +204,7 @@ class Part:
 
     def build(self) -> cq.Solid:
         """The solid, made in CadQuery."""
-        first, *more = (piece.build() for piece in self.body)
-        shape = first.fuse(*more) if more else first
+        shape = joined([piece.build() for piece in self.body], self.name)
         if tools := self._tools():
             shape = shape.cut(*tools)
         (solid,) = shape.Solids()

@@ -154,3 +154,26 @@ def _wire(curve: ParallelCurve, z: float, spans: int) -> TopoDS_Wire:
         edge = BRepBuilderAPI_MakeEdge(spline, corners[index], corners[(index + 1) % len(corners)])
         wire.Add(edge.Edge())
     return wire.Wire()
+
+
+JOINING_MM = (None, 1e-6, 1e-4)
+"""Distances, mm, within which faces are taken as one, from none to a fiftieth of the narrowest zone on a drawing: the
+kernel sometimes leaves journals apart whose undercuts end in one plane."""
+
+
+def joined(pieces: Sequence[cq.Shape], name: str) -> cq.Shape:
+    """One solid of all `pieces` of the part called `name`; what is written is held to the closed-form volume after.
+
+    Raises `HdoptError` where the geometry kernel does not join them.
+    """
+    first, *more = pieces
+    for within in JOINING_MM if more else ():
+        shape = first.fuse(*more, tol=within)
+        if len(shape.Solids()) == 1:
+            return shape
+    if more:
+        raise HdoptError(
+            f"the pieces of the {name} could not be joined into one solid by the geometry kernel; "
+            "change a width or a diameter in [export] by 0.1 mm"
+        )
+    return first
