@@ -12,7 +12,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import special
 
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError
@@ -82,6 +81,8 @@ class GaussianCopula:
 
     def correlate(self, u: Array) -> Array:
         """Independent uniforms of shape (n, d) in (0, 1) to dependent ones; a copy where anything changes."""
+        from scipy import special
+
         if self.is_independent:
             return u
         u = u.copy()
