@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from hdopt.arrays import Array, Index
-from hdopt.kinematics.closed_form import ErrorComponents, TipGeometry
+from hdopt.kinematics.closed_form import ErrorComponents, RigidMotion, RimConstants, TipGeometry
 from hdopt.kinematics.compiled_closed_form import (
     compiled,
     entry,
@@ -63,15 +63,9 @@ def _one_of(other: bool, there: float, here: float) -> float:
 
 
 @compiled
-def _both_zones(work: Array, tip: TipGeometry, p: Array, tan_alpha: float) -> None:
+def _both_zones(work: Array, rim: RimConstants, motion: RigidMotion[float], p: Array, tan_alpha: float) -> None:
     """Deviation (mm of arc), deeper rim and offsets of either zone at the angles in `work`, without measured teeth;
-    `tip` has the wave generator's constants, `p` the errors (12,)."""
-    half_width = tip.half_width
-    rim = rim_constants(tip)
-    components = ErrorComponents(
-        p[0], p[1], p[2] / half_width, p[3] / half_width, p[4], p[5], p[6] / half_width, p[7] / half_width
-    )
-    motion = rigid_motion(tip, components)
+    `rim` has the wave generator's constants, `motion` what the errors `p` (12,) make of it."""
     cs_cos, cs_sin, fs_cos, fs_sin = p[9], p[8], p[11], p[10]
     for number in range(2):
         z, at = 1.0 - 2.0 * number, ZONE + number * ZONE_ROWS
@@ -111,15 +105,17 @@ def _add_measured(work: Array, table: Array, cos: int, sin: int, offset: int, ri
 
 
 @compiled
-def _driving(work: Array, tip: TipGeometry, p: Array, tan_alpha: float, scale: float) -> None:
-    """The zone that drives at the angles in `work`, the error (arcmin) and its slopes (arcmin/mm); arguments as for
-    `evaluated`."""
-    rim = rim_constants(tip)
-    half_width = tip.half_width
-    components = ErrorComponents(
-        p[0], p[1], p[2] / half_width, p[3] / half_width, p[4], p[5], p[6] / half_width, p[7] / half_width
-    )
-    motion = rigid_motion(tip, components)
+def _driving(
+    work: Array,
+    tip: TipGeometry,
+    rim: RimConstants,
+    motion: RigidMotion[float],
+    p: Array,
+    tan_alpha: float,
+    scale: float,
+) -> None:
+    """The zone that drives at the angles in `work`, the error (arcmin) and its slopes (arcmin/mm); `rim` and
+    `motion` as for `_both_zones`, the others as for `evaluated`."""
     first, second = ZONE, ZONE + ZONE_ROWS
     cs_cos, cs_sin, fs_cos, fs_sin = p[9], p[8], p[11], p[10]
     for i in range(BLOCK):
@@ -176,6 +172,11 @@ def evaluated(
     n = rotation.shape[1]
     value, zone, slopes = np.empty(n), np.empty(n, np.int64), np.empty((PARAMETERS, n))
     work = np.zeros(WORK)
+    half_width, rim = tip.half_width, rim_constants(tip)
+    components = ErrorComponents(
+        p[0], p[1], p[2] / half_width, p[3] / half_width, p[4], p[5], p[6] / half_width, p[7] / half_width
+    )
+    motion = rigid_motion(tip, components)
     has_extra = extra.shape[1] == n and n > 1
     for number in range(2):
         work[EXTRA + number * BLOCK : EXTRA + (number + 1) * BLOCK] = 0.0 if has_extra else extra[number, 0]
@@ -187,12 +188,12 @@ def evaluated(
             for number in range(2):
                 at = EXTRA + number * BLOCK
                 work[at : at + rows] = extra[number, start : start + rows]
-        _both_zones(work, tip, p, tan_alpha)
+        _both_zones(work, rim, motion, p, tan_alpha)
         if len(cs) > 0:
             _add_measured(work, cs, COS, SIN, OFFSET, RISE_CS)
         if len(fs) > 0:
             _add_measured(work, fs, COS_FS, SIN_FS, OFFSET_FS, RISE_FS)
-        _driving(work, tip, p, tan_alpha, scale)
+        _driving(work, tip, rim, motion, p, tan_alpha, scale)
         value[start : start + rows] = work[VALUE : VALUE + rows]
         for i in range(rows):
             zone[start + i] = np.int64(work[DRIVES + i])
