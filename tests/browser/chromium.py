@@ -177,11 +177,13 @@ class Page:
         file.write_bytes(base64.b64decode(answer["data"]))
         return file
 
-    def cpu_seconds(self) -> float:
-        """Processor time that the busiest of the browser's page processes has taken so far."""
+    def cpu_seconds(self, every: bool = False) -> float:
+        """Processor time that the busiest of the browser's page processes, or `every` process, has taken so far."""
         session, self._session = self._session, ""
         found = self._call("SystemInfo.getProcessInfo")["processInfo"]
         self._session = session
+        if every:
+            return sum(process["cpuTime"] for process in found)
         return max(process["cpuTime"] for process in found if process["type"] == "renderer")
 
     def wait(self, seconds: float) -> None:
