@@ -1,4 +1,4 @@
-"""What a frame of the explorer costs: `python tests/browser/frame_cost.py [EXPLORER.html]`, a table on standard output."""
+"""What a frame of the explorer costs: `python tests/browser/frame_cost.py [EXPLORER.html]`, as a table."""
 
 from __future__ import annotations
 
