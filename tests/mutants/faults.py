@@ -2,35 +2,37 @@
 
 Each fault in `hand_made/ROOM.toml` is one that a reviewer who knows the physics would look for: a term dropped, a sign
 turned, rows leaked. The tests that should notice it are those of its room, or those that it names, one file after the
-other; golden answers do not count. Outcomes are kept below `build/mutants`; survivors are asked again. What is known of
-a room is written to docs/mutants.md.
+other, that which noticed it last before the others; golden answers do not count. Outcomes are kept in `asked.json`.
+Asked is what never was, what no test noticed, and what was noticed before its file or that test changed. What is known
+of a room is written to docs/mutants.md. Two processes at once want a `--folder` each.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from tests.mutants.hand_made import ROOT, Fault, faults_of, rooms
+from tests.mutants.ledger import asked, digest_of, is_known, keep
 from tests.mutants.trial import load_libraries, refreshed_tree, tried
 
 PAGE = ROOT / "docs" / "mutants.md"
 
 
-def section(room: str, faults: Sequence[Fault], found: dict[str, str]) -> str:
+def section(room: str, faults: Sequence[Fault], found: dict[str, list[str]]) -> str:
     """The part of the page about one `room`: counts, survivors, and what cannot be seen, with its reason."""
     counted = [fault for fault in faults if not fault.equivalent]
-    said = {fault: found.get(fault.key, "not asked") for fault in counted}
+    said = {fault: found.get(fault.key, ["not asked"])[0] for fault in counted}
     killed, survived, late, left = (
         list(said.values()).count(word) for word in ("killed", "survived", "timeout", "not asked")
     )
     share = killed / max(killed + survived, 1)
     counts = f"{killed} of {killed + survived} noticed ({share:.0%}); {late} ran out of time, {left} not asked yet."
     lines = [f"## {room}", "", counts, ""]
-    lines += [f"- {word}: {one.name} (`{one.file}`)" for one, word in said.items() if word in ("survived", "timeout")]
+    lines += [f"- {word}: {one.name} (`{one.file}`)" for one, word in said.items() if word != "killed"]
     lines += [f"- nothing to see: {fault.name}: {fault.equivalent}" for fault in faults if fault.equivalent]
     return "\n".join(lines).rstrip() + "\n"
 
@@ -40,6 +42,12 @@ def with_sections(page: str, written: dict[str, str]) -> str:
     head, *old = re.split(r"(?m)^(?=## )", page)
     by_room = {one.split("\n", 1)[0].removeprefix("## ").strip(): one for one in old} | written
     return "\n".join([head.rstrip() + "\n", *(by_room[room].rstrip() + "\n" for room in sorted(by_room))])
+
+
+def _killer_first(fault: Fault, found: dict[str, list[str]]) -> Fault:
+    """`fault` with the test file first that noticed it when it was last asked."""
+    by = found.get(fault.key, ["", "", ""])[2]
+    return replace(fault, tests=tuple(sorted(fault.tests, key=lambda name: name != by)))
 
 
 def main() -> int:
@@ -53,23 +61,23 @@ def main() -> int:
     options = parser.parse_args()
     folder = options.folder.resolve()
     load_libraries()
-    tree, kept = refreshed_tree(folder), folder / "faults.json"
-    found: dict[str, str] = json.loads(kept.read_text()) if kept.exists() else {}
+    tree, found = refreshed_tree(folder), asked()
     listed = {room: faults_of(room) for room in options.rooms or rooms()}
     pending = [
-        fault
+        _killer_first(fault, found)
         for faults in listed.values()
         for fault in faults
         if not fault.equivalent
         and options.only in fault.name
         and re.search(options.tests, fault.tests[0])
-        and (options.afresh or found.get(fault.key) != "killed")
+        and (options.afresh or not is_known(fault, found))
         and not (options.new and fault.key in found)
     ]
-    for number, (fault, said) in enumerate(tried(pending, tree, folder), start=1):
-        found[fault.key] = said
-        kept.write_text(json.dumps(found, indent=1))
+    stands = {(fault, by): digest_of(fault, (by,) if by else ()) for fault in pending for by in ("", *fault.tests)}
+    for number, (fault, said, by) in enumerate(tried(pending, tree, folder), start=1):
+        keep(fault, [said, stands[fault, by], by])
         print(f"{number}/{len(pending)} {said}: {fault.room}: {fault.name}", flush=True)
+    found = asked()
     written = {
         room: section(room, faults, found)
         for room, faults in listed.items()

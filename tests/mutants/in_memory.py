@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import functools
 import gc
 import os
 import sys
+from collections.abc import Iterator, Set
 from pathlib import Path
 from types import CodeType, FunctionType
 
@@ -37,6 +39,47 @@ def put_in_memory(path: Path, old: str, new: str) -> None:
             if code.co_freevars != function.__code__.co_freevars:
                 raise NotInMemory(f"other closure: {code.co_qualname}")
             function.__code__ = code
+
+
+def changed_functions(path: Path, old: str, new: str) -> frozenset[str]:
+    """Qualified names of the functions whose code differs; none where more than functions do."""
+    try:
+        found = frozenset(_changed(compile(old, str(path), "exec"), compile(new, str(path), "exec")))
+    except NotInMemory:
+        return frozenset()
+    return found
+
+
+def mark_calls(path: Path, text: str, names: Set[str], number: int) -> None:
+    """Have the functions `names` of the file `path`, where they are in memory and not machine code, tell
+    `sys._fault_called` their `number` whenever they begin."""
+    tree = ast.parse(text)
+    _insert(tree, "", names, ast.parse(f'__import__("sys")._fault_called({number})').body[0])
+    marked = dict(_functions(compile(ast.fix_missing_locations(tree), str(path), "exec")))
+    for function in [one for one in gc.get_objects() if isinstance(one, FunctionType) and _is_from(one, path)]:
+        code = marked.get(function.__code__.co_qualname)
+        if code is not None and function.__code__.co_qualname in names - _compiled_functions(path):
+            if code.co_freevars == function.__code__.co_freevars:
+                function.__code__ = code
+
+
+def _insert(node: ast.AST, prefix: str, names: Set[str], call: ast.stmt) -> None:
+    for child in ast.iter_child_nodes(node):
+        inner = prefix
+        if isinstance(child, ast.ClassDef):
+            inner = f"{prefix}{child.name}."
+        elif isinstance(child, ast.FunctionDef):
+            inner = f"{prefix}{child.name}.<locals>."
+            if f"{prefix}{child.name}" in names:
+                child.body.insert(0, call)
+        _insert(child, inner, names, call)
+
+
+def _functions(code: CodeType) -> Iterator[tuple[str, CodeType]]:
+    for one in _codes(code):
+        if one.co_flags & CO_OPTIMIZED:
+            yield one.co_qualname, one
+        yield from _functions(one)
 
 
 def forget_results() -> None:

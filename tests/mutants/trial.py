@@ -22,6 +22,7 @@ from typing import NoReturn, TextIO
 
 from tests.mutants.hand_made import ROOT, Fault
 from tests.mutants.in_memory import NotInMemory, forget_modules, forget_results, put_in_memory
+from tests.mutants.order import LikelyFirst, Watch
 
 LOG = "faults-last.log"
 TIMEOUT_S = 400.0
@@ -59,17 +60,21 @@ def refreshed_tree(folder: Path) -> Path:
     return tree
 
 
-def tried(faults: Sequence[Fault], tree: Path, folder: Path) -> Iterator[tuple[Fault, str]]:
-    """Each of `faults` and what its tests make of it in `tree`: killed, survived, or timeout."""
+def tried(faults: Sequence[Fault], tree: Path, folder: Path) -> Iterator[tuple[Fault, str, str]]:
+    """Each of `faults`, what its tests make of it in `tree` (killed, survived, or timeout), and which file it was."""
     left = {fault: 0 for fault in faults}
     while left:
         file = min((fault.tests[at] for fault, at in left.items()), key=lambda name: -_count(left, name))
         here = [fault for fault, at in left.items() if fault.tests[at] == file]
+        answered = False
         for fault, said in _on_file(file, here, tree, folder):
+            answered = True
             left[fault] += 1
             if said != SURVIVED or left[fault] == len(fault.tests):
                 del left[fault]
-                yield fault, said
+                yield fault, said, "" if said == SURVIVED else file
+        if not answered:
+            left = {fault: at for fault, at in left.items() if fault not in here}
 
 
 def _count(left: dict[Fault, int], name: str) -> int:
@@ -90,7 +95,8 @@ def _on_file(file: str, faults: Sequence[Fault], tree: Path, folder: Path) -> It
         for line in lines:
             number, said = json.loads(line)
             if number is None:
-                raise SystemExit(f"{file} fails without any fault: see {folder / LOG}")
+                print(f"not asked: {file} fails without any fault: see {folder / LOG}", flush=True)
+                break
             fault = faults[number]
             if said == ANEW:
                 anew.append(fault)
@@ -105,20 +111,24 @@ def _on_file(file: str, faults: Sequence[Fault], tree: Path, folder: Path) -> It
 
 def _session(file: str, faults: Sequence[Fault], tree: Path, folder: Path, out: TextIO) -> int:
     """Run `file` as it stands, then with each of `faults` in a child of this process; a line of `out` says what."""
-    if _pytest(file):
+    watch = Watch(faults, tree)
+    if _pytest(file, watch):
         out.write(json.dumps([None, "failed"]) + "\n")
         return 0
     for number, fault in enumerate(faults):
         with put_in(fault, tree) as (path, before, after):
+            first = LikelyFirst(watch, number)
 
-            def child(path: Path = path, before: str = before, after: str = after) -> NoReturn:
+            def child(
+                path: Path = path, before: str = before, after: str = after, first: LikelyFirst = first
+            ) -> NoReturn:
                 try:
                     put_in_memory(path, before, after)
                 except NotInMemory:
                     os._exit(99)
                 forget_results()
                 forget_modules(tree / "tests")
-                os._exit(_pytest(file))
+                os._exit(_pytest(file, first))
 
             said = _in_child(child)
         out.write(json.dumps([number, said]) + "\n")
@@ -199,9 +209,9 @@ def _machine_code(tree: Path, folder: Path) -> Path:
     return folder / "faults-compiled" / digest.hexdigest()[:16]
 
 
-def _pytest(file: str) -> int:
+def _pytest(file: str, plugin: object = None) -> int:
     import pytest
 
-    code = int(pytest.main([*QUICK, f"tests/{file}"]))
+    code = int(pytest.main([*QUICK, f"tests/{file}"], [] if plugin is None else [plugin]))
     sys.stdout.flush()
     return code

@@ -1,11 +1,16 @@
 """The list of hand-made faults fits the code that it is about."""
 
+import sys
 from collections import Counter
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from tests.mutants import in_memory
 from tests.mutants.faults import with_sections
 from tests.mutants.hand_made import ROOT, faults_of, rooms
+from tests.mutants.ledger import asked, digest_of, is_known, keep
 
 FAULTS = [fault for room in rooms() for fault in faults_of(room)]
 
@@ -31,3 +36,35 @@ def test_a_room_that_was_run_takes_the_place_of_its_old_section():
     page = "# Head\n\nText.\n\n## beta\n\nold\n\n## gamma\n\nstays\n"
     found = with_sections(page, {"beta": "## beta\n\nnew\n", "alpha": "## alpha\n\nfirst\n"})
     assert found == "# Head\n\nText.\n\n## alpha\n\nfirst\n\n## beta\n\nnew\n\n## gamma\n\nstays\n"
+
+
+def test_an_answer_holds_while_its_file_and_the_test_that_gave_it_stand(tmp_path):
+    """Would catch an answer that is kept for a text it was not given for."""
+    kept = tmp_path / "asked.json"
+    fault = FAULTS[0]
+    by = fault.tests[0]
+    keep(fault, ["killed", digest_of(fault, (by,)), by], kept)
+    assert is_known(fault, asked(kept))
+    keep(fault, ["survived", digest_of(fault), ""], kept)
+    assert not is_known(fault, asked(kept))
+    keep(fault, ["killed", digest_of(fault), by], kept)
+    assert is_known(fault, asked(kept)) == (len(fault.tests) == 1)
+    assert not is_known(replace(fault, new=fault.new + "#"), asked(kept))
+
+
+def test_functions_tell_that_they_were_called():
+    path = Path(in_memory.__file__)
+    text = path.read_text(encoding="utf-8")
+    changed = in_memory.changed_functions(path, text, text.replace("found = frozenset(", "found = set("))
+    assert changed == {"changed_functions"}
+    called: list[int] = []
+    function = in_memory.changed_functions
+    before = function.__code__
+    sys._fault_called = called.append  # type: ignore[attr-defined]
+    try:
+        in_memory.mark_calls(path, text, changed, 7)
+        assert function(path, text, text) == frozenset()
+    finally:
+        function.__code__ = before
+        del sys._fault_called  # type: ignore[attr-defined]
+    assert called == [7]
