@@ -105,6 +105,40 @@ def test_closed_form_agrees_with_the_exact_geometry(index, profile, structure, s
     assert found.offset_fs[:, same_rim] == pytest.approx(reference.offset_fs[:, same_rim], abs=1.5e-3 * scale**2)
 
 
+def of_parity(values, zone, rim):
+    """The part of `values` (zone, rim, ...) that keeps its sign over zones and rims, or changes it where -1."""
+    over_rims = values[:, 0] + rim * values[:, 1]
+    return (over_rims[0] + zone * over_rims[1]) / 4
+
+
+@pytest.mark.parametrize(
+    ("profile", "only_tilts", "what", "parity", "close"),
+    [
+        # E_l, alone in what all four points share; left out are terms of third order: 4e-5 of it (ellipse).
+        ("ellipse", False, "offset_cs", (1, 1), 2e-4),
+        ("two_disk", False, "offset_cs", (1, 1), 4e-4),
+        # T_l, with the other sign on the other rim and in the other zone.
+        ("ellipse", False, "offset_cs", (-1, -1), 1e-3),
+        # What the wave generator itself sees differs by the shift over L_W.
+        ("ellipse", False, "difference", (1, 1), 1e-2),
+        ("ellipse", False, "difference", (-1, -1), 1e-2),
+        # Tilt about both axes: of second order, where the closed form has two thirds of the offset.
+        ("ellipse", True, "offset_cs", (-1, 1), 0.5),
+        ("two_disk", True, "offset_cs", (-1, 1), 0.5),
+    ],
+)
+def test_every_part_of_an_offset_is_that_of_the_exact_geometry(profile, only_tilts, what, parity, close):
+    """Would catch a part lost or turned that is small beside the others: the tip's own offset, a tilt's sign."""
+    errors = one(random_errors(1, 5), 0)
+    if only_tilts:
+        errors = errors.with_(axis_eccentricity=0.0, wg_eccentricity=0.0)
+    found, exactly = (
+        of_parity(b.offset_cs - b.offset_fs if what == "difference" else b.offset_cs, *parity)
+        for b in (module.branches(drive(PROFILES[profile]), errors, THETA) for module in (closed_form, exact))
+    )
+    assert np.abs(found - exactly).max() < close * np.abs(exactly).max()
+
+
 def test_a_measured_ellipse_gives_the_ellipses_waveform():
     measured, analytic = (
         kinematic_error_arcmin(drive(profile), BASE_ERRORS, THETA, "exact")

@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 from hdopt.drive.geometry import ARCMIN
 from hdopt.effects import EFFECTS
+from hdopt.effects._oscillator import relative_responses
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.resonance import Foot
 
@@ -105,3 +106,18 @@ def test_a_steady_speed_does_not_swing():
     np.testing.assert_allclose(columns[:, 0], 0.0, atol=1e-9)
     drag = 2 * DAMPING / W * 20.0 / RATIO / ARCMIN
     np.testing.assert_allclose(columns[:, 1], drag, rtol=1e-9)
+
+
+@pytest.mark.parametrize("damping", [0.02, 0.3])
+def test_a_foot_that_sets_off_leaves_a_swing_at_the_damped_frequency(damping):
+    """The oscillator's step response, to rounding: would catch a swing that damping does not slow."""
+    time = np.arange(0, 2, 5e-3)
+    conditions = conditions_of(time, 20.0 * time, np.full(len(time), 20.0))
+    rate = 3.0
+    found = relative_responses(conditions, (rate * time)[:, None], FREQUENCY, damping, np.eye(2))[:, 0]
+    free, decay = W * math.sqrt(1 - damping**2), np.exp(-damping * W * time)
+    sine, cosine = decay * np.sin(free * time), decay * np.cos(free * time)
+    np.testing.assert_allclose(found[:, 0], -rate / free * sine, atol=1e-10)
+    np.testing.assert_allclose(
+        found[:, 1], -2 * damping * rate / W * (1 - cosine - damping * W / free * sine), atol=1e-10
+    )
