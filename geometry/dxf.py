@@ -12,6 +12,7 @@ from hdopt.files import JsonReady
 from hdopt.geometry.arcs import enclosed_area, sample
 from hdopt.geometry.check import PROFILE_TOLERANCE, CheckFailed
 from hdopt.geometry.cut_outlines import Outline, all_outlines
+from hdopt.geometry.dxf_text import text_of
 
 if TYPE_CHECKING:
     from hdopt.geometry.job import Job
@@ -50,7 +51,7 @@ def write_dxf(path: Path, job: Job) -> None:
     for row, text in enumerate(_notes(job, made)):
         place = (-reach, -reach - (2 * row + 2) * height)
         space.add_text(text, height=height, dxfattribs={"layer": "TEXT"}).set_placement(place)
-    document.saveas(path)
+    path.write_text(text_of(document, job.identity.description), encoding="utf-8")
 
 
 def _notes(job: Job, made: Sequence[Outline]) -> list[str]:

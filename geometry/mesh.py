@@ -12,6 +12,7 @@ import numpy as np
 from hdopt.arrays import Array, Index
 from hdopt.files import JsonReady
 from hdopt.geometry.check import CheckFailed
+from hdopt.geometry.zip_entry import add_entry
 
 if TYPE_CHECKING:
     import cadquery as cq
@@ -106,9 +107,12 @@ def write_3mf(path: Path, job: Job) -> None:
     )
     declaration = '<?xml version="1.0" encoding="UTF-8"?>\n'
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("[Content_Types].xml", declaration + types)
-        archive.writestr("_rels/.rels", declaration + relations)
-        archive.writestr("3D/3dmodel.model", declaration + ElementTree.tostring(model, encoding="unicode"))
+        for entry, text in (
+            ("[Content_Types].xml", types),
+            ("_rels/.rels", relations),
+            ("3D/3dmodel.model", ElementTree.tostring(model, encoding="unicode")),
+        ):
+            add_entry(archive, entry, declaration + text)
 
 
 def check_3mf(path: Path, job: Job, name: str) -> JsonReady:

@@ -13,6 +13,7 @@ from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.job import Job
 from hdopt.geometry.part_sheets import sheets
 from hdopt.geometry.sheet_dxf import dxf_of
+from hdopt.geometry.zip_entry import add_entry
 
 
 def names(job: Job) -> list[str]:
@@ -26,9 +27,7 @@ def write_drawings(path: Path, job: Job) -> None:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, sheet in zip(names(job), sheets(job), strict=True):
             for ending, text in (("svg", sheet.svg()), ("dxf", dxf_of(sheet))):
-                entry = zipfile.ZipInfo(f"{name}.{ending}")
-                entry.compress_type = zipfile.ZIP_DEFLATED
-                archive.writestr(entry, text)
+                add_entry(archive, f"{name}.{ending}", text)
 
 
 def check_drawings(path: Path, job: Job, name: str) -> JsonReady:

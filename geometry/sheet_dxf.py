@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import math
 
+from hdopt.geometry.dxf_text import text_of
 from hdopt.geometry.sheet import KINDS, Area, Label, Line, Ring, Sheet, Solid
 
 CAP_SHARE = 0.73
@@ -59,6 +59,4 @@ def dxf_of(sheet: Sheet) -> str:
                 dxfattribs={"layer": "TEXT", "style": "DRAWING"},
             )
             text.set_placement((mark.at[0], up - mark.at[1]), align=align[mark.anchor])
-    stream = io.StringIO()
-    document.write(stream)
-    return stream.getvalue()
+    return text_of(document, f"{sheet.title}, {sheet.description}")
