@@ -163,7 +163,7 @@ def _profile(part: Part, model: WaveGeneratorModel) -> Callout | None:
         f"profile: parallel curve, {contour_name(part)}",
         "its points: the CSV of the cam and the STEP file of this revision",
         f"perimeter {contour.perimeter:.4f} ±{math.pi * zone:.4g}",
-        "Ra 0.4; 58-62 HRC, depth 0.6-0.8 after grinding",
+        "Ra 0.4",
     )
     point = polar(contour.least_radius, math.radians(52))
     if hasattr(contour, "points"):

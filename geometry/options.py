@@ -48,12 +48,17 @@ class ExportOptions:
     """What the numbers of assembly and parts begin with, before their place in the parts list."""
     cam_material: str | None = None
     """Of the cam or both discs, as the sheets and the STEP file name it."""
+    cam_hardness: str | None = None
+    """As the sheets name it, "58-62 HRC"."""
     cam_density_g_cm3: float | None = None
     hub_material: str | None = None
+    hub_hardness: str | None = None
     hub_density_g_cm3: float | None = None
     input_disc_material: str | None = None
+    input_disc_hardness: str | None = None
     input_disc_density_g_cm3: float | None = None
     floating_disc_material: str | None = None
+    floating_disc_hardness: str | None = None
     floating_disc_density_g_cm3: float | None = None
     cam_resolution_deg: float | None = None
     wheel_radius_mm: float | None = None
@@ -89,12 +94,16 @@ RULES: dict[str, str] = {
     "profile_tolerance_mm": "profile of a surface (ISO 1101), width of the zone; 10 um, at most what the budget gives",
     "part_number": "WG and eight digits of the fingerprint",
     "cam_material": "100Cr6, hardened",
+    "cam_hardness": "58-62 HRC of the material that is assumed; none beside a material that the study names",
     "cam_density_g_cm3": "that of steel, 7.85",
     "hub_material": "42CrMo4, quenched and tempered",
+    "hub_hardness": "28-32 HRC of the material that is assumed; none beside a material that the study names",
     "hub_density_g_cm3": "that of steel, 7.85",
     "input_disc_material": "CuSn12-C",
+    "input_disc_hardness": "90 HB of the material that is assumed; none beside a material that the study names",
     "input_disc_density_g_cm3": "that of bronze, 8.8",
     "floating_disc_material": "42CrMo4, nitrided",
+    "floating_disc_hardness": "600 HV of the material that is assumed; none beside a material that the study names",
     "floating_disc_density_g_cm3": "that of steel, 7.85",
     "cam_resolution_deg": "step of the cam's table",
     "wheel_radius_mm": "radius of the grinding wheel that the G-code is for",

@@ -70,7 +70,11 @@ def product_data(job: Job) -> dict[str, ProductData]:
     whole = {job.identity.title: ProductData(part_number(job, 0))}
     return whole | {
         part.name: ProductData(
-            part_number(job, number), made_of.name, made_of.density, callouts_of(part, job.model), made_of.assumed
+            part_number(job, number),
+            made_of.with_hardness,
+            made_of.density,
+            callouts_of(part, job.model),
+            made_of.assumed,
         )
         for number, part in enumerate((part for part in job.model.parts if not part.context), 1)
         for made_of in (material(part, job.options),)
@@ -282,8 +286,10 @@ def _title(sheet: Sheet, job: Job, name: str, number: str, scale: float, part: P
         f"number {number}   revision {job.identity.fingerprint}   date {moment().date().isoformat()}   scale {ratio}"
     ]
     if part is not None:
-        lines.append(material(part, job.options).label)
-        lines.append(f"mass {1e3 * mass(part, job.options):.4g} g   volume {part.volume:.2f} mm³")
+        made_of = material(part, job.options)
+        lines += [made_of.label, made_of.hardness_label]
+        grams, density = 1e3 * mass(part, job.options), 1e6 * made_of.density
+        lines.append(f"mass {grams:.4g} g at {density:.4g} g/cm³   volume {part.volume:.2f} mm³")
     else:
         total = sum(mass(item, job.options) for item, _ in job.made)
         lines.append(f"mass of all parts {1e3 * total:.4g} g")
@@ -346,7 +352,9 @@ def _parts_list(sheet: Sheet, job: Job) -> None:
     for number, (part, _) in enumerate(job.made, 1):
         name = part.name.replace("_", " ")
         grams, made_of = f"{1e3 * mass(part, job.options):.4g}", material(part, job.options)
-        rows.append((f"{number}", name, part_number(job, number), made_of.name + " *" * made_of.assumed, grams))
+        rows.append(
+            (f"{number}", name, part_number(job, number), made_of.with_hardness + " *" * made_of.assumed, grams)
+        )
     thread = next((a.value for a in job.model.assumptions if a.key == "export.bolt_thread"), job.options.bolt_thread)
     hub = next((part for part, _ in job.made if part.name == "hub" and part.bolts), None)
     if hub is not None and hub.bolts is not None:

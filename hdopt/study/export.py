@@ -46,12 +46,16 @@ class ExportSection(Section):
     seat_fit: str | None = None
     part_number: Words | None = None
     cam_material: Words | None = None
+    cam_hardness: Words | None = None
     cam_density_g_cm3: Positive | None = None
     hub_material: Words | None = None
+    hub_hardness: Words | None = None
     hub_density_g_cm3: Positive | None = None
     input_disc_material: Words | None = None
+    input_disc_hardness: Words | None = None
     input_disc_density_g_cm3: Positive | None = None
     floating_disc_material: Words | None = None
+    floating_disc_hardness: Words | None = None
     floating_disc_density_g_cm3: Positive | None = None
     cam_resolution_deg: Positive | None = None
     wheel_radius_mm: Positive | None = None

@@ -11,7 +11,7 @@ from hdopt.geometry.job import make_job
 from hdopt.geometry.materials import mass, material
 from hdopt.geometry.options import RULES, ExportOptions
 from hdopt.geometry.part21 import Part21
-from hdopt.geometry.part_sheets import product_data
+from hdopt.geometry.part_sheets import product_data, sheets
 
 GIVEN = ExportOptions(
     step_schema="AP242",
@@ -32,6 +32,25 @@ def test_given_materials_and_numbers_take_the_place_of_the_assumed():
     products = product_data(job)
     assert [product.number for product in products.values()] == ["HD-25-00", "HD-25-01", "HD-25-02"]
     assert products["cam"].material == "16MnCr5, case-hardened" and not products["cam"].assumed
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        ({}, "hardness (assumed): 58-62 HRC"),
+        ({"cam_material": "EN AW-7075"}, "hardness: none is named with this material"),
+        ({"cam_material": "16MnCr5", "cam_hardness": "60 HRC, 0.8 deep"}, "hardness: 60 HRC, 0.8 deep"),
+        ({"cam_hardness": "62-64 HRC"}, "hardness: 62-64 HRC"),
+    ],
+)
+def test_hardness_follows_the_material(options, line):
+    """A sheet that asks for aluminium of 58 HRC cannot be made."""
+    given = ExportOptions(**options)
+    job = make_job(drive(), given, "x")
+    cam = next(sheet for sheet in sheets(job) if sheet.title.startswith("cam"))
+    said = [label.content for label in cam.labels]
+    assert line in said
+    assert [text for text in said if "HRC" in text] == ([line] if "HRC" in line else [])
 
 
 @pytest.mark.parametrize(("profile", "structure"), [("two_disk", Structure.AUTOMATIC), ("ellipse", Structure.INTEGRAL)])
@@ -55,5 +74,5 @@ def test_product_data_of_the_step_file_name_them(tmp_path):
 
 
 def test_rules_say_what_holds_without_them():
-    keys = [key for key in vars(GIVEN) if key.endswith(("_material", "_density_g_cm3"))]
-    assert len(keys) == 8 and all(key in RULES for key in [*keys, "part_number"])
+    keys = [key for key in vars(GIVEN) if key.endswith(("_material", "_hardness", "_density_g_cm3"))]
+    assert len(keys) == 12 and all(key in RULES for key in [*keys, "part_number"])
