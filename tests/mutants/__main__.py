@@ -1,51 +1,74 @@
-"""Put faults into a room one at a time and run its tests: `python -m tests.mutants ROOM... [--sample N]`."""
+"""Put cosmic-ray's faults in, one at a time, and run a room's tests: `python -m tests.mutants ROOM... [--sample N]`.
+
+They are tried as those made by hand are (`tests/mutants/trial.py`): the tests that call the faulted function first.
+"""
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
 import random
-import shutil
-import subprocess
-import sys
 import tomllib
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+import cosmic_ray.plugins
 from cosmic_ray.commands.init import init
 from cosmic_ray.modules import find_modules
-from cosmic_ray.mutating import mutate_and_test
+from cosmic_ray.mutating import mutate_code
 from cosmic_ray.work_db import WorkDB, use_db
-from cosmic_ray.work_item import TestOutcome
 
+from tests.mutants.hand_made import ROOT, Fault
 from tests.mutants.rooms import ROOMS
+from tests.mutants.trial import load_libraries, refreshed_tree, tried
 
-ROOT = Path(__file__).resolve().parents[2]
 SEED = 2026
-TIMEOUT_S = 600.0
+INCOMPETENT = "incompetent"
+"""A mutant that is no Python, or no other text than before."""
 
 
-def copy_of_tree(folder: Path) -> Path:
-    """The files under version control, as they stand, below `folder`: mutants are made there and nowhere else."""
-    tree = folder / "tree"
-    if not tree.exists():
-        listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout
-        for name in listed.decode().split("\0"):
-            if name and (ROOT / name).is_file():
-                (tree / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(ROOT / name, tree / name)
-    return tree
-
-
-def key_of(item) -> str:
-    """'module:line:operator:occurrence' of a mutant."""
-    (mutation,) = item.mutations
+def key_of(mutation) -> str:
+    """'module:line:operator:occurrence' of a mutation."""
     return f"{mutation.module_path}:{mutation.start_pos[0]}:{mutation.operator_name}:{mutation.occurrence}"
 
 
-def command_of(room: str, tree: Path) -> str:
-    """The test command of `room`, quick tests first failure last; golden answers are not among them."""
-    files = [str(path.relative_to(tree)) for pattern in ROOMS[room].tests for path in (tree / "tests").glob(pattern)]
-    quick = "-m 'not slow and not browser' --benchmark-disable -p no:cacheprovider"
-    return f"{sys.executable} -m pytest -q -x {quick} {' '.join(sorted(set(files)))}"
+def mutations_of(room: str, folder: Path) -> list:
+    """All of cosmic-ray's mutations of `room`, in the order that the seed draws; their list is made in `folder`."""
+    listed = folder / f"{room}.sqlite"
+    listed.unlink(missing_ok=True)
+    before = Path.cwd()
+    os.chdir(ROOT)
+    try:
+        with use_db(str(listed), WorkDB.Mode.create) as database:
+            init(find_modules([Path("hdopt") / room]), database, {})
+            found = sorted((one for item in database.work_items for one in item.mutations), key=key_of)
+    finally:
+        os.chdir(before)
+    random.Random(SEED).shuffle(found)
+    return found
+
+
+def fault_of(room: str, mutation) -> Fault | None:
+    """`mutation` as a fault of `room`, asked of all its tests; None where it makes no other text."""
+    path = ROOT / mutation.module_path
+    text = path.read_text(encoding="utf-8")
+    operator = cosmic_ray.plugins.get_operator(mutation.operator_name)(**mutation.operator_args)
+    mutated = mutate_code(text, operator, mutation.occurrence)
+    if mutated is None or mutated == text:
+        return None
+    try:
+        compile(mutated, str(path), "exec")
+    except SyntaxError:
+        return None
+    return Fault(room, key_of(mutation), str(mutation.module_path), text, mutated, tests_of(room))
+
+
+def tests_of(room: str) -> tuple[str, ...]:
+    """Files of the tests of `room`, below `tests`."""
+    tests = ROOT / "tests"
+    named = (str(path.relative_to(tests)) for pattern in ROOMS[room].tests for path in sorted(tests.glob(pattern)))
+    return tuple(dict.fromkeys(named))
 
 
 def run(room: str, folder: Path, sample: int | None) -> dict[str, str]:
@@ -53,37 +76,23 @@ def run(room: str, folder: Path, sample: int | None) -> dict[str, str]:
 
     What was run before is kept in `folder` and not run again.
     """
-    import os
-
-    tree = copy_of_tree(folder)
-    os.chdir(tree)
-    with use_db(str(folder / f"{room}.sqlite"), WorkDB.Mode.create) as database:
-        if not database.num_work_items:
-            init(find_modules([Path("hdopt") / room]), database, {})
-        items = sorted(database.work_items, key=key_of)
-        random.Random(SEED).shuffle(items)
-        chosen = items[:sample]
-        done = dict(database.results)
-        for number, item in enumerate(chosen, start=1):
-            if item.job_id not in done:
-                result = mutate_and_test(item.mutations, command_of(room, tree), TIMEOUT_S)
-                database.set_result(item.job_id, result)
-                done[item.job_id] = result
-                print(f"{number}/{len(chosen)} {key_of(item)}: {outcome(result)}", flush=True)
-        return {key_of(item): outcome(done[item.job_id]) for item in chosen}
+    kept = folder / f"{room}.json"
+    done: dict[str, str] = json.loads(kept.read_text()) if kept.exists() else {}
+    chosen = mutations_of(room, folder)[:sample]
+    faults = {key_of(one): fault_of(room, one) for one in chosen if key_of(one) not in done}
+    done |= {key: INCOMPETENT for key, fault in faults.items() if fault is None}
+    asked: Sequence[Fault] = [fault for fault in faults.values() if fault is not None]
+    for number, (fault, said, _) in enumerate(tried(asked, refreshed_tree(folder), folder), start=1):
+        done[fault.name] = said
+        kept.write_text(json.dumps(done, indent=1))
+        print(f"{number}/{len(asked)} {said}: {fault.name}", flush=True)
+    return {key_of(one): done.get(key_of(one), "not asked") for one in chosen}
 
 
-def outcome(result) -> str:
-    """The outcome of one mutant in a word."""
-    if result.test_outcome == TestOutcome.KILLED and result.output == "timeout":
-        return "timeout"
-    return str(result.test_outcome.value) if result.test_outcome else "incompetent"
-
-
-def report(room: str, found: dict[str, str]) -> bool:
+def report(room: str, found: dict[str, str], equivalent: Iterable[str]) -> bool:
     """Print the share killed, time-outs apart, and every survivor; whether the room's target is met."""
-    equivalent = tomllib.loads((ROOT / "tests" / "mutants" / "equivalents.toml").read_text())
-    counted = {key: said for key, said in found.items() if key not in equivalent and said in ("killed", "survived")}
+    left_out = set(equivalent)
+    counted = {key: said for key, said in found.items() if key not in left_out and said in ("killed", "survived")}
     killed = sum(said == "killed" for said in counted.values())
     share = killed / len(counted) if counted else 1.0
     apart = sum(said == "timeout" for said in found.values())
@@ -99,14 +108,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__)
     parser.add_argument("rooms", nargs="*", metavar="ROOM", help=f"of {', '.join(ROOMS)}; all where omitted")
     parser.add_argument("--sample", type=int, help="only the first N mutants of each room, in seeded order")
-    parser.add_argument("--folder", type=Path, default=ROOT / "build" / "mutants", help="what was run is kept here")
+    parser.add_argument("--folder", type=Path, default=ROOT / "build" / "mechanical", help="what was run is kept here")
     options = parser.parse_args()
     for room in options.rooms:
         if room not in ROOMS:
             parser.error(f"unknown room {room!r}; there are {', '.join(ROOMS)}")
     folder = options.folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    met = [report(room, run(room, folder, options.sample)) for room in options.rooms or ROOMS]
+    load_libraries()
+    equivalent = tomllib.loads((ROOT / "tests" / "mutants" / "equivalents.toml").read_text(encoding="utf-8"))
+    met = [report(room, run(room, folder, options.sample), equivalent) for room in options.rooms or ROOMS]
     return 0 if all(met) else 1
 
 
