@@ -287,6 +287,9 @@ class HeldOutSettings:
     )
     nested_training: int = threshold(6, "input turns", "choice: turns that are left to it at least")
     flips: int = threshold(99, "1", "theorem: resolves a chance of 1 in 100")
+    flips_of_nothing: int = threshold(
+        19, "1", "choice: flips where too little is explained for a name, so that none hangs on the chance"
+    )
     enough_reached: int = threshold(
         1, "1", "choice: flips that reach a score until their share is told; Besag, Clifford 1991 take any number"
     )

@@ -7,7 +7,9 @@ import pytest
 from scipy import stats
 from test_cross_validation import RATE, rows_of
 
+from hdopt.diagnosis.checks.assessment import most_flips
 from hdopt.diagnosis.checks.false_alarm import best_score, false_alarm_chance, tail
+from hdopt.diagnosis.inference.cross_validation import HeldOut
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.residual_gains import FitProbe
@@ -39,7 +41,8 @@ def chance(probe, columns, observed):
     """By terms whose shapes are given: of them `gain / 2` is exponential, for two columns each."""
     terms = [Term("output_coupling", {}, columns=c) for c in columns]
     free = Scale(1.0, settings=replace(DEFAULT.penalty, effect_cost=0.0))
-    return false_alarm_chance(probe, lambda one: best_score(one, terms, free), np.random.default_rng(0), observed)
+    most = probe.fit.problem.settings.held_out.flips
+    return false_alarm_chance(probe, lambda one: best_score(one, terms, free), np.random.default_rng(0), observed, most)
 
 
 def waves(rows, orders):
@@ -73,7 +76,7 @@ def test_on_pure_noise_the_chance_is_one():
         def searched(one, scale=scale):
             return best_score(one, search_terms(one), scale)
 
-        found.append(false_alarm_chance(probe, searched, np.random.default_rng(seed), searched(probe)))
+        found.append(false_alarm_chance(probe, searched, np.random.default_rng(seed), searched(probe), 99))
     # Sixteen uniform chances fall below this test's 5 % once in twenty sets of seeds; these are fixed.
     assert stats.kstest(found, "uniform", alternative="greater").pvalue > 0.05
     assert min(found) > 0.005
@@ -88,14 +91,26 @@ def test_what_is_there_is_found_at_once():
         asked.append(one)
         return float(np.random.default_rng(len(asked)).gumbel())
 
-    far = false_alarm_chance(probe_of(rows), score, np.random.default_rng(0), 100.0)
+    far = false_alarm_chance(probe_of(rows), score, np.random.default_rng(0), 100.0, 99)
     assert (far, len(asked)) == (SETTINGS.least_chance, SETTINGS.fewest_flips)
     asked.clear()
-    likely = false_alarm_chance(probe_of(rows), score, np.random.default_rng(0), 0.0)
+    likely = false_alarm_chance(probe_of(rows), score, np.random.default_rng(0), 0.0, 99)
     assert likely == SETTINGS.enough_reached / len(asked)
     asked.clear()
-    hardly = false_alarm_chance(probe_of(rows), lambda one: score(one) * 1e-3, np.random.default_rng(0), 3.0)
-    assert (hardly, len(asked)) == (1 / (1 + SETTINGS.flips), SETTINGS.flips)
+    hardly = false_alarm_chance(probe_of(rows), lambda one: score(one) * 1e-3, np.random.default_rng(0), 3.0, 19)
+    assert (hardly, len(asked)) == (1 / (1 + 19), 19)
+
+
+@pytest.mark.parametrize("share", [0.5, 1.5])
+def test_few_flips_only_where_no_name_hangs_on_them(share):
+    """Below the share that is worth a name the chance is told roughly, above it in full. Faults caught: few flips for
+    what could be named, so that 0.05 stands where 0.01 is asked; all flips for what could not.
+    """
+    explained = share * DEFAULT.verdict.smallest_share
+    base, best = (HeldOut(np.array([power]), np.array([power]), np.ones(1)) for power in (1.0 + explained, 1.0))
+    most = most_flips(base, best, DEFAULT)
+    assert (1 / (1 + most) <= DEFAULT.verdict.significance) == (share > 1)
+    assert most == (SETTINGS.flips if share > 1 else SETTINGS.flips_of_nothing)
 
 
 def test_spectra_are_those_of_the_flipped_turns():
@@ -121,7 +136,7 @@ def test_another_residual_is_looked_at_as_if_it_were_the_fits():
 
 
 def test_a_record_without_anything_to_look_for_alarms_nobody():
-    assert false_alarm_chance(probe_of(noisy(10)), lambda one: -np.inf, np.random.default_rng(0), -np.inf) == 1.0
+    assert false_alarm_chance(probe_of(noisy(10)), lambda one: -np.inf, np.random.default_rng(0), -np.inf, 99) == 1.0
 
 
 def test_signs_are_those_of_whole_turns():

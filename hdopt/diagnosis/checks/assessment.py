@@ -118,7 +118,9 @@ def assess(state: State) -> Evidence:
         across_conditions=across_conditions(base, best),
         remainder=remainder,
         noise_floor=float(np.sqrt(min(remainder.held_out.variance, best_out.variance))),
-        false_alarm_p=false_alarm_chance(probe.on(best.residual), searched_anew, rng, observed),
+        false_alarm_p=false_alarm_chance(
+            probe.on(best.residual), searched_anew, rng, observed, most_flips(base_out, best_out, base.problem.settings)
+        ),
         inflation=inflation,
         lacking=lacking_effects(state, strange),
         below_detection=detection_limits(FitProbe(best), pool, scale),
@@ -130,6 +132,15 @@ def assess(state: State) -> Evidence:
         scale=fitted_scale(best, state.nuisances),
         passes=repeated_passes(best),
     )
+
+
+def most_flips(base: HeldOut, best: HeldOut, settings: DiagnosisSettings) -> int:
+    """Flips that the chance of a false alarm is worth, where the base alone misses unseen turns by `base` and with the
+    best explanation by `best`: few where that is not enough for a name, whatever the chance. `settings` are the
+    thresholds.
+    """
+    enough = base.variance > (1 + settings.verdict.smallest_share) * best.variance
+    return settings.held_out.flips if enough else settings.held_out.flips_of_nothing
 
 
 def best_placebo(probe: FitProbe, pool: Sequence[Term], best: Fit) -> Term | None:

@@ -26,7 +26,7 @@ def best_score(probe: FitProbe, terms: Sequence[Term], scale: Scale) -> float:
 
 
 def false_alarm_chance(
-    probe: FitProbe, score: Callable[[FitProbe], float], rng: np.random.Generator, observed: float
+    probe: FitProbe, score: Callable[[FitProbe], float], rng: np.random.Generator, observed: float, most: int
 ) -> float:
     """Chance that noise alone reaches `observed`, by random sign flips of whole turns, drawn by `rng`, of what `probe`
     looks at: the noise, that is what the best explanation leaves (Freedman, Lane, J. Bus. Econ. Stat. 1, 1983; an
@@ -38,7 +38,8 @@ def false_alarm_chance(
     until a few reach `observed`: of h after n, h/n is a true chance, never too small (Besag, Clifford, "Sequential
     Monte Carlo p-values", Biometrika 78, 1991). Where `observed` lies so far out that the largest of exponential
     scores (Gumbel's distribution of their mean and spread, its scale widened for safety) is hardly ever there, the
-    least chance that is told stands at once. Of b turns there are 2^(b - 1) patterns: no chance below is shown.
+    least chance that is told stands at once; after `most` flips that all stayed below it is 1 / (1 + `most`). Of b
+    turns there are 2^(b - 1) patterns: no chance below is shown.
     """
     settings = probe.fit.problem.settings.held_out
     block = probe.rows.block
@@ -47,14 +48,14 @@ def false_alarm_chance(
     if np.isneginf(observed):
         return 1.0
     scores: list[float] = []
-    for _ in range(settings.flips):
+    for _ in range(most):
         scores.append(score(probe.flipped(rng.choice([-1.0, 1.0], size=blocks)[block])))
         reached = sum(one >= observed for one in scores)
         if reached == settings.enough_reached:
             return max(reached / len(scores), least)
         if not reached and len(scores) >= settings.fewest_flips and tail(scores, observed, settings) < least:
             return least
-    return max((1 + reached) / (1 + settings.flips), least)
+    return max((1 + reached) / (1 + most), least)
 
 
 def tail(scores: Sequence[float], observed: float, settings: HeldOutSettings) -> float:
