@@ -1,0 +1,138 @@
+"""Requirements, prices and rules of an allocation, by hand and by differences."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hdopt.allocation import rules
+from hdopt.allocation.convex import Item, rss_rule, solve, worst_case_rule
+from hdopt.allocation.cost import Exponential, Grade, GradeTable, Piecewise, Reciprocal
+from hdopt.allocation.rules import AllocationProblem, allocate_by_equal_scaling, allocate_by_rss, allocate_by_yield
+from hdopt.tolerance.distributions import Normal, Uniform
+from hdopt.tolerance.space import InputSpace, Tolerance
+
+SENSITIVITIES, FIXED = (2.0, -3.0), (0.1, -0.2)
+AT = np.array([0.01, 0.02])
+Z_90 = 1.2816
+"""Standard deviations below which nine tenths of a normal distribution lie."""
+
+
+@pytest.mark.parametrize(
+    ("rule", "value"),
+    [(worst_case_rule, 0.02 + 0.06 + 0.3), (rss_rule, math.sqrt(0.02**2 + 0.06**2 + 0.1**2 + 0.2**2))],
+)
+def test_a_requirement_is_its_sum_and_slopes_as_it_does(rule, value):
+    """Would catch a sign that takes from the stack, and fixed parts that add otherwise or not at all."""
+    found = rule(SENSITIVITIES, 1.0, FIXED)
+    assert found.value(AT) == pytest.approx(value)
+    step = 1e-7
+    differences = [(found.value(AT + e) - found.value(AT - e)) / (2 * step) for e in np.diag([step, step])]
+    assert found.slope(AT) == pytest.approx(differences, rel=1e-6)
+
+
+@pytest.mark.parametrize("rule", [worst_case_rule, rss_rule])
+def test_the_price_of_the_limit_is_what_a_wider_one_saves(rule):
+    items = [Item("a", Reciprocal(1.0, 0.02), 0.1), Item("b", Exponential(3.0, 0.1), 0.1)]
+    limit = 0.9
+    found, wider, narrower = (solve(items, rule(SENSITIVITIES, x, FIXED)) for x in (limit, limit + 1e-3, limit - 1e-3))
+    assert found.marginal_cost == pytest.approx((narrower.total_cost - wider.total_cost) / 2e-3, rel=1e-3)
+    at = np.array(list(found.tolerances.values()))
+    assert found.slack == pytest.approx(limit - rule(SENSITIVITIES, limit, FIXED).value(at), abs=1e-15)
+    assert found.slack >= -1e-9 * limit
+    assert found.total_cost * (1 - 1e-6) <= found.lower_bound <= found.total_cost * (1 + 1e-9)
+
+
+def test_a_tolerance_keeps_its_own_bounds_and_those_of_its_cost():
+    quoted = Piecewise(((0.1, 5.0), (0.4, 1.0)))
+    assert Item("a", quoted, 0.2, lower=0.05, upper=0.3).bounds == (0.1, 0.3)
+    assert Item("a", quoted, 0.2, lower=0.2, upper=0.9).bounds == (0.2, 0.4)
+
+
+def test_a_kink_belongs_to_the_line_behind_it():
+    lines = Piecewise(((1.0, 10.0), (2.0, 4.0), (4.0, 2.0)))
+    assert lines.slope(np.array([1.999, 2.0, 2.001])) == pytest.approx([-6.0, -1.0, -1.0])
+
+
+class Sum:
+    """s . x: normal where the inputs are."""
+
+    def __init__(self, *slopes):
+        self.slopes = np.array(slopes)
+
+    def __call__(self, inputs):
+        return inputs @ self.slopes
+
+
+def problem(*held, required=0.9, limit=0.4, costs=(Reciprocal(0.0, 0.1), Reciprocal(0.0, 0.2))):
+    """Two normal inputs to be chosen, 4 sigma within the tolerance, and `held` ones of that standard deviation."""
+    tolerances = {name: Tolerance.of_deviation(Normal(mean=0.0, std=0.1, lower=-0.4, upper=0.4)) for name in ("a", "b")}
+    tolerances |= {
+        f"held{i}": Tolerance.of_deviation(Normal(mean=0.0, std=s, lower=-8 * s, upper=8 * s))
+        for i, s in enumerate(held)
+    }
+    items = tuple(Item(name, cost, 0.4, lower=0.01, upper=40.0) for name, cost in zip("ab", costs, strict=True))
+    return AllocationProblem(Sum(1.0, 1.0, *[1.0] * len(held)), InputSpace(tolerances), items, limit, required, "mm")
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Stacks of a few points, and the seeds that they were drawn with."""
+    seeds = []
+    run = rules.run_stack
+
+    def noted(response, space, request):
+        seeds.append(request.seed)
+        return run(response, space, request)
+
+    monkeypatch.setattr(rules, "run_stack", noted)
+    for name in ("COMPARE_POINTS", "DESIGN_POINTS", "MODEL_POINTS"):
+        monkeypatch.setattr(rules, name, 2**14)
+    return seeds
+
+
+@pytest.mark.parametrize("required", [0.9, 0.99])
+def test_root_sum_square_brings_the_share_asked_for_to_the_limit(quick, required):
+    """A sum of normal numbers is normal: the rule is exact, but for the sample."""
+    found = allocate_by_rss(problem(0.05, required=required), seed=3)
+    assert found.modelled == pytest.approx(0.4, rel=2e-4)
+    assert found.required_quantile.value == pytest.approx(0.4, rel=0.02)
+    assert set(quick) == {4}
+
+
+def test_the_price_of_a_root_sum_square_counts_what_stays_as_it_is(quick):
+    """By hand: cost C = K/sqrt(L^2 - r^2), r the held spread's part, so dC/dL = C L/(L^2 - r^2)."""
+    found = allocate_by_rss(problem(0.15), seed=3)
+    assert found.marginal_cost == pytest.approx(found.total_cost * 0.4 / (0.4**2 - (Z_90 * 0.15) ** 2), rel=0.02)
+
+
+def test_the_price_of_a_root_sum_square_counts_directions(quick):
+    class Turned(Sum):
+        def __call__(self, inputs):
+            return super().__call__(inputs[:, :2]) + 0.15 * math.sqrt(2) * np.cos(inputs[:, 2])
+
+    one = problem()
+    turned = Tolerance(Uniform(lower=0.0, upper=2 * math.pi), None)
+    space = InputSpace({**one.space.tolerances, "phase": turned}, turning=frozenset({"phase"}))
+    found = allocate_by_rss(
+        AllocationProblem(Turned(1.0, 1.0), space, one.items, one.limit, one.required_yield, "mm"), seed=3
+    )
+    assert found.marginal_cost == pytest.approx(found.total_cost * 0.4 / (0.4**2 - (Z_90 * 0.15) ** 2), rel=0.02)
+
+
+def test_a_design_is_judged_on_a_sample_that_it_never_saw(quick):
+    """The quantile's model is drawn with the seed, the judgement with the one after it."""
+    allocate_by_yield(problem(), seed=3, verify_n=2**14)
+    assert set(quick) == {4}
+
+
+def test_equal_scaling_takes_the_finer_grade_and_keeps_the_bounds(quick):
+    grades = GradeTable(tuple(Grade(name, t, 1 / t) for name, t in (("fine", 0.3), ("usual", 0.5), ("wide", 3.0))))
+    given = problem(limit=1.0, costs=(grades, Reciprocal(0.0, 0.2)))
+    found = allocate_by_equal_scaling(given, seed=3)
+    factor = found.tolerances["b"] / 0.4
+    assert 0.5 < factor * 0.4 < 3.0  # between two grades
+    assert (found.grades, found.tolerances["a"]) == ({"a": "usual"}, 0.5)
+    narrow = Item("b", Reciprocal(0.0, 0.2), 0.4, lower=0.01, upper=0.45)
+    bounded = AllocationProblem(given.response, given.space, (given.items[0], narrow), 1.0, 0.9, "mm")
+    assert allocate_by_equal_scaling(bounded, seed=3).tolerances["b"] == 0.45
