@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from hdopt.arrays import Array, Index
 from hdopt.drive.geometry import ARCMIN
 from hdopt.effects.conditions import TURN, Conditions
+from hdopt.late import late
 
 FEWEST_ROWS = 8
 """Rows of a piece from which it is integrated."""
@@ -54,7 +54,7 @@ def settled_drag(rate: Array, frequency: float, damping: float) -> Array:
     return np.asarray(-2 * damping / (TURN * frequency) * rate)
 
 
-@njit(cache=True, nogil=True)
+@late(calls=0)
 def _swing(
     time: Array, pieces: Index, excitations: Array, weights: Array, w: float, damping: float, result: Array
 ) -> None:
@@ -66,7 +66,7 @@ def _swing(
             _between_knots(time[start:end], excitations[start:end], weights, w, damping, result[start:end])
 
 
-@njit(cache=True, nogil=True)
+@late(calls=0)
 def _between_knots(time: Array, excitations: Array, weights: Array, w: float, damping: float, result: Array) -> None:
     """The swing of one piece into `result` (n, k); arguments as for `_swing`, on the rows of the piece.
 

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 
 from hdopt.arrays import Array, Index
+from hdopt.late import late
 
 
 def sine_columns(phase: Array, harmonics: Sequence[float] | Array) -> Array:
@@ -20,7 +20,7 @@ def sine_columns(phase: Array, harmonics: Sequence[float] | Array) -> Array:
     return _sines(phase, multiples)
 
 
-@njit(cache=True, nogil=True)
+@late(calls=0)
 def _sines(phase: Array, harmonics: Array) -> Array:
     columns = np.empty((len(phase), 2 * len(harmonics)))
     for i in range(len(phase)):
@@ -30,7 +30,7 @@ def _sines(phase: Array, harmonics: Array) -> Array:
     return columns
 
 
-@njit(cache=True, nogil=True)
+@late(calls=0)
 def _whole_sines(phase: Array, harmonics: Index) -> Array:
     """The same for whole multiples, each from the one before by the sine's and cosine's addition theorems."""
     columns = np.empty((len(phase), 2 * len(harmonics)))

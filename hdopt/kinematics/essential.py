@@ -12,13 +12,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from hdopt.arrays import Array, Index
 from hdopt.kinematics.branches import TIE_MM
-from hdopt.kinematics.compiled_closed_form import tooth_deviation
+from hdopt.kinematics.closed_form import tooth_deviation as closed_form_deviation
+from hdopt.late import late
 
-compiled = njit(cache=True, nogil=True, error_model="numpy")
+tooth_deviation = late()(closed_form_deviation)
 
 ROOT_STEPS, ROOT_CELLS = 60, 1e-14
 """Most steps to a change of the deepest rim, and how close two of them end it, in cells."""
@@ -59,7 +59,7 @@ class Sampled(NamedTuple):
     teeth: Teeth
 
 
-@compiled
+@late()
 def between(values: Array, place: float) -> float:
     """Cubic through the four neighbours of a `place`, in cells, among `values` (n,) on an even periodic grid."""
     n = len(values)
@@ -83,7 +83,7 @@ def between(values: Array, place: float) -> float:
     )
 
 
-@compiled
+@late()
 def _on_table(table: Array, angle: float) -> float:
     return between(table, angle / (2 * math.pi) * len(table)) if len(table) else 0.0
 
@@ -94,7 +94,7 @@ def on_table(table: Array, angles: Array) -> Array:
     return np.reshape(_all_on_table(table, flat), np.shape(angles))
 
 
-@compiled
+@late(calls=0)
 def _all_on_table(table: Array, angles: Array) -> Array:
     found = np.empty(len(angles))
     for i in range(len(angles)):
@@ -102,7 +102,7 @@ def _all_on_table(table: Array, angles: Array) -> Array:
     return found
 
 
-@compiled
+@late()
 def _root(gaps: Array, low: float, high: float) -> float:
     """Where the interpolated `gaps` change sign between two places, by the Illinois method: a secant that halves the
     value of an end which stays."""
@@ -128,7 +128,7 @@ def _root(gaps: Array, low: float, high: float) -> float:
     return place
 
 
-@compiled
+@late()
 def _rim_changes(gaps: Array, found: Array, count: int) -> int:
     """Append to `found` the places where `gaps` (m,) over one turn change sign; pairs within a cell too."""
     m = len(gaps)
@@ -149,7 +149,7 @@ def _rim_changes(gaps: Array, found: Array, count: int) -> int:
     return count
 
 
-@compiled
+@late()
 def _node(mesh: Sampled, rims: Index, place: float, out: Array) -> None:
     """Fill `out` (2, 4) for both zones at a `place`: deviation without FS teeth, FS sine's cosine and sine part over
     the phase, and the angle on the FS."""
@@ -170,14 +170,14 @@ def _node(mesh: Sampled, rims: Index, place: float, out: Array) -> None:
         out[zone, 3] = angle + away
 
 
-@compiled
+@late()
 def _zone_value(node: Array, zone: int, phase: float, teeth: Teeth) -> float:
     """A zone's deviation at a node for the FS phase in rad, mm of arc."""
     value: float = node[zone, 0] + node[zone, 1] * math.cos(phase) + node[zone, 2] * math.sin(phase)
     return value + _on_table(teeth.fs_table, node[zone, 3] + phase)
 
 
-@compiled
+@late()
 def _extreme_in_cell(
     mesh: Sampled, rims: Index, phase: float, low: float, high: float, zone: int, node: Array
 ) -> float:
@@ -206,7 +206,7 @@ def _extreme_in_cell(
     return best
 
 
-@njit(inline="always", error_model="numpy")
+@late()
 def _least_of_lines(one_a: float, two_a: float, one_b: float, two_b: float) -> float:
     """Least of the larger of two lines between their ends."""
     least = min(max(one_a, two_a), max(one_b, two_b))
@@ -216,7 +216,7 @@ def _least_of_lines(one_a: float, two_a: float, one_b: float, two_b: float) -> f
     return least
 
 
-@compiled
+@late()
 def _scan_piece(mesh: Sampled, rims: Index, places: Array, nodes: Array, values: Array, best: Array) -> float:
     """Walk one stretch, given by its `places`; `best` (2,) holds the least and the largest deviation so far."""
     n, phases, teeth = len(places), mesh.phases, mesh.teeth
@@ -226,45 +226,43 @@ def _scan_piece(mesh: Sampled, rims: Index, places: Array, nodes: Array, values:
     for p in range(phases):
         phase = 2 * math.pi * p / phases
         cos, sin = math.cos(phase), math.sin(phase)
-        for i in range(n):
-            for zone in range(2):
-                value = nodes[i, zone, 0] + nodes[i, zone, 1] * cos + nodes[i, zone, 2] * sin
-                if len(teeth.fs_table):
-                    value += _on_table(teeth.fs_table, nodes[i, zone, 3] + phase)
-                values[p, zone, i] = value
         for zone in range(2):
-            for i in range(1, n - 1):
+            values[p, zone, :n] = nodes[:n, zone, 0] + nodes[:n, zone, 1] * cos + nodes[:n, zone, 2] * sin
+            if len(teeth.fs_table):
+                values[p, zone, :n] += _all_on_table(teeth.fs_table, nodes[:n, zone, 3] + phase)
+            if n > 4:
                 # Only between whole cells; those at the ends of the stretch are shorter.
-                if 1 < i < n - 2:
-                    second = values[p, zone, i - 1] - 2 * values[p, zone, i] + values[p, zone, i + 1]
-                    bend = max(bend, abs(second))
-        for i in range(n):
-            best[0] = min(best[0], max(values[p, 0, i], values[p, 1, i]))
-            best[1] = max(best[1], max(values[p, 0, i], values[p, 1, i]))
+                cells = values[p, zone, 1 : n - 1]
+                bend = max(bend, np.abs(cells[:-2] - 2 * cells[1:-1] + cells[2:]).max())
+        larger = np.maximum(values[p, 0, :n], values[p, 1, :n])
+        best[0] = min(best[0], larger.min())
+        best[1] = max(best[1], larger.max())
     return bend
 
 
-@compiled
+@late()
 def _refine_piece(
     mesh: Sampled, rims: Index, places: Array, values: Array, margin: float, best: Array, node: Array
 ) -> None:
     """Follow the cells whose extremes, within the `margin`, may pass the `best` found so far."""
+    n = len(places)
     for p in range(mesh.phases):
         phase = 2 * math.pi * p / mesh.phases
-        for i in range(len(places) - 1):
-            one_a, two_a, one_b, two_b = values[p, 0, i], values[p, 1, i], values[p, 0, i + 1], values[p, 1, i + 1]
-            if _least_of_lines(one_a, two_a, one_b, two_b) - margin < best[0]:
-                low, high = places[i], places[i + 1]
-                found = _extreme_in_cell(mesh, rims, phase, low, high, -1, node)
+        one, two = values[p, 0, :n], values[p, 1, :n]
+        floor = np.maximum(np.minimum(one[:-1], one[1:]), np.minimum(two[:-1], two[1:]))
+        for i in np.flatnonzero(floor - margin < best[0]):
+            if _least_of_lines(one[i], two[i], one[i + 1], two[i + 1]) - margin < best[0]:
+                found = _extreme_in_cell(mesh, rims, phase, places[i], places[i + 1], -1, node)
                 best[0] = min(best[0], found)
-            for zone in range(2):
-                if max(values[p, zone, i], values[p, zone, i + 1]) + margin > best[1]:
-                    low, high = places[i], places[i + 1]
-                    found = _extreme_in_cell(mesh, rims, phase, low, high, zone, node)
+        for zone in range(2):
+            row = values[p, zone, :n]
+            for i in np.flatnonzero(np.maximum(row[:-1], row[1:]) + margin > best[1]):
+                if max(row[i], row[i + 1]) + margin > best[1]:
+                    found = _extreme_in_cell(mesh, rims, phase, places[i], places[i + 1], zone, node)
                     best[1] = max(best[1], -found)
 
 
-@compiled
+@late()
 def _stretches(gaps: Array) -> Array:
     """Places of one turn, sorted, where a zone's deepest rim changes, the first again a turn later; `gaps` (2, m)."""
     m = gaps.shape[1]
@@ -279,7 +277,7 @@ def _stretches(gaps: Array) -> Array:
     return marks
 
 
-@compiled
+@late()
 def _rims_between(gaps: Array, low: float, high: float, rims: Index) -> bool:
     """Fill `rims` (2,) with the deepest rims between two neighbouring changes; False where they only tie."""
     real = high > low
@@ -290,7 +288,7 @@ def _rims_between(gaps: Array, low: float, high: float, rims: Index) -> bool:
     return real
 
 
-@compiled
+@late()
 def essential_extremes(mesh: Sampled) -> tuple[float, float]:
     """Essential infimum and supremum of max(tau_1, tau_2) over one full relative turn, mm of arc.
 

@@ -81,11 +81,10 @@ def extremes_arcmin(
         *(mesh_tables(drive) if tables is None else tables),
     )
     tan_alpha = misalignment * float(np.tan(gear.pressure_angle))
-    low, high = essential_extremes(
-        Sampled(
-            found.depth, found.offset_cs, found.offset_fs, tan_alpha, gear.flexspline_advance, gear.beat_phases, teeth
-        )
+    mesh = Sampled(
+        found.depth, found.offset_cs, found.offset_fs, tan_alpha, gear.flexspline_advance, gear.beat_phases, teeth
     )
+    low, high = essential_extremes.compiled(mesh) if drive.has_measured_teeth else essential_extremes(mesh)
     return low * gear.arcmin_per_mm, high * gear.arcmin_per_mm
 
 
@@ -124,18 +123,37 @@ def interpolated_waveform(
 
     The branches of the `geometry` named are sampled once and joined by cubic splines, right to 1e-7 arcmin.
     """
-    from scipy.interpolate import CubicSpline
-
-    places, found = sampled_branches(drive, errors, geometry)
+    _, found = sampled_branches(drive, errors, geometry)
     values = np.stack(list(vars(found).values()))
-    splines = CubicSpline(np.append(places, 2 * np.pi), np.append(values, values[..., :1], -1), -1, "periodic")
+    splines = periodic_spline(values)
 
     def waveform(theta: Array) -> Array:
-        points = deepest(Branches(*splines(np.mod(theta, 2 * np.pi))))
+        points = deepest(Branches(*splines(theta)))
         error: Array = drive.geometry.arcmin_per_mm * np.max(deviation_at(drive, errors, theta, points), axis=0)
         return error
 
     return waveform
+
+
+def periodic_spline(values: Array) -> Callable[[Array], Array]:
+    """The periodic cubic spline through `values` (..., n) on an even grid of one turn from 0, as a function of angles
+    (rad, (k,)) -> (..., k). Its slopes solve a cyclic system, which Fourier's transform makes diagonal."""
+    n = values.shape[-1]
+    turn = 2 * np.pi * np.arange(n // 2 + 1) / n
+    # d[i-1] + 4 d[i] + d[i+1] = 3 (y[i+1] - y[i-1]), slopes a cell.
+    slopes = np.fft.irfft(np.fft.rfft(values) * (3j * np.sin(turn) / (2 + np.cos(turn))), n)
+    rise = np.roll(values, -1, -1) - values
+    after = np.roll(slopes, -1, -1)
+    pieces = np.stack([values, slopes, 3 * rise - 2 * slopes - after, slopes + after - 2 * rise])
+
+    def spline(theta: Array) -> Array:
+        place = np.mod(theta, 2 * np.pi) * (n / (2 * np.pi))
+        cell = place.astype(np.int64)
+        x = place - cell
+        a, b, c, d = np.take(pieces, cell, axis=-1, mode="wrap")
+        return np.asarray(a + x * (b + x * (c + x * d)))
+
+    return spline
 
 
 def held_peak_to_peak(waveform: Callable[[Array], Array], theta: Array, values: Array, width: float) -> float:
@@ -150,11 +168,10 @@ def held_peak_to_peak(waveform: Callable[[Array], Array], theta: Array, values: 
 def _held_high(waveform: Callable[[Array], Array], theta: Array, values: Array, width: float) -> float:
     """The largest level that `waveform` stays above over a window."""
     from numpy.lib.stride_tricks import sliding_window_view
-    from scipy.ndimage import minimum_filter1d
 
     step = theta[1] - theta[0]
     cells = max(int(width / step), 1)
-    levels = np.roll(minimum_filter1d(values, cells + 1, mode="wrap"), -(cells + 1) // 2)
+    levels = sliding_window_view(np.concatenate([values, values[:cells]]), cells + 1).min(axis=1)
     fine = width / FINE_PLACES
     best = float(levels.max())
     reach = int(np.ceil(2 * step / fine))

@@ -18,9 +18,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from hdopt.arrays import Array
+from hdopt.late import late
 
 NODES = 91
 """Places from the major to the minor axis where the motion is sampled, a degree apart."""
@@ -63,7 +63,7 @@ def ring_of(rows: Array, neutral: float, ratio: float) -> Ring:
     return Ring(np.ascontiguousarray(np.vstack([rows, length])), neutral, math.pi / 2 / float(length[-1]), ratio)
 
 
-@njit(cache=True)
+@late()
 def deflection_at(rows: Array, phi: float) -> tuple[float, float, float]:
     """w, w' and the integral of w at an angle `phi` (rad): the quintic that takes w, w', w'' of `rows` at both ends of
     the cell."""
@@ -81,7 +81,7 @@ def deflection_at(rows: Array, phi: float) -> tuple[float, float, float]:
     return w, w1, rows[3, i] + h * integral
 
 
-@njit(cache=True)
+@late()
 def tooth_place(ring: Ring, phi: float) -> tuple[float, float, float]:
     """Foot of the tooth of a `ring` at `phi` (rad from the major axis) in its space's frame: sideways and height (mm),
     and its lean (rad)."""
@@ -98,7 +98,7 @@ def tooth_place(ring: Ring, phi: float) -> tuple[float, float, float]:
     return rho * math.sin(phi - space), rho * math.cos(phi - space), phi - math.atan2(slope, rho) - space
 
 
-@njit(cache=True)
+@late()
 def gap_at(ring: Ring, flanks: Flanks, phi: float, side: float) -> float:
     """Least distance (mm) of the `flanks` of a `side` of the tooth of a `ring` at `phi` (rad); below 0 they overlap,
     infinite where they share no height."""
@@ -112,7 +112,7 @@ def gap_at(ring: Ring, flanks: Flanks, phi: float, side: float) -> float:
     return min(_least_between(points, flanks.space, 1.0), _least_between(flanks.space, points, -1.0))
 
 
-@njit(cache=True)
+@late()
 def _least_between(points: Array, line: Array, sign: float) -> float:
     """Least of `sign` times the distance from each of `points` to the `line` at its height."""
     least = math.inf
@@ -126,7 +126,7 @@ def _least_between(points: Array, line: Array, sign: float) -> float:
     return least
 
 
-@njit(cache=True)
+@late()
 def largest_overlap(ring: Ring, flanks: Flanks, to: float) -> float:
     """By how much (mm) the leading `flanks` overlap at most on a `ring`, from the major axis to the angle `to` (rad);
     0 where they never do."""
@@ -137,7 +137,7 @@ def largest_overlap(ring: Ring, flanks: Flanks, to: float) -> float:
     return most
 
 
-@njit(cache=True)
+@late()
 def least_trailing_gap(ring: Ring, flanks: Flanks) -> float:
     """Least gap (mm) of the trailing `flanks` on a tooth's way out, on a `ring`."""
     at = 0

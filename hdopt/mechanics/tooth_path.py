@@ -19,12 +19,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.drive.profiles import WaveGeneratorProfile, perimeter_error, polar_curvature
 from hdopt.errors import HdoptError, MissingValue
+from hdopt.late import late
 from hdopt.mechanics.bending import ring_wall
 from hdopt.mechanics.contact import TIPS, Contact, contact_angle
 from hdopt.mechanics.tooth_gap import (
@@ -180,7 +180,7 @@ class Mesh:
         return max(_peak(change), kink)
 
 
-@njit(cache=True)
+@late()
 def _integrate(rows: Array) -> None:
     """Fill row 3 with the integral of the quintics through rows 0 to 2."""
     h = CELL
@@ -192,7 +192,7 @@ def _integrate(rows: Array) -> None:
         rows[3, i + 1] = rows[3, i] + h * (values + slopes + bends)
 
 
-@njit(cache=True)
+@late()
 def _falls_to(rows: Array, level: float) -> float:
     """Angle at which w first falls to `level`; NaN where it starts below, or never gets there."""
     if rows[0, 0] <= level:
@@ -210,7 +210,7 @@ def _falls_to(rows: Array, level: float) -> float:
     return math.nan
 
 
-@njit(cache=True)
+@late()
 def _free_angle(rows: Array, module: float, tan_alpha: float, play: float) -> float:
     """The angle of `Mesh.free_flank_angle`; `play` is half the backlash, mm."""
     for i in range(1, rows.shape[1]):
@@ -229,7 +229,7 @@ def _free_angle(rows: Array, module: float, tan_alpha: float, play: float) -> fl
     return math.pi / 2
 
 
-@njit(cache=True)
+@late()
 def _peak(values: Array) -> float:
     """Largest of equally spaced values, and of the parabola through it and its neighbours."""
     at = int(np.argmax(values))

@@ -17,6 +17,9 @@ from hdopt.errors import HdoptError
 
 INSEPARABLE_GROWTH = 3.0
 """Neighbouring orders count as not separable when together they make their errors at least this many times larger."""
+SOUND = 1e-4
+"""Least eigenvalue of the Gram matrix of unit columns from which normal equations are as good as any: rounding then
+grows 1e4 times, and the correction takes that away."""
 
 
 @dataclass(frozen=True)
@@ -101,8 +104,9 @@ def order_spectrum(theta: ArrayLike, signal: ArrayLike, orders: Sequence[float])
         raise HdoptError(
             f"{len(theta)} samples cannot carry {len(orders)} orders; at least {columns.shape[1] + 1} are needed"
         )
-    coefficients, _, rank, _ = np.linalg.lstsq(columns, signal, rcond=1e-10)
-    if rank < columns.shape[1]:
+    gram = columns.T @ columns
+    coefficients = _coefficients(columns, gram, signal)
+    if coefficients is None:
         turns = np.ptp(theta) / (2 * np.pi)
         raise HdoptError(
             f"a record of {turns:.3g} input turns cannot tell these orders apart: "
@@ -115,9 +119,22 @@ def order_spectrum(theta: ArrayLike, signal: ArrayLike, orders: Sequence[float])
         phases=np.arctan2(sin, cos),
         mean=float(coefficients[0]),
         residual_rms=float(np.sqrt(np.mean((signal - columns @ coefficients) ** 2))),
-        error_growth=error_growth(theta, orders),
-        inseparable=inseparable_groups(theta, orders),
+        error_growth=_growth(gram),
+        inseparable=_inseparable(gram, float(np.ptp(theta)), orders),
     )
+
+
+def _coefficients(columns: Array, gram: Array, signal: Array) -> Array | None:
+    """Least squares of `signal` (n,) by `columns` (n, k) with their Gram matrix; None where they cannot be told apart.
+
+    By normal equations with one correction where these are sound, which loses nothing and takes a tenth of the time.
+    """
+    size = np.sqrt(np.diag(gram))
+    if np.linalg.eigvalsh(gram / np.multiply.outer(size, size))[0] > SOUND:
+        found = np.linalg.solve(gram, columns.T @ signal)
+        return np.asarray(found + np.linalg.solve(gram, columns.T @ (signal - columns @ found)))
+    found, _, rank, _ = np.linalg.lstsq(columns, signal, rcond=1e-10)
+    return None if rank < columns.shape[1] else np.asarray(found, np.float64)
 
 
 def error_growth(theta: ArrayLike, orders: Sequence[float]) -> Array:
@@ -126,8 +143,13 @@ def error_growth(theta: ArrayLike, orders: Sequence[float]) -> Array:
     `theta` (n,) input angles in rad, `orders` in cycles per input turn.
     """
     columns = order_columns(theta, orders)
-    scaled = columns / np.sqrt(np.sum(columns**2, axis=0))
-    variance = np.diag(np.linalg.pinv(scaled.T @ scaled, rcond=1e-14))
+    return _growth(columns.T @ columns)
+
+
+def _growth(gram: Array) -> Array:
+    """`error_growth` from the Gram matrix (1 + 2 m, 1 + 2 m) of the orders' columns."""
+    size = np.sqrt(np.diag(gram))
+    variance = np.diag(np.linalg.pinv(gram / np.multiply.outer(size, size), rcond=1e-14))
     growth: Array = np.sqrt(np.maximum(variance[1::2], variance[2::2]))
     return growth
 
@@ -141,14 +163,23 @@ def inseparable_groups(theta: ArrayLike, orders: Sequence[float]) -> tuple[tuple
 
     `theta` (n,) input angles in rad, `orders` in cycles per input turn.
     """
-    theta = np.asarray(theta, float)
-    one_cycle = 2 * np.pi / np.ptp(theta)
-    groups: list[list[float]] = []
-    for order in sorted(float(order) for order in orders):
-        if groups and order - groups[-1][-1] < one_cycle * (1 - 1e-9):
-            groups[-1].append(order)
+    columns = order_columns(theta, orders)
+    return _inseparable(columns.T @ columns, float(np.ptp(np.asarray(theta, float))), orders)
+
+
+def _inseparable(gram: Array, travel: float, orders: Sequence[float]) -> tuple[tuple[float, ...], ...]:
+    """`inseparable_groups` from the Gram matrix of the columns of all `orders` over a `travel` in rad."""
+    one_cycle = 2 * np.pi / travel
+    groups: list[list[int]] = []
+    for place in np.argsort(np.asarray(orders, float)).tolist():
+        if groups and orders[place] - orders[groups[-1][-1]] < one_cycle * (1 - 1e-9):
+            groups[-1].append(place)
         else:
-            groups.append([order])
-    return tuple(
-        tuple(group) for group in groups if len(group) > 1 and error_growth(theta, group).max() >= INSEPARABLE_GROWTH
-    )
+            groups.append([place])
+
+    def grown(group: list[int]) -> float:
+        columns = [0, *(column for place in group for column in (1 + 2 * place, 2 + 2 * place))]
+        return float(_growth(gram[np.ix_(columns, columns)]).max())
+
+    found = [group for group in groups if len(group) > 1 and grown(group) >= INSEPARABLE_GROWTH]
+    return tuple(tuple(float(orders[place]) for place in group) for group in found)

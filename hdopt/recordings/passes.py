@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from hdopt.arrays import Array, Index, Mask
+from hdopt.late import late
 from hdopt.recordings.recording import TURN, Recording
 
 
@@ -27,7 +27,7 @@ class Passes:
         return int(self.index[-1]) + 1
 
 
-@njit(cache=True)
+@late(calls=0)
 def _turning_points(angle: Array, threshold: float) -> Index:
     """Indices where the angle turns back by more than `threshold` (zigzag rule)."""
     turns = np.empty(len(angle), np.int64)

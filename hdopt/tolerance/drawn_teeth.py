@@ -13,7 +13,6 @@ from hdopt.drive.pitch_tolerances import PitchTolerances
 from hdopt.errors import HdoptError
 from hdopt.kinematics.load_sharing import LoadSharing, mesh_tables
 from hdopt.kinematics.peak_to_peak import beat_extremes_arcmin
-from hdopt.kinematics.teeth_kernel import whole_tables
 from hdopt.parallel.shared_memory import in_blocks
 from hdopt.tolerance.distributions import Uniform
 from hdopt.tolerance.space import Tolerance
@@ -104,6 +103,8 @@ def drawn_peak_to_peak_arcmin(
     `inputs` (n, d) hold the numbers that pick the `teeth`; what is measured of `drive` stays beside them.
     `misalignment` and `sine_share` as in `beat_extremes_arcmin`.
     """
+    from hdopt.kinematics.teeth_kernel import whole_tables
+
     sharing = LoadSharing.of(drive)
     whole = whole_tables(drive, mesh_tables(drive))
     out = np.empty(len(matrix))

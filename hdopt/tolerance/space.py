@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import special
 
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError, unknown_name
@@ -109,6 +108,8 @@ class InputSpace:
 
     def from_scores(self, scores: Array) -> Array:
         """Values of the inputs from (already dependent) normal scores, shape (n, d)."""
+        from scipy import special
+
         return self.from_uniform(np.clip(special.ndtr(scores), 1e-300, 1 - 2**-53))
 
     def with_tolerances(self, values: Mapping[str, float]) -> InputSpace:

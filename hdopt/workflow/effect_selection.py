@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from hdopt.simulation import EffectValues, ExtendedModel
 from hdopt.study import Study
-from hdopt.study.effects import OperationSection
 
 CHOICES = {
     "all": ("drive", "bench"),
@@ -41,8 +40,7 @@ class Inclusion:
 
 def inclusion(study: Study, default: str) -> Inclusion:
     """Which effects of a `study` count: as its [operation] includes, or by `default` ('all', 'drive' or 'none')."""
-    section = study.find("operation", OperationSection)
-    asked = None if section is None else section.include
+    asked = _asked(study)
     choice = asked or default
     origins = CHOICES[choice]
     return Inclusion(
@@ -51,6 +49,15 @@ def inclusion(study: Study, default: str) -> Inclusion:
         tuple(effect for effect in study.effects if effect.origin in origins),
         tuple(effect for effect in study.effects if effect.origin not in origins),
     )
+
+
+def _asked(study: Study) -> str | None:
+    if "operation" not in study.sections:
+        return None
+    from hdopt.study.effects import OperationSection
+
+    section = study.find("operation", OperationSection)
+    return None if section is None else section.include
 
 
 def extended_model(study: Study, default: str = "all") -> ExtendedModel:

@@ -11,7 +11,6 @@ from hdopt.recordings.orders import ModelOrder, model_orders
 from hdopt.simulation import ExtendedModel
 from hdopt.simulation.extremes import peak_to_peak_arcmin
 from hdopt.study import Study
-from hdopt.study.effects import effect_keys
 from hdopt.workflow.effect_selection import Inclusion
 
 SAME_ORDER = 1e-9
@@ -41,6 +40,8 @@ def effect_table(
     `base` that without any effect, arcmin. `adds_arcmin` is how much the peak-to-peak would fall if this effect alone
     were taken out, arcmin; None where it is not counted.
     """
+    from hdopt.study.effects import effect_keys
+
     rows = []
     for effect in study.effects:
         counted = effect in chosen.counted

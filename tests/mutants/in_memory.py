@@ -105,7 +105,9 @@ def _is_from(function: FunctionType, path: Path) -> bool:
 def _compiled_functions(path: Path) -> set[str]:
     from numba.core.dispatcher import Dispatcher
 
-    made = (one.py_func for one in gc.get_objects() if isinstance(one, Dispatcher))
+    from hdopt.late import Late
+
+    made = (one.py_func for one in gc.get_objects() if isinstance(one, Dispatcher | Late))
     return {one.__code__.co_qualname for one in made if _is_from(one, path)}
 
 
