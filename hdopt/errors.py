@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 
 
 class HdoptError(ValueError):
@@ -38,6 +39,37 @@ class IncompleteStudy(MissingValue):
 
 class MissingLibrary(HdoptError):
     """A library of the system is needed that this machine lacks. The message names its package."""
+
+
+class NoResult(HdoptError):
+    """Numbers, each allowed by itself, that lead to no result together; `placed` once the message says where they
+    stand."""
+
+    placed = False
+
+
+@contextmanager
+def numbers_of(place: Callable[[], str]) -> Iterator[None]:
+    """Say of numbers that lead to no result meanwhile where they stand: `place` says it, and is asked only then."""
+    try:
+        yield
+    except NoResult as error:
+        if error.placed:
+            raise
+        raise _placed(f"{place()}: {error}") from error
+    except HdoptError:
+        raise
+    except (ValueError, ArithmeticError) as error:
+        said = _printable(str(error.args[-1] if error.args else type(error).__name__))
+        raise _placed(
+            f"{place()}: these numbers lead to no result ({said}); see whether each has the unit its name says"
+        ) from error
+
+
+def _placed(message: str) -> NoResult:
+    error = NoResult(message)
+    error.placed = True
+    return error
 
 
 MOST_LINES = 3

@@ -15,7 +15,7 @@ import secrets
 import stat
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -66,6 +66,14 @@ class FilesOfWork:
     began: float = field(default_factory=time.time)
     facts: dict[str, str] = field(default_factory=dict)
     """What else is to be known of the work: its study and that one's hash."""
+    place: Callable[[], str] | None = None
+    """Says where to look when numbers lead to no result; None for work without a study."""
+
+    def place_of_numbers(self) -> str:
+        """Where the numbers of this work stand: in its study, else in its inputs."""
+        if self.place is not None:
+            return self.place()
+        return ", ".join(path.name for path in self.inputs) or "this command"
 
 
 _of_work: ContextVar[FilesOfWork | None] = ContextVar("hdopt_files_of_work", default=None)

@@ -17,7 +17,7 @@ import numpy as np
 
 from hdopt.allocation.cost import ConvexCost, CostModel, Expression, GradeTable, Piecewise
 from hdopt.arrays import Array
-from hdopt.errors import HdoptError
+from hdopt.errors import HdoptError, NoResult
 
 FEASIBLE = 1e-9
 """Violation of the requirement, relative to its limit, that is left to rounding."""
@@ -273,7 +273,7 @@ def _solve(problem: Any, solver: str, **options: Any) -> None:
     try:
         problem.solve(solver=solver, **options)
     except cp.error.SolverError as error:
-        raise HdoptError(
+        raise NoResult(
             f"the solver {solver} gave up on these costs and tolerances; see whether each has the unit its name says "
             "and none is a million times another"
         ) from error

@@ -49,13 +49,14 @@ def _run(arguments: Sequence[str] | None) -> int:
     import click
 
     from hdopt.cli.app import cli
+    from hdopt.errors import numbers_of
     from hdopt.files import watching_files
 
     if not os.environ.get("HDOPT_TRACEBACK"):
         # Results are checked to be finite where they are made; NumPy's own lines would stand beside the one message.
         warnings.filterwarnings("ignore", category=RuntimeWarning)
     try:
-        with watching_files():
+        with watching_files() as work, numbers_of(work.place_of_numbers):
             status = cli.main(args=arguments, prog_name="hdopt", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as help_text:
         help_text.show()
@@ -82,8 +83,6 @@ def _message(error: Exception) -> str:
         return in_brief(f"{name} failed: {error.strerror or error}")
     if isinstance(error, MemoryError):
         return "this needs more memory than there is; ask for fewer samples, or use --engine dask://HOST:PORT"
-    if isinstance(error, ValueError | ArithmeticError):
-        return in_brief(f"these numbers lead to no result: {error}; see whether each has the unit its name says")
     kind = type(error).__name__
     return in_brief(f"cannot go on: {kind}: {error}", 2) + "\nHDOPT_TRACEBACK=1 in the environment shows where"
 

@@ -12,7 +12,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar  # Any: what a study file holds, of TOML's several kinds
 
-from hdopt.errors import HdoptError, MissingSection, MissingValue, unknown_name
+from hdopt.errors import HdoptError, MissingSection, MissingValue, NoResult, numbers_of, unknown_name
 from hdopt.files import files_of_work
 from hdopt.study.document import (
     SET_ON_COMMAND_LINE,
@@ -195,17 +195,15 @@ class Study:
     def _placed(self, name: str) -> Iterator[None]:
         """Messages of what is built from the section `name` say where in the file that section stands."""
         try:
-            yield
+            with numbers_of(lambda: self.document.where((name,))):
+                yield
         except MissingValue as error:
             error.args = (f"{self.document.where((name,))}: {error}",)  # which keys it names stays known
             raise
+        except NoResult:
+            raise
         except HdoptError as error:
             raise HdoptError(f"{self.document.where((name,))}: {error}") from error
-        except (ValueError, ArithmeticError) as error:
-            raise HdoptError(
-                f"{self.document.where((name,))}: these numbers lead to no result ({error}); see whether each has the "
-                "unit its name says"
-            ) from error
 
 
 AnyStudy = Study | str | Path | None
@@ -281,7 +279,15 @@ def study_of(document: Document, name: str, folder: Path) -> Study:
     study = Study(name, check_sections(document), document.data, folder, document.source, document)
     if (work := files_of_work()) is not None:
         work.facts |= {"study": name, "study_sha256": study.sha256, "source": document.source}
+        work.place = lambda: place_of_numbers(document)
     return study
+
+
+def place_of_numbers(document: Document) -> str:
+    """Where to look in `document` when its numbers lead to no result: its value that is farthest from the usual."""
+    from hdopt.study.farthest import farthest
+
+    return farthest(document, _shipped_drive(DEFAULT_STUDY).data)
 
 
 def _document(source: str | Path) -> tuple[Document, Path, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping
+from functools import cache
 from importlib import import_module
 from types import UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints  # Any: values of TOML, and annotations
@@ -67,10 +68,9 @@ ANY_NAME = "*"
 
 def _paths(model: type[Section], path: Keys, content: Any) -> set[Keys]:
     found: set[Keys] = set()
-    for name, field in model.model_fields.items():
-        here = (*path, field.alias or name)
-        value = content.get(here[-1]) if isinstance(content, Mapping) else None
-        named, held_in = sections_in(field.annotation), containers(field.annotation)
+    for name, named, held_in in _keys(model):
+        here = (*path, name)
+        value = content.get(name) if isinstance(content, Mapping) else None
         found.add(here)
         if dict in held_in:
             found |= _named_tables(named, here, value)
@@ -80,6 +80,15 @@ def _paths(model: type[Section], path: Keys, content: Any) -> set[Keys]:
     if model.__annotations__.get("__pydantic_extra__"):
         found |= _named_tables(sections_in(get_type_hints(model)["__pydantic_extra__"]), path, content)
     return found
+
+
+@cache
+def _keys(model: type[Section]) -> list[tuple[str, list[type[Section]], set[Any]]]:
+    """Key, section models and containers of each field; a model's fields do not change."""
+    return [
+        (field.alias or name, sections_in(field.annotation), containers(field.annotation))
+        for name, field in model.model_fields.items()
+    ]
 
 
 def _named_tables(kinds: list[type[Section]], path: Keys, content: Any) -> set[Keys]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdopt.arrays import Array
+from hdopt.errors import HdoptError, NoResult
 from hdopt.tolerance.distributions import Normal
 from hdopt.tolerance.space import InputSpace, Tolerance
 
@@ -43,8 +44,11 @@ class LinearResponse:
 
 def linear_problem(dimensions: Mapping[str, Dimension]) -> tuple[LinearResponse, InputSpace]:
     """Response and inputs of a stack whose dimensions are normal, truncated at their tolerances."""
-    tolerances = {
-        name: Tolerance.of_deviation(Normal(std=d.tolerance / d.sigmas, lower=-d.tolerance, upper=d.tolerance))
-        for name, d in dimensions.items()
-    }
+    tolerances = {}
+    for name, d in dimensions.items():
+        try:
+            deviation = Normal(std=d.tolerance / d.sigmas, lower=-d.tolerance, upper=d.tolerance)
+        except HdoptError as error:
+            raise NoResult(f"dimension {name}: {error}") from error
+        tolerances[name] = Tolerance.of_deviation(deviation)
     return LinearResponse(tuple(d.sensitivity for d in dimensions.values())), InputSpace(tolerances)

@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.errors import HdoptError
+from hdopt.errors import HdoptError, NoResult
 
 
 class Response(Protocol):
@@ -54,7 +54,7 @@ def evaluate(response: Response, inputs: Array, names: Sequence[str], where: str
         if len(bad):
             row = int(bad[0])
             sample = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, inputs[row], strict=True))
-            raise HdoptError(
+            raise NoResult(
                 f"the response is {values[row]} for sample {row} of {where} ({len(bad)} such in this block): {sample}; "
                 "narrow the inputs to where the response is defined"
             )

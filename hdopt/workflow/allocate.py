@@ -11,6 +11,7 @@ from hdopt.errors import HdoptError, unknown_name
 from hdopt.parallel.engine import Engine
 from hdopt.study import AnyStudy, Study, as_study
 from hdopt.tolerance.intervals import IntervalEstimate
+from hdopt.workflow.placed import numbers_named
 from hdopt.workflow.stack import ToleranceProblem, study_problem, words_on_model
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ RULES = ("worst_case", "rss", "yield")
 Progress = Callable[[Sequence[str]], Iterable[str]]
 
 
+@numbers_named
 def allocate(
     study: AnyStudy = None,
     rule: str | None = None,

@@ -20,6 +20,7 @@ from hdopt.geometry.job import Job, make_job
 from hdopt.study import AnyStudy, Study, as_study
 from hdopt.workflow.export import export_options
 from hdopt.workflow.output_files import Files, checked_files, write_table_files
+from hdopt.workflow.placed import numbers_named
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -106,6 +107,7 @@ class CompareResult(ShownAsTable):
         return {"deviations": self.to_frame()}
 
 
+@numbers_named
 def compare(
     study: AnyStudy,
     measured: str | Path,

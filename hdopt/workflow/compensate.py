@@ -22,6 +22,7 @@ from hdopt.files import ShownAsTable, write_text
 from hdopt.recordings.recording import TURN, Recording
 from hdopt.recordings.rows import Rows, gather, neighbours_for
 from hdopt.workflow.output_files import Files, checked_files
+from hdopt.workflow.placed import recordings_named
 from hdopt.workflow.recorded_drive import AnyDrive, AnyRecordings, recorded_drive
 from hdopt.workflow.waveform_fit import WaveformFit, fit_rows
 
@@ -161,6 +162,7 @@ def homing_words(homing: tuple[float, float]) -> str:
     )
 
 
+@recordings_named
 def compensate(
     recordings: AnyRecordings,
     drive: AnyDrive = None,

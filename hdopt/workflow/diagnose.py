@@ -10,6 +10,7 @@ from hdopt.diagnosis import diagnose as diagnose_records
 from hdopt.errors import HdoptError
 from hdopt.files import write_text
 from hdopt.workflow.output_files import Files, checked_files
+from hdopt.workflow.placed import recordings_named
 from hdopt.workflow.recorded_drive import AnyDrive, AnyRecordings, recorded_drive
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 FILES = ("report", "study")
 
 
+@recordings_named
 def diagnose(
     recordings: AnyRecordings,
     drive: AnyDrive = None,

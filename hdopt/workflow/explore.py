@@ -22,6 +22,7 @@ from hdopt.study import AnyStudy, Study, as_study
 from hdopt.study.tolerances import RequirementSection
 from hdopt.study.write import study_toml
 from hdopt.tolerance.sampling import SAMPLINGS
+from hdopt.workflow.placed import numbers_named
 from hdopt.workflow.stack import drive_problem_of
 from hdopt.workflow.steps.profiles import alternatives
 
@@ -89,6 +90,7 @@ class ExplorerPage:
     cloud: Array
 
 
+@numbers_named
 def explore(
     study: AnyStudy = None, file: str | Path = EXPLORER_FILE, n: int = CLOUD_N, *, seed: int = 1
 ) -> ExploreResult:
@@ -107,6 +109,7 @@ def explore(
     return ExploreResult(study.name, file, len(page.cloud), page.notes, page.cloud)
 
 
+@numbers_named
 def explorer_page(study: Study, n: int = CLOUD_N, seed: int = 1) -> ExplorerPage:
     """The explorer of `study`; `n` and `seed` as in `explore`."""
     if not 1 <= n <= MOST_CLOUD:

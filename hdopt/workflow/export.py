@@ -11,8 +11,10 @@ from hdopt.geometry.options import ExportOptions
 from hdopt.study import AnyStudy, Study, as_study
 from hdopt.study.export import ExportSection
 from hdopt.workflow.allocation_file import read_allocation
+from hdopt.workflow.placed import numbers_named
 
 
+@numbers_named
 def export(
     study: AnyStudy, files: Mapping[str, str | Path], tolerances: Mapping[str, float] | str | Path | None = None
 ) -> ExportResult:

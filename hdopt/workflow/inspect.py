@@ -11,12 +11,14 @@ from hdopt.recordings.recording import Recording
 from hdopt.recordings.sheet import Inspection
 from hdopt.workflow.acceptance_sheet import NO_LABEL, SheetLabel, acceptance_sheet
 from hdopt.workflow.output_files import Files, checked_files, write_table_files
+from hdopt.workflow.placed import recordings_named
 from hdopt.workflow.recorded_drive import AnyDrive, AnyRecordings, RecordedDrive, recorded_drive
 from hdopt.workflow.requirement import required_limits
 
 FILES = ("csv", "xlsx", "report", "bench")
 
 
+@recordings_named
 def inspect(
     recordings: AnyRecordings,
     drive: AnyDrive = None,

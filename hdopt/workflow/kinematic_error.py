@@ -28,6 +28,7 @@ from hdopt.simulation.extremes import peak_to_peak_arcmin as extended_peak_to_pe
 from hdopt.study import AnyStudy, Study, as_study, study_of_drive
 from hdopt.workflow.effect_selection import inclusion
 from hdopt.workflow.effect_table import effect_table, remarks, walked_extended_arcmin
+from hdopt.workflow.placed import numbers_named
 from hdopt.workflow.waveform import WaveformResult, converged_extremes_arcmin, held_arcmin, model_of, waveform_of
 
 if TYPE_CHECKING:
@@ -195,6 +196,7 @@ class _Notes:
             return None
 
 
+@numbers_named
 def kinematic_error(
     study: AnyStudy | Drive = None,
     errors: DriveErrors | None = None,
@@ -380,6 +382,7 @@ def _study_of(study: AnyStudy | Drive, errors: DriveErrors | None) -> Study:
     return found
 
 
+@numbers_named
 def profile(study: AnyStudy = None) -> ProfileResult:
     """What the wave-generator profile of a `study` (or its name or path) asks of the flexspline: contact, curvature,
     stress, stretch."""

@@ -8,8 +8,10 @@ from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
 from hdopt.kinematics import peak_to_peak as kernel
 from hdopt.study import AnyStudy, as_study
+from hdopt.workflow.placed import numbers_named
 
 
+@numbers_named
 def peak_to_peak(drive: AnyStudy | Drive = None, errors: DriveErrors | None = None) -> Array:
     """Converged peak-to-peak kinematic error, arcmin, k_e = 1, by the closed form.
 

@@ -25,6 +25,7 @@ from hdopt.study.comments import comments_of
 from hdopt.study.defaults import defaults_taken
 from hdopt.study.drive import StudySection
 from hdopt.study.write import study_toml
+from hdopt.workflow.placed import numbers_named
 from hdopt.workflow.provenance import provenance
 from hdopt.workflow.requirement import of_run
 from hdopt.workflow.run_folder import RunFolder, finish, run_folder
@@ -104,6 +105,7 @@ def left_out(step: StepResult) -> str:
     return f"left out: {step.results['left_out']}" if "left_out" in step.results else ""
 
 
+@numbers_named
 def run_study(
     study: AnyStudy, folder: str | Path, seed: int = 1, progress: Progress = iter, resume: bool = False
 ) -> RunResult:

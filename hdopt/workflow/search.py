@@ -14,6 +14,7 @@ from hdopt.optimize.region_maps import find_regions
 from hdopt.optimize.search import search_designs
 from hdopt.study import AnyStudy, Study, as_study
 from hdopt.workflow.output_files import Files, checked_files, write_table_files
+from hdopt.workflow.placed import numbers_named
 from hdopt.workflow.search_setup import setup_of
 from hdopt.workflow.stack import PILOT_MEASURED, PILOT_N
 from hdopt.workflow.write_design import chosen_study_toml
@@ -21,6 +22,7 @@ from hdopt.workflow.write_design import chosen_study_toml
 FILES = ("csv", "xlsx", "study")
 
 
+@numbers_named
 def search(
     study: AnyStudy = None,
     seed: int = 1,

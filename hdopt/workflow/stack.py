@@ -28,6 +28,7 @@ from hdopt.tolerance.screening import Screening, run_screening
 from hdopt.tolerance.space import InputSpace
 from hdopt.tolerance.stack import StackRequest, run_stack
 from hdopt.tolerance.worst_case import WorstCase
+from hdopt.workflow.placed import numbers_named
 
 STACK_N = 2**18
 USUAL_YIELD = 0.9973
@@ -95,6 +96,7 @@ AnyProblem: TypeAlias = ToleranceProblem | AnyStudy
 """What the calls about tolerances take: a problem made of records, or a study, its name or its path."""
 
 
+@numbers_named
 def study_problem(study: AnyProblem) -> ToleranceProblem:
     """Response, inputs and requirement of a `study`, or of its name or path: its drive's, or those of its linear stack;
     a problem as it is.
@@ -125,6 +127,7 @@ def study_problem(study: AnyProblem) -> ToleranceProblem:
     )
 
 
+@numbers_named
 def drive_problem_of(study: Study) -> DriveProblem:
     """The drives of a `study` under its [tolerances] and [contributors], without effects: their response, arcmin, and
     their random inputs. Raises `HdoptError` where it has no [tolerances] or no [requirement]."""
@@ -211,6 +214,7 @@ def _homogenization(study: Study, kind: str) -> float:
     return contact_of(study.drive).homogenization()
 
 
+@numbers_named
 def stack(
     study: AnyProblem = None,
     n: int = STACK_N,
@@ -326,6 +330,7 @@ def _exact_at(problem: ToleranceProblem, worst: WorstCase) -> tuple[str, ...]:
     )
 
 
+@numbers_named
 def sobol(
     study: AnyProblem = None,
     n: int = SOBOL_N,
@@ -361,6 +366,7 @@ def sobol(
     return SobolResult(problem.study, indices, effects, tuple(notes))
 
 
+@numbers_named
 def screen(
     study: AnyProblem = None,
     method: str = "morris",

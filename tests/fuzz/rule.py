@@ -15,8 +15,8 @@ from tests.fuzz import strategies
 LONGEST_MESSAGE = 2000
 
 
-def held(arguments: list[str]) -> int:
-    """Run a command in this process; its status, after checking how it ended."""
+def held(arguments: list[str], place: str = "") -> int:
+    """Run a command in this process; its status, after checking how it ended. A refusal names the `place`."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
@@ -29,6 +29,7 @@ def held(arguments: list[str]) -> int:
     assert len(said) <= LONGEST_MESSAGE, said[:200]
     if status == 2 and "Usage:" not in said:
         assert said.startswith("hdopt: ") and said.count("\n") <= 3, said
+        assert place in said, (arguments, said)
     if "--json" in arguments and arguments[-1] == "-" and status != 2:
         json.loads(out.getvalue(), parse_constant=lambda name: 1 / 0)
     return status
@@ -36,7 +37,14 @@ def held(arguments: list[str]) -> int:
 
 def study(content: bytes, folder: Path) -> None:
     (folder / "s.toml").write_bytes(content)
-    held(["profile", str(folder / "s.toml"), "--json", "-"])
+    held(["profile", str(folder / "s.toml"), "--json", "-"], place="s.toml")
+
+
+def number(content: tuple[str, list[str]], folder: Path) -> None:
+    """One number far off: whatever fails over it says in which file, and at which line or key, to look."""
+    text, command = content
+    (folder / "s.toml").write_text(text)
+    held([command[0], str(folder / "s.toml"), *command[1:], "--json", "-"], place="s.toml")
 
 
 def recording(content: bytes, folder: Path) -> None:
@@ -77,6 +85,7 @@ def options(words: list[str], folder: Path) -> None:
 
 KINDS: dict[str, tuple[st.SearchStrategy, object]] = {
     "studies": (strategies.STUDY_FILES, study),
+    "numbers": (strategies.NUMBERS, number),
     "recordings": (strategies.RECORDING_FILES, recording),
     "cams": (strategies.CAM_FILES, cam),
     "allocations": (strategies.ALLOCATION_FILES, allocation),

@@ -62,7 +62,7 @@ def main() -> None:
     (asked.out / "failures").mkdir(parents=True, exist_ok=True)
     state_file = asked.out / "state.json"
     state = json.loads(state_file.read_text()) if state_file.is_file() else {}
-    if state.get("seed") != asked.seed:
+    if state.get("seed") != asked.seed or state["kinds"].keys() != KINDS.keys():
         state = {"seed": asked.seed, "kinds": {kind: {"rounds": 0, "inputs": 0, "failures": 0} for kind in KINDS}}
     began, spent = time.monotonic(), state.get("seconds", 0.0)
     todo = True

@@ -7,9 +7,11 @@ files, bytes that are no text.
 from __future__ import annotations
 
 import json
+from copy import deepcopy
 
 from hypothesis import strategies as st
 
+from hdopt.study import leaves, load_study
 from hdopt.study.write import study_toml
 
 ANY_TEXT = st.text(st.characters(exclude_categories=("Cs",)), max_size=30)
@@ -140,6 +142,35 @@ ALLOCATION_FILES = damaged(
         WRONG,
     ).map(json.dumps)
 )
+
+STUDIES = {name: load_study(name).data for name in ("csf-25-80-tolerances", "chase-shaft-housing")}
+COMMANDS = {
+    "csf-25-80-tolerances": [["profile"]] * 12 + [["stack", "-n", "2048"]] * 2 + [["ke", "--method", "closed form"]],
+    "chase-shaft-housing": [["stack", "-n", "2048"], ["allocate", "--no-compare"]],
+}
+MAGNITUDES = [0.0, -1.0, 5e-324, 1e-300, 1e-14, 1e-6, 1e-3, 1e3, 1e6, 1e14, 1e300, 1e308, -1e308]
+
+
+@st.composite
+def _one_number(draw) -> tuple[str, list[str]]:
+    """A shipped study with one of its numbers far off, each allowed by itself, and a command that computes with it."""
+    name = draw(st.sampled_from(sorted(STUDIES)))
+    data = deepcopy(STUDIES[name])
+    paths = [path for path in leaves(data) if type(_table(data, path)[path[-1]]) in (int, float)]
+    path = draw(st.sampled_from(paths))
+    value = draw(st.one_of(st.sampled_from(MAGNITUDES), st.floats(-308, 308).map(lambda decades: 10.0**decades)))
+    _table(data, path)[path[-1]] = value
+    data.setdefault("allocate", {}).update(verify_n=2**14, curve=[])
+    return study_toml(data), draw(st.sampled_from(COMMANDS[name]))
+
+
+def _table(data: dict, path: tuple[str, ...]) -> dict:
+    for part in path[:-1]:
+        data = data[part]
+    return data
+
+
+NUMBERS = _one_number()
 
 KEYS = ["axis_tilt_x_deg", "wave_generator.width_mm", "width_mm", "module_mm", "upper", "profile", "steps", ""]
 OPTIONS = st.lists(

@@ -5,7 +5,7 @@ from hypothesis import HealthCheck, given, settings
 
 from tests.fuzz.rule import KINDS
 
-EXAMPLES = {"studies": 60, "recordings": 100, "cams": 40, "allocations": 200, "options": 60}
+EXAMPLES = {"studies": 60, "numbers": 30, "recordings": 100, "cams": 40, "allocations": 200, "options": 60}
 MANY = 500
 
 
