@@ -197,13 +197,27 @@ def _bore(part: Part, model: WaveGeneratorModel) -> Callout | None:
         return None
     diameter = 2 * part.bore.radius
     if part.clearance_hole:
-        return Callout(polar(part.bore.radius, place), (f"hole Ø{diameter:g} H11 through",))
+        return Callout(polar(part.bore.radius, place), (f"hole Ø{diameter:g} H11 through", *_countersunk(part)))
     fit = model.plan.hole_of(part.name)
     named = f"bore Ø{diameter:g} {fit.hole} {_limits(fit.hole_limits)}" if fit else f"bore Ø{diameter:g}"
-    finish = f"Ra 0.8; countersunk {part.countersink:g} × 45°" if part.countersink else "Ra 0.8"
     faces = (Cylinder(part.bore.radius),)
     limits = (diameter, *fit.hole_limits) if fit else None
-    return Callout(polar(part.bore.radius, place), (named, finish), datum="A", faces=faces, size=limits)
+    return Callout(
+        polar(part.bore.radius, place),
+        (named, "; ".join(("Ra 0.8", *_countersunk(part)))),
+        datum="A",
+        faces=faces,
+        size=limits,
+    )
+
+
+def _countersunk(part: Part) -> tuple[str, ...]:
+    """At which of its ends the bore of a `part` is countersunk."""
+    if not part.countersink or not part.countersunk:
+        return ()
+    ends = {side for _, side in part.countersunk}
+    where = "at both ends" if len(ends) == 2 else "at the front" if 1 in ends else "at the back"
+    return (f"countersunk {part.countersink:g} × 45° {where}",)
 
 
 def _limits(limits: tuple[float, float]) -> str:
@@ -298,7 +312,8 @@ def _seat(part: Part, model: WaveGeneratorModel) -> Callout | None:
     at = polar(circle.radius, math.radians(60))
     limits = (2 * circle.radius, *fit.shaft_limits)
     if circle.offset:
-        frames = (Frame("position", zone, True, _datums(part)),) if zone else ()
+        # Without a bound of the eccentricity, the journals share the discs' zone, as their offset's limits do.
+        frames = (Frame("position", zone or model.profile_zone / 2, True, _datums(part)),)
         boxed = (f"±{circle.offset:.4f} off the axis",)
         faces = tuple(Cylinder(circle.radius, (0.0, sign * circle.offset)) for sign in (1, -1))
         tip = (at[0], at[1] + circle.offset)
@@ -348,12 +363,12 @@ def _face(part: Part, model: WaveGeneratorModel) -> Callout | None:
 
 def _edges(part: Part) -> Callout | None:
     texts = []
-    for piece in part.body:
-        if isinstance(piece, Prism):
-            for edge in (piece.bottom_edge, piece.top_edge):
-                if edge.axial:
-                    slope = math.degrees(math.atan2(edge.radial, edge.axial))
-                    texts.append(f"{edge.axial:g} × {slope:.3g}°")
+    prisms = [piece for piece in part.body if isinstance(piece, Prism)]
+    for place, edges in (("back", "bottom_edge"), ("front", "top_edge")):
+        for edge in dict.fromkeys(getattr(piece, edges) for piece in prisms):
+            if edge.axial:
+                slope = math.degrees(math.atan2(edge.radial, edge.axial))
+                texts.append(f"{edge.axial:g} × {slope:.3g}° at the {place}")
     if not texts:
         return None
-    return Callout(polar(0.99 * part.box[3], math.radians(115)), ("outer edges: " + ", ".join(dict.fromkeys(texts)),))
+    return Callout(polar(0.99 * part.box[3], math.radians(115)), ("outer edges: " + ", ".join(texts),))

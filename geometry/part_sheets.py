@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hdopt.geometry.arcs import outline_of_slot, outline_of_strip, sample
 from hdopt.geometry.callouts import Callout, callouts_of
 from hdopt.geometry.contour import Circle
 from hdopt.geometry.day import moment
@@ -25,6 +26,8 @@ from hdopt.geometry.materials import mass, material
 from hdopt.geometry.mating_drawing import fill_mating_sheet
 from hdopt.geometry.part import Part, Prism
 from hdopt.geometry.sheet import FRAME_HEIGHT, SMALL, TEXT, Point, Sheet, Solid, text_width
+from hdopt.geometry.sheet_details import draw_details, mark_details
+from hdopt.geometry.sheet_lengths import STACK, axial_spans, draw_lengths
 from hdopt.geometry.step import ProductData
 from hdopt.geometry.views import half_behind_minor_axis_zero, section_at_minor_axis_zero, seen_from
 
@@ -38,8 +41,11 @@ FRONT_CENTRE, FRONT_ROOM = (92.0, 98.0), 116.0
 SECTION_CENTRE, SECTION_ROOM = (216.0, 98.0), 44.0
 COLUMN_LEFT, COLUMN_TOP, COLUMN_STEP = 282.0, 22.0, 5.0
 TITLE_LEFT, TITLE_TOP = 232.0, 209.0
-STACK = 8.0
-"""Distance between dimension lines, mm."""
+DETAILS = (276.0, 149.0)
+"""Upper left of the detail views."""
+
+BALLOON = 2.6
+"""Radius of the ring round a number, mm."""
 
 APART = math.radians(12)
 """Least angle between two numbers beside a view."""
@@ -107,6 +113,11 @@ def _frame(sheet: Sheet) -> None:
 
 
 def _front(sheet: Sheet, place: Placed, part: Part, solid: cq.Solid) -> None:
+    if part.slot is not None:
+        # It is cut into the back, which the front view does not show.
+        slot = part.slot
+        rows = outline_of_slot(slot) if slot.closed else outline_of_strip(slot.width, slot.disc_radius, slot.direction)
+        sheet.polyline(place(sample(rows)), "hidden", closed=True)
     draw_view(sheet, place, seen_from([solid], *FRONT))
     box, over = part.box, 5 / place.scale
     sheet.line(place.point(box[0] - over, 0), place.point(box[3] + over, 0), "axis")
@@ -150,23 +161,10 @@ def _section(sheet: Sheet, place: Placed, part: Part, solid: cq.Solid) -> None:
     top, bottom = place.point(0, box[4])[1], place.point(0, box[1])[1]
     middle = place.point((part.bottom + part.top) / 2, 0)[0]
     sheet.text((middle, top - 14), "A – A", 5, "middle", bold=True)
-    _heights(sheet, place, part, box[1], bottom)
+    draw_lengths(sheet, axial_spans(part), place.point(0, 0)[0], place.scale, bottom)
     _diameters(sheet, place, part)
-
-
-def _heights(sheet: Sheet, place: Placed, part: Part, edge: float, bottom: float) -> None:
-    """Axial lengths, a line each: pieces, slot, then the whole."""
-    spans = [(piece.bottom, piece.top) for piece in part.body] if len(part.body) > 1 else []
-    for piece in part.body:
-        if isinstance(piece, Prism) and piece.groove is not None:
-            # Where the ring stands, from the step below it.
-            spans.append((piece.bottom, piece.groove.bottom))
-    if part.slot:
-        spans.append((part.bottom, part.bottom + part.slot.depth))
-    spans.append((part.bottom, part.top))
-    for row, (low, high) in enumerate(dict.fromkeys(spans)):
-        start, end = place.point(low, edge), place.point(high, edge)
-        sheet.dimension(start, end, bottom + STACK * (row + 1), f"{high - low:g}", False)
+    mark_details(sheet, part, place.point(0, 0), place.scale)
+    draw_details(sheet, part, DETAILS)
 
 
 def _diameters(sheet: Sheet, place: Placed, part: Part) -> None:
@@ -197,7 +195,7 @@ def _column(sheet: Sheet, place: Placed, callouts: Sequence[Callout]) -> None:
     for number, callout in enumerate(callouts, 1):
         tip, end = tips[number - 1], ends[number - 1]
         _balloon(sheet, (COLUMN_LEFT - 5, y - 1.2), number)
-        sheet.line(tip, end)
+        sheet.line(tip, _toward(end, tip))
         sheet.arrow(tip, math.atan2(tip[1] - end[1], tip[0] - end[0]))
         _balloon(sheet, end, number)
         for line in callout.lines:
@@ -229,8 +227,14 @@ def _datum(sheet: Sheet, at: tuple[float, float], letter: str) -> None:
 
 
 def _balloon(sheet: Sheet, centre: tuple[float, float], number: int) -> None:
-    sheet.circle(centre, 2.6, "thin", "#ffffff")
+    sheet.circle(centre, BALLOON, "thin", "#ffffff")
     sheet.text((centre[0], centre[1] + 1.0), str(number), 2.9, "middle")
+
+
+def _toward(centre: Point, tip: Point) -> Point:
+    """Where a line from `tip` to a balloon at `centre` meets its ring."""
+    share = BALLOON / max(math.dist(centre, tip), BALLOON)
+    return centre[0] + share * (tip[0] - centre[0]), centre[1] + share * (tip[1] - centre[1])
 
 
 def _balloon_places(tips: Sequence[Point], centre: Point) -> list[Point]:
@@ -288,15 +292,19 @@ def _title(sheet: Sheet, job: Job, name: str, number: str, scale: float, part: P
     if part is not None:
         made_of = material(part, job.options)
         lines += [made_of.label, made_of.hardness_label]
-        grams, density = 1e3 * mass(part, job.options), 1e6 * made_of.density
-        lines.append(f"mass {grams:.4g} g at {density:.4g} g/cm³   volume {part.volume:.2f} mm³")
+        weight, density = _weight(mass(part, job.options)), 1e6 * made_of.density
+        lines.append(f"mass {weight} at {density:.4g} g/cm³   volume {part.volume:.2f} mm³")
     else:
         total = sum(mass(item, job.options) for item, _ in job.made)
-        lines.append(f"mass of all parts {1e3 * total:.4g} g")
+        lines.append(f"mass of all parts {_weight(total)}")
     lines += [*NOTES, f"{job.identity.description}; first-angle projection"]
     for row, line in enumerate(lines):
         sheet.text((x + 4, y + 22 + 5.4 * row), line, SMALL)
     draw_first_angle(sheet, (right - 18, y + 9))
+
+
+def _weight(kilograms: float) -> str:
+    return f"{kilograms:.4g} kg" if kilograms >= 1 else f"{1e3 * kilograms:.4g} g"
 
 
 def _assembly(job: Job) -> Sheet:
@@ -343,7 +351,7 @@ def _numbers(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], top
         tips.append((y, x, number))
     for row, (y, x, number) in enumerate(sorted(tips)):
         end = top + (bottom - top) * (row + 0.5) / (2 * len(tips))
-        sheet.line((x, y), (right - 2.6, end))
+        sheet.line((x, y), _toward((right, end), (x, y)))
         _balloon(sheet, (right, end), number)
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
 
+import numpy as np
 import pytest
 from wave_generators import drive, scaled
 
@@ -15,7 +17,9 @@ from hdopt.geometry.job import make_job
 from hdopt.geometry.mating_drawing import fill_mating_sheet
 from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.part_sheets import HEIGHT, WIDTH, sheets
-from hdopt.geometry.sheet import Sheet, label_box, text_width
+from hdopt.geometry.sheet import Line, Ring, Sheet, label_box, text_width
+from hdopt.geometry.sheet_details import outline
+from hdopt.geometry.undercut import AT_SHOULDER, IN_CORNER, Undercut
 
 pytestmark = pytest.mark.slow
 
@@ -24,12 +28,16 @@ AXIS = {"axis_eccentricity_mm": 0.015, "axis_tilt_y_deg": 0.2, "axis_tilt_x_deg"
 
 CASES = [
     ("ellipse", Structure.INTEGRAL, 1.0),
-    ("two_disk", Structure.AUTOMATIC, 0.4),
-    ("two_disk", Structure.INTEGRAL, 4.0),
+    ("ellipse", Structure.AUTOMATIC, 0.4),
     ("ellipse", Structure.ONE_WAY_MAJOR, 4.0),
-    ("ellipse", Structure.INTEGRAL, 0.4),
     ("resal", Structure.ONE_WAY_MINOR, 1.0),
+    ("two_disk", Structure.INTEGRAL, 4.0),
+    ("two_disk", Structure.AUTOMATIC, 4.0),
+    ("two_disk", Structure.ONE_WAY_MAJOR, 0.4),
+    ("two_disk", Structure.ONE_WAY_MINOR, 0.2),
+    ("ellipse", Structure.INTEGRAL, 0.2),
 ]
+"""Every structure with a cam and with discs; drives of 12 mm to 250 mm."""
 
 
 def job_of(profile, structure, scale):
@@ -49,6 +57,33 @@ def test_no_text_lies_on_another_or_off_the_sheet(profile, structure, scale):
         for (first, a), (second, b) in itertools.combinations(boxes, 2):
             apart = a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
             assert apart, f"{sheet.title}: {first!r} lies on {second!r}"
+        assert crossed(sheet) == [], sheet.title
+
+
+def crossed(sheet):
+    """Texts that a line runs through: it enters the box, less 0.2 mm of play, between its two ends."""
+    pieces = []
+    for mark in sheet.marks:
+        if isinstance(mark, Ring):
+            turn = np.linspace(0, 2 * np.pi, 61)
+            points = np.column_stack([np.cos(turn), np.sin(turn)]) * mark.radius + mark.centre
+        elif isinstance(mark, Line):
+            points = np.vstack([mark.points, mark.points[:1]]) if mark.closed else mark.points
+        else:
+            continue
+        pieces.append(np.stack([points[:-1], points[1:]], axis=1))
+    starts, ends = np.moveaxis(np.concatenate(pieces), 1, 0)
+    steps = np.where(np.abs(ends - starts) < 1e-9, 1e-9, ends - starts)
+    found = []
+    for label in sheet.labels:
+        left, top, right, low = label_box(label)
+        shares = np.sort(
+            [(np.array([left, top]) + 0.2 - starts) / steps, (np.array([right, low]) - 0.2 - starts) / steps], 0
+        )
+        enters, leaves = np.maximum(shares[0].max(1), 0.0), np.minimum(shares[1].min(1), 1.0)
+        if label.content and (enters < leaves).any():
+            found.append(label.content)
+    return found
 
 
 def test_widths_of_texts_are_those_of_the_font():
@@ -69,6 +104,8 @@ def test_every_datum_is_drawn_once_and_used(profile, structure):
         round_rim = profile == "two_disk"
         for callout in callouts:
             assert not (callout.boxed and "profile" in callout.lines[0] and round_rim)
+            # A theoretically exact dimension has no tolerance but its frame's.
+            assert callout.frames or not callout.boxed, callout.lines
             if part.name == "cam":
                 assert all(frame.symbol != "coaxiality" for frame in callout.frames)
 
@@ -81,6 +118,52 @@ def test_frames_take_their_zones_from_the_budget():
     assert profile.zone == pytest.approx(0.0075) and profile.datums == "DE"
     hub = [frame for callout in callouts_of(job.model.part("hub"), job.model) for frame in callout.frames]
     assert next(frame for frame in hub if frame.symbol == "coaxiality").value == "Ø0.0075"
+
+
+def sheet_of(job, name):
+    return next(sheet for sheet in sheets(job) if sheet.title.startswith(name))
+
+
+def test_undercuts_have_details_with_their_sizes():
+    job = job_of("two_disk", Structure.INTEGRAL, 1.0)
+    said = [label.content for label in sheet_of(job, "eccentric hub").labels]
+    # One corner at the flange, two at the step between the journals.
+    assert said.count("Z") == 1 and said.count("Y") == 2
+    assert "Z  20:1  DIN 509-E0.2×0.1" in said and "Y  20:1  relief" in said
+    for size in ("R0.2", "R0.1", "0.6", "1"):
+        assert size in said
+    assert said.count("15°") == 2 and said.count("0.1") == 2
+    plain = [label.content for label in sheet_of(job, "disc 1").labels]
+    assert not {"Z", "Y", "15°"} & set(plain)
+
+
+@pytest.mark.parametrize("undercut", [AT_SHOULDER, IN_CORNER, Undercut(2.5, 0.3, 0.6)])
+def test_detail_has_the_outline_of_the_undercut(undercut):
+    """Its radius, depth, length and slope, each measured on the points drawn."""
+    made = outline(undercut)
+    arc, foot, end = made[:-2], made[-2], made[-1]
+    centre = (undercut.radius, undercut.radius - undercut.depth)
+    assert np.hypot(*(arc - centre).T) == pytest.approx(np.full(len(arc), undercut.radius))
+    assert arc[0] == pytest.approx((0.0, centre[1])) and arc[-1] == pytest.approx((undercut.radius, -undercut.depth))
+    assert foot[1] == -undercut.depth and end == pytest.approx((undercut.length, 0.0))
+    assert math.degrees(math.atan2(end[1] - foot[1], end[0] - foot[0])) == pytest.approx(15.0)
+
+
+def test_countersinks_and_edges_say_at_which_end():
+    model = job_of("ellipse", Structure.ONE_WAY_MINOR, 1.0).model
+    cam = [line for callout in callouts_of(model.part("cam"), model) for line in callout.lines]
+    assert "countersunk 0.5 × 45° at the front" in cam
+    assert "outer edges: 0.3 × 45° at the back, 1 × 15° at the front" in cam
+
+
+def test_slot_in_the_back_lies_hidden_in_the_front_view():
+    job = job_of("ellipse", Structure.ONE_WAY_MINOR, 1.0)
+    hidden = [mark for mark in sheet_of(job, "cam").marks if isinstance(mark, Line) and mark.kind == "hidden"]
+    slot, scale = job.model.part("cam").slot, 2.0
+    assert len(hidden) == 1
+    wide, high = np.ptp(hidden[0].points, axis=0)
+    # Along the minor axis, which lies across the sheet.
+    assert (wide, high) == pytest.approx((scale * 2 * slot.reach, scale * slot.width), rel=1e-3)
 
 
 def test_sheets_as_pdf_and_as_archive(tmp_path, monkeypatch):
