@@ -40,8 +40,7 @@ def triangles(solid: cq.Solid) -> tuple[Triangles, Array, Index]:
     # Faces mesh their common edge with the same points; to a nanometre they are one.
     _, first, same = np.unique(np.round(vertices, 6), axis=0, return_index=True, return_inverse=True)
     vertices, indices = vertices[first], same.reshape(-1)[np.array(corners)]
-    alive = np.array([len(set(row)) == 3 for row in indices.tolist()])
-    indices = indices[alive]
+    indices = indices[(indices != np.roll(indices, 1, axis=1)).all(axis=1)]
     return vertices[indices], vertices, indices
 
 
@@ -147,9 +146,10 @@ def _faults(mesh: Triangles, parts: list[Part], job: Job, what: str) -> list[str
     _, corners = np.unique(np.round(mesh.reshape(-1, 3), 4), axis=0, return_inverse=True)
     corners = corners.reshape(-1, 3)
     edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
-    directed, times = np.unique(edges, axis=0, return_counts=True)
-    back = {(b, a): n for (a, b), n in zip(directed.tolist(), times.tolist(), strict=True)}
-    if any(back.get((a, b)) != n for (a, b), n in zip(directed.tolist(), times.tolist(), strict=True) if a != b):
+    edges = edges[edges[:, 0] != edges[:, 1]].astype(np.int64)
+    # Every edge is walked as often forth as back.
+    ways = edges @ np.array([[int(corners.max()) + 1, 1], [1, int(corners.max()) + 1]])
+    if not np.array_equal(np.sort(ways[:, 0]), np.sort(ways[:, 1])):
         failures.append(f"{what} is not closed: an edge lacks its neighbour")
     volume = float(np.einsum("ij,ij->i", mesh[:, 0], np.cross(mesh[:, 1], mesh[:, 2])).sum() / 6)
     expected = sum(part.volume for part in parts)

@@ -164,6 +164,9 @@ def test_hole_in_a_mesh(monkeypatch, tmp_path):
         return found[1:], vertices, indices[1:]
 
     monkeypatch.setattr(mesh, "triangles", torn)
+    # Coarse: a hole is a hole.
+    monkeypatch.setattr(mesh, "CHORD", 0.1)
+    monkeypatch.setattr(mesh, "ANGLE", 0.5)
     plain = ExportOptions(hub=False, mount="plain", chamfer_mm=0, lead_in_length_mm=0)
     for kind in ("stl", "3mf"):
         with pytest.raises(CheckFailed, match="is not closed: an edge lacks its neighbour"):
