@@ -13,7 +13,8 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 from hdopt.geometry.contour import Circle, Contour, ParallelCurve
-from hdopt.geometry.features import Bore, DBore, KeywayBore, Slot
+from hdopt.geometry.features import Bore, DBore, KeywayBore
+from hdopt.geometry.slide_features import Slot
 
 ARC_TOLERANCE = 2e-5
 """Largest distance between a curve and its arcs, mm."""

@@ -71,7 +71,7 @@ def _sliding(carrier: Cam | TwoDiscs, structure: Structure) -> tuple[Part, ...]:
     else:
         thickness = slide.depth + carrier.wall
         slot = slide.carrier_slot(math.inf, thickness)
-        driven = carrier.parts(bore, slot.reach + carrier.wall, thickness, slot)
+        driven = carrier.parts(bore, slot.mouth_reach + carrier.wall, thickness, slot)
         back = driven[0].bottom
     between: tuple[Part, ...] = ()
     if structure is Structure.AUTOMATIC:

@@ -16,7 +16,8 @@ from hdopt.geometry.din471 import ring_of
 from hdopt.geometry.features import BoltCircle, DBore, KeywayBore, polar
 from hdopt.geometry.iso286 import deviations
 from hdopt.geometry.model import WaveGeneratorModel
-from hdopt.geometry.part import Part, Prism, Tongue
+from hdopt.geometry.part import Part, Prism
+from hdopt.geometry.slide_features import SlideEdges, Tongue
 from hdopt.geometry.threads import THREADS
 from hdopt.geometry.undercut import AT_SHOULDER, Undercut
 
@@ -283,10 +284,19 @@ def _slot(part: Part) -> Callout | None:
     if slot is None:
         return None
     ends = f"ends R{slot.width / 2:g}, {2 * slot.reach:.4g} long" if slot.closed else "open at both ends"
-    lines = (f"slot {slot.width:g}, {slot.depth:g} deep, from the back", f"{ends}; bottom corners R 0.2 max; Ra 0.8")
+    lines = (
+        f"slot {slot.width:g}, {slot.depth:g} deep, from the back",
+        f"{ends}; Ra 0.8",
+        f"bottom corners {_cornered(slot.edges)}",
+        f"mouth {slot.edges.chamfer:g} × 45°",
+    )
     sides = (Flank(slot.width / 2, slot.direction + math.pi / 2),)
     letter = "B" if secondary(part) == "slot" else ""
     return Callout(polar(0.8 * slot.half_length, slot.direction), lines, datum=letter, faces=sides)
+
+
+def _cornered(edges: SlideEdges) -> str:
+    return f"R or × 45° up to {edges.corner:g}"
 
 
 def _block(part: Part, model: WaveGeneratorModel) -> Callout | None:
@@ -295,7 +305,8 @@ def _block(part: Part, model: WaveGeneratorModel) -> Callout | None:
         return None
     zone = model.plan.zone(part.name, "wg_eccentricity")
     frames = (Frame("symmetry", zone, False, "A"),) if zone else ()
-    lines = (f"block {block.width:g}, {block.height:g} high; Ra 0.8",)
+    edges = f"foot {_cornered(block.edges)}; upper edges {block.edges.chamfer:g} × 45°"
+    lines = (f"block {block.width:g}, {block.height:g} high; Ra 0.8", edges)
     sides = (Flank(block.width / 2, block.direction + math.pi / 2),)
     return Callout(polar(0.8 * block.radius, block.direction), lines, frames, faces=sides)
 
@@ -313,7 +324,7 @@ def _seat(part: Part, model: WaveGeneratorModel) -> Callout | None:
     limits = (2 * circle.radius, *fit.shaft_limits)
     if circle.offset:
         # Without a bound of the eccentricity, the journals share the discs' zone, as their offset's limits do.
-        frames = (Frame("position", zone or model.profile_zone / 2, True, _datums(part)),)
+        frames: tuple[Frame, ...] = (Frame("position", zone or model.profile_zone / 2, True, _datums(part)),)
         boxed = (f"±{circle.offset:.4f} off the axis",)
         faces = tuple(Cylinder(circle.radius, (0.0, sign * circle.offset)) for sign in (1, -1))
         tip = (at[0], at[1] + circle.offset)

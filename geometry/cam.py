@@ -10,8 +10,9 @@ from hdopt.geometry.carrier import MAJOR, Carrier
 from hdopt.geometry.choices import Choices
 from hdopt.geometry.colours import DARK_STEEL, STEEL
 from hdopt.geometry.contour import Circle, ParallelCurve
-from hdopt.geometry.features import BoltCircle, Bore, PlainBore, Slot
+from hdopt.geometry.features import BoltCircle, Bore, PlainBore
 from hdopt.geometry.part import Part, Prism, ProfiledPart
+from hdopt.geometry.slide_features import Slot
 from hdopt.geometry.threads import THREAD_FOR_RADIUS, THREADS
 from hdopt.geometry.undercut import AT_SHOULDER, IN_CORNER, Undercut
 

@@ -10,8 +10,9 @@ from hdopt.geometry.budget import FIT_SHARE
 from hdopt.geometry.carrier import MAJOR, MINOR, Carrier
 from hdopt.geometry.colours import BRONZE, GREEN
 from hdopt.geometry.contour import Circle
-from hdopt.geometry.features import PlainBore, Slot
-from hdopt.geometry.part import Part, Prism, Tongue
+from hdopt.geometry.features import PlainBore
+from hdopt.geometry.part import Part, Prism
+from hdopt.geometry.slide_features import SlideEdges, Slot, Tongue
 
 
 class CrossSlide:
@@ -67,16 +68,24 @@ class CrossSlide:
     def _direction(self, number: int) -> float:
         return MAJOR if number == 1 else MINOR
 
+    def _edges(self, number: int) -> SlideEdges:
+        return SlideEdges.of(self.widths[number], self.depth)
+
+    def _block(self, number: int, bottom: float) -> Tongue:
+        """The block that runs in a slot, on a face at z = `bottom`."""
+        width = self.widths[number] - self.clearance
+        return Tongue(self.radius, width, self._direction(number), bottom, bottom + self.depth, self._edges(number))
+
     def carrier_slot(self, room: float, thickness: float) -> Slot:
         """The slot in the cam's back, closed at both ends: the last slot of the chain."""
         number, wall = self.structure.slots[-1], self.carrier.wall
         width = self.widths[number]
         straight = math.sqrt(self.radius**2 - width**2 / 4) + self.travel
-        slot = Slot(width, self.depth, straight, self._direction(number), self.radius, closed=True)
-        if slot.reach + wall > room:
+        slot = Slot(width, self.depth, straight, self._direction(number), self.radius, True, self._edges(number))
+        if slot.mouth_reach + wall > room:
             raise HdoptError(
-                f"slot {number} for a disc of {2 * self.radius:g} mm reaches {slot.reach:.4g} mm from the axis; the "
-                f"cam allows {room - wall:.4g} mm; give a smaller clearances.disc_radius_mm"
+                f"slot {number} for a disc of {2 * self.radius:g} mm reaches {slot.mouth_reach:.4g} mm from the axis; "
+                f"the cam allows {room - wall:.4g} mm; give a smaller clearances.disc_radius_mm"
             )
         if self.depth + wall > thickness:
             raise HdoptError(
@@ -90,9 +99,9 @@ class CrossSlide:
         top = back - self.gap
         body = (
             Prism(Circle(self.radius), top - self.thickness, top),
-            Tongue(self.radius, self.widths[2] - self.clearance, MINOR, top, top + self.depth),
+            self._block(2, top),
         )
-        slot = Slot(self.widths[1], self.depth, self.radius, MAJOR, self.radius, closed=False)
+        slot = Slot(self.widths[1], self.depth, self.radius, MAJOR, self.radius, False, self._edges(1))
         return Part("floating_disc", GREEN, body, bore, slot=slot, clearance_hole=True)
 
     def input_disc(self, back: float) -> Part:
@@ -104,7 +113,7 @@ class CrossSlide:
         edge = self.carrier.chamfer()
         body = (
             Prism(Circle(self.radius), top - self.thickness, top, bottom_edge=edge),
-            Tongue(self.radius, self.widths[number] - self.clearance, direction, top, top + self.depth),
+            self._block(number, top),
         )
         face = ((body[0].bottom, -1),)
         return Part("input_disc", BRONZE, body, bore, self.carrier.countersink(bore), face)

@@ -18,7 +18,8 @@ from hdopt.arrays import Array
 from hdopt.geometry.arcs import outline_of, outline_of_bore, outline_of_slot, outline_of_strip
 from hdopt.geometry.callouts import hole_note
 from hdopt.geometry.contour import Circle, Contour
-from hdopt.geometry.part import Part, Prism, Tongue
+from hdopt.geometry.part import Part, Prism
+from hdopt.geometry.slide_features import Tongue
 
 if TYPE_CHECKING:
     from hdopt.geometry.job import Job
@@ -77,7 +78,7 @@ def _of_part(job: Job, part: Part) -> Iterator[Outline]:
         high = f"stands {piece.height:g} high, z = {piece.bottom:g} to {piece.top:g}"
         if isinstance(piece, Tongue):
             rows = outline_of_strip(piece.width, piece.radius, piece.direction)
-            yield Outline("BLIND_BLOCK", rows, piece.volume / piece.height, note=high)
+            yield Outline("BLIND_BLOCK", rows, piece.area, note=high)
         else:
             yield replace(_along("BLIND_STEP", piece.outline), note=high)
     if part.slot:

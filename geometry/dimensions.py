@@ -17,7 +17,8 @@ from hdopt.geometry.din471 import ring_of
 from hdopt.geometry.features import DBore, KeywayBore
 from hdopt.geometry.iso286 import deviations
 from hdopt.geometry.model import WaveGeneratorModel
-from hdopt.geometry.part import Part, Prism, Tongue
+from hdopt.geometry.part import Part, Prism
+from hdopt.geometry.slide_features import Tongue
 
 ECCENTRICITY, TILTS = "wg_eccentricity_mm", ("wg_tilt_major_deg", "wg_tilt_minor_deg")
 """The errors that a wave generator's own parts make; all others come from housing, shaft and splines."""

@@ -1,4 +1,4 @@
-"""What is cut into a part: bores with their keyway or flat, cross-slide slots, bolt circles, broken edges.
+"""What is cut into a part: bores with their keyway or flat, bolt circles, broken edges.
 
 Every feature knows its area in closed form (for the check of a file) and its cutting tool as a CadQuery shape. A
 feature that has a direction has it at `direction` rad, clockwise from the major axis.
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from hdopt.errors import HdoptError
-from hdopt.geometry.areas import obround, round_corner, segment_of_disc, slot_outside_disc, strip_of_disc
+from hdopt.geometry.areas import round_corner, segment_of_disc, slot_outside_disc, strip_of_disc
 from hdopt.geometry.din6885 import Key
 
 if TYPE_CHECKING:
@@ -216,41 +216,6 @@ def countersink_tool(bore: Bore, size: float, face: float, outward: int) -> cq.S
         cq.Vector(0, 0, face + outward * margin),
         cq.Vector(0, 0, -outward),
     )
-
-
-@dataclass(frozen=True)
-class Slot:
-    """A cross-slide slot `width` mm wide, cut `depth` deep into a part's back along `direction`.
-
-    `half_length` is where its straight flanks end, from the axis; `closed` slots end round, in the part, open ones run
-    out of a disc of `disc_radius`.
-    """
-
-    width: float
-    depth: float
-    half_length: float
-    direction: float
-    disc_radius: float
-    closed: bool
-
-    @property
-    def reach(self) -> float:
-        return self.half_length + self.width / 2 if self.closed else self.disc_radius
-
-    @property
-    def area(self) -> float:
-        return obround(2 * self.half_length, self.width) if self.closed else strip_of_disc(self.width, self.disc_radius)
-
-    def tool(self, face: float) -> list[cq.Shape]:
-        """The milling cutter's path, from below `face` up into the part."""
-        top, below = face + self.depth, face - 1.0
-        flanks = bar(-self.half_length, self.half_length, self.width, below, top, self.direction)
-        if not self.closed:
-            return [bar(-2 * self.disc_radius, 2 * self.disc_radius, self.width, below, top, self.direction)]
-        ends = [
-            cylinder(self.width / 2, below, top, polar(sign * self.half_length, self.direction)) for sign in (-1, 1)
-        ]
-        return [flanks, *ends]
 
 
 @dataclass(frozen=True)

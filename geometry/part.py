@@ -6,18 +6,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from hdopt.arrays import Array, Mask
-from hdopt.geometry.areas import strip_of_disc
 from hdopt.geometry.contour import Circle, Contour, ParallelCurve
 from hdopt.geometry.features import (
     BoltCircle,
     Bore,
     BrokenEdge,
-    Slot,
-    bar,
     countersink_tool,
     countersink_volume,
-    cylinder,
 )
+from hdopt.geometry.slide_features import Slot, Tongue
 from hdopt.geometry.solids import Station, joined, loft, turn
 from hdopt.geometry.undercut import RingGroove, Stretch, Undercut
 
@@ -63,8 +60,8 @@ class Prism:
             broken += sum(recess.removed_volume(self.outline.radius) for recess in self.recesses)
         return (self.outline.area - (self.inner.area if self.inner else 0.0)) * self.height - broken
 
-    def bore_area(self, bore: Bore) -> float:
-        return bore.area_with_disc(0.0)
+    def bore_volume(self, bore: Bore) -> float:
+        return bore.area_with_disc(0.0) * self.height
 
     def contains(self, points: Array, margin: float) -> Mask:
         """Which points (n, 3) lie in a prism with unbroken edges, deeper than `margin` mm."""
@@ -108,32 +105,6 @@ class Prism:
 
 
 @dataclass(frozen=True)
-class Tongue:
-    """The block of a cross-slide: the strip of `width` along `direction` of a disc of `radius`."""
-
-    radius: float
-    width: float
-    direction: float
-    bottom: float
-    top: float
-
-    @property
-    def height(self) -> float:
-        return self.top - self.bottom
-
-    @property
-    def volume(self) -> float:
-        return strip_of_disc(self.width, self.radius) * self.height
-
-    def bore_area(self, bore: Bore) -> float:
-        return bore.area_in_strip(self.width)
-
-    def build(self) -> cq.Shape:
-        strip = bar(-2 * self.radius, 2 * self.radius, self.width, self.bottom, self.top, self.direction)
-        return cylinder(self.radius, self.bottom, self.top).intersect(strip)
-
-
-@dataclass(frozen=True)
 class Part:
     """One solid: prisms and tongues stacked along z, less a bore through all of them, a slot and bolt holes.
 
@@ -173,11 +144,10 @@ class Part:
         """mm^3, in closed form from outlines, features and heights."""
         volume = sum(piece.volume for piece in self.body)
         if self.bore:
-            volume -= sum(piece.bore_area(self.bore) * piece.height for piece in self.body)
+            volume -= sum(piece.bore_volume(self.bore) for piece in self.body)
             volume -= len(self.countersunk) * countersink_volume(self.bore, self.countersink)
         if self.slot:
-            already = self.bore.area_in_strip(self.slot.width) if self.bore else 0.0
-            volume -= (self.slot.area - already) * self.slot.depth
+            volume -= self.slot.volume_beside(self.bore)
         if self.bolts:
             volume -= self.bolts.area * sum(piece.height for piece in self.body if self.holds_bolts(piece))
         return volume

@@ -14,8 +14,9 @@ from hdopt.geometry.choices import Choices
 from hdopt.geometry.colours import DARK_STEEL, LIGHT_STEEL, STEEL
 from hdopt.geometry.contour import Circle
 from hdopt.geometry.din471 import ring_of, smallest_ring
-from hdopt.geometry.features import Bore, BrokenEdge, Slot
+from hdopt.geometry.features import Bore, BrokenEdge
 from hdopt.geometry.part import SHARP, Part, Prism, ProfiledPart
+from hdopt.geometry.slide_features import Slot
 from hdopt.geometry.undercut import AT_SHOULDER, IN_CORNER, RingGroove
 
 

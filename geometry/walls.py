@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from hdopt.errors import HdoptError
 from hdopt.geometry.features import DBore, KeywayBore
-from hdopt.geometry.part import Part, Prism, Tongue
+from hdopt.geometry.part import Part, Prism
+from hdopt.geometry.slide_features import Tongue
 
 ROUNDING = 1e-9
 """What sums of given sizes may miss, mm."""
@@ -83,7 +84,7 @@ def _of_prism(part: Part, piece: Prism) -> Iterator[Wall]:
     if part.slot is not None and piece is part.body[0]:
         if part.slot.closed:
             keys = "clearances.disc_radius_mm"
-            yield Wall(part.name, "the wall between slot and rim", rim - part.slot.reach, keys)
+            yield Wall(part.name, "the wall between slot and rim", rim - part.slot.mouth_reach, keys)
         floor = piece.height - part.slot.depth
         yield Wall(part.name, "the floor of the slot", floor, "export.slot_depth_mm")
     if part.bolts is not None and part.holds_bolts(piece):

@@ -19,9 +19,10 @@ from hdopt.geometry.arcs import ARC_TOLERANCE, enclosed_area, outline_of, outlin
 from hdopt.geometry.contour import Circle, ParallelCurve
 from hdopt.geometry.din6885 import key_for_bore
 from hdopt.geometry.export import export_drive
-from hdopt.geometry.features import DBore, KeywayBore, Slot
+from hdopt.geometry.features import DBore, KeywayBore
 from hdopt.geometry.job import make_job
 from hdopt.geometry.options import ExportOptions
+from hdopt.geometry.slide_features import Slot
 
 pytestmark = pytest.mark.slow
 

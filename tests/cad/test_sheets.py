@@ -61,7 +61,7 @@ def test_no_text_lies_on_another_or_off_the_sheet(profile, structure, scale):
 
 
 def crossed(sheet):
-    """Texts that a line runs through: it enters the box, less 0.2 mm of play, between its two ends."""
+    """Texts that a line runs through or comes nearer to than 0.2 mm: it enters the box between its two ends."""
     pieces = []
     for mark in sheet.marks:
         if isinstance(mark, Ring):
@@ -78,7 +78,7 @@ def crossed(sheet):
     for label in sheet.labels:
         left, top, right, low = label_box(label)
         shares = np.sort(
-            [(np.array([left, top]) + 0.2 - starts) / steps, (np.array([right, low]) - 0.2 - starts) / steps], 0
+            [(np.array([left, top]) - 0.2 - starts) / steps, (np.array([right, low]) + 0.2 - starts) / steps], 0
         )
         enters, leaves = np.maximum(shares[0].max(1), 0.0), np.minimum(shares[1].min(1), 1.0)
         if label.content and (enters < leaves).any():
