@@ -36,7 +36,7 @@ def matrix_peak_to_peak_arcmin(drive: Drive, matrix: Array) -> Array:
     """The same for a `drive` with errors as rows of the `matrix` of `DriveErrors.to_matrix`, shape (n, 12) -> (n,);
     smooth-tipped profiles only.
 
-    Measured teeth have no extremes in closed form: the beat is walked, at most 20 times slower. Its values are within
+    Measured teeth have no extremes in closed form: the beat is walked, about 100 times slower. Its values are within
     1e-5 arcmin of `extremes_arcmin` in the closed form (`tests/unit/test_teeth_kernel.py`).
     """
     matrix = np.ascontiguousarray(matrix, dtype=np.float64)

@@ -41,7 +41,7 @@ def table(run: dict) -> str:
         for what, slow, fast in PAIRS
         if slow in times and fast in times
     ]
-    teeth = measured.get("test_measured_teeth_cost_at_most_twenty_sines", {}).get("extra_info", {})
+    teeth = measured.get("test_measured_teeth_against_the_sines", {}).get("extra_info", {})
     if "times_the_sine" in teeth:
         rows.append(f"| a drive with measured teeth over one with sines | {teeth['times_the_sine']:.3g} |")
     exact = measured.get("test_against_the_exact_geometry", {}).get("extra_info", {})
