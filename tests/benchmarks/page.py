@@ -1,7 +1,7 @@
 """Measure what hdopt computes with and write docs/benchmarks.md: `python -m tests.benchmarks.page [--print]`.
 
 Everything is processor time of one thread, the best of a few, in one run: so a busy machine disturbs it least, and what
-counts are the ratios. `--print` leaves the page as it is.
+counts are the ratios. `--print` leaves the page and its picture as they are.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from hdopt.tolerance.sampling import ScrambledSobol
 from hdopt.tolerance.sensitivity import run_sobol
 from hdopt.tolerance.space import InputSpace
 from hdopt.workflow.stack import study_problem
+from tests.benchmarks import growth
 from tests.benchmarks.peak import multiply_adds_per_ns
 from tests.benchmarks.test_peak_to_peak_speed import fixed_angles
 
@@ -275,6 +276,8 @@ ON_GROWTH = """
 Time goes as the size to the power of the exponent, fitted over the sizes named. How a diagnosis takes its time is
 measured by `tests/benchmarks/test_diagnosis_speed.py`.
 
+![Time over size, both as multiples of the first, with the exponent of each](benchmarks-growth.svg)
+
 | what grows | sizes | seconds | exponent |
 |---|---|---|---:|"""
 
@@ -301,6 +304,7 @@ def main() -> None:
     text = page()
     if not only_print:
         PAGE.write_text(text, encoding="utf-8")
+        growth.write()
 
 
 if __name__ == "__main__":
