@@ -23,6 +23,8 @@ LIMIT_NAMES = (
     "hysteresis_loss",
 )
 
+LARGEST_LIMIT_ARCMIN = 1e6
+
 
 @dataclass(frozen=True)
 class Decision:
@@ -74,10 +76,25 @@ def parse_limits(text: str | None) -> dict[str, float]:
             value = float(match.group(1)) * LIMIT_UNITS[match.group(2)]
         except ValueError as error:
             raise HdoptError(f"--limit gives {name} {match.group(1)!r}, which is no number") from error
-        if not 0 < value < 1e6:
+        if not 0 < value < LARGEST_LIMIT_ARCMIN:
             raise HdoptError(f"--limit gives {name} {value:g} arcmin; give a number above 0")
         found[name] = value
     return found
+
+
+def checked_limits(limits: Mapping[str, float] | str) -> dict[str, float]:
+    """`limits` as name -> arcmin, from such a mapping or from words as `parse_limits` takes them.
+
+    Raises `HdoptError` for a name that is no figure and for a limit that is not above 0.
+    """
+    if isinstance(limits, str):
+        return parse_limits(limits)
+    for name, value in limits.items():
+        if name not in LIMIT_NAMES:
+            raise HdoptError(unknown_name("figure among the limits", str(name), LIMIT_NAMES))
+        if not (isinstance(value, int | float) and 0 < value < LARGEST_LIMIT_ARCMIN):
+            raise HdoptError(f"the limit of {name} is {value!r}; give a number of arcmin above 0")
+    return dict(limits)
 
 
 def verdict_line(decision: Decision, units: Mapping[str, str]) -> str:

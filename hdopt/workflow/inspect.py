@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hdopt.errors import HdoptError
 from hdopt.files import write_text
+from hdopt.recordings.decision import checked_limits
 from hdopt.recordings.recording import Recording
 from hdopt.recordings.sheet import Inspection
 from hdopt.workflow.acceptance_sheet import NO_LABEL, SheetLabel, acceptance_sheet
@@ -22,7 +23,7 @@ FILES = ("csv", "xlsx", "report", "bench")
 def inspect(
     recordings: AnyRecordings,
     drive: AnyDrive = None,
-    limits: Mapping[str, float] | None = None,
+    limits: Mapping[str, float] | str | None = None,
     *,
     speed_rpm: float | None = None,
     mountings: Sequence[str] = (),
@@ -33,12 +34,13 @@ def inspect(
     """The acceptance sheet of one drive.
 
     `recordings`: files or records of one drive. `drive`: its record, a study, a shipped name or the path of a study
-    file; None leaves out what needs a model (the beat of a short record, the origin of the orders). `limits` by name in
-    arcmin (`hdopt.recordings.decision.LIMIT_NAMES`); None for the requirement of the drive's study, where it has one.
-    `speed_rpm` of the input for the slope in time, by default the recording's own. `mountings` labels each recording
-    for the gauge study. `label` goes on the sheet; `seed` is that of the fit. `files` to write: {"csv": PATH} the
-    figures, {"report": PATH} one HTML page, {"bench": PATH} what was understood of the first file. Raises `HdoptError`
-    where there is nothing to inspect, and before any work where a file cannot be written.
+    file; None leaves out what needs a model (the beat of a short record, the origin of the orders). `limits` by name
+    in arcmin (`hdopt.recordings.decision.LIMIT_NAMES`), or in words ("peak_to_peak=1.0arcmin"); None for the
+    requirement of the drive's study, where it has one. `speed_rpm` of the input for the slope in time, by default the
+    recording's own. `mountings` labels each recording for the gauge study. `label` goes on the sheet; `seed` is that
+    of the fit. `files` to write: {"csv": PATH} the figures, {"report": PATH} one HTML page, {"bench": PATH} what was
+    understood of the first file. Raises `HdoptError` where there is nothing to inspect, and before any work where a
+    file cannot be written.
     """
     source, wanted = recorded_drive(drive), checked_files(files, FILES)
     found = acceptance_sheet(
@@ -54,10 +56,13 @@ def inspect(
     return found
 
 
-def limits_for(source: RecordedDrive, limits: Mapping[str, float] | None) -> Mapping[str, float]:
-    """The `limits` (by name, arcmin) if any are given, else what the study of `source` requires."""
+def limits_for(source: RecordedDrive, limits: Mapping[str, float] | str | None) -> Mapping[str, float]:
+    """The `limits` (by name in arcmin, or in words) if any are given, else what the study of `source` requires.
+
+    Raises `HdoptError` for a name that is no figure and for a limit that is not above 0.
+    """
     if limits is not None or source.study is None:
-        return limits or {}
+        return checked_limits(limits or {})
     return required_limits(source.study)
 
 

@@ -23,7 +23,7 @@ FILES = ("csv", "xlsx", "report")
 def inspect_many(
     recordings: Sequence[Recording | str | Path],
     drive: AnyDrive = None,
-    limits: Mapping[str, float] | None = None,
+    limits: Mapping[str, float] | str | None = None,
     seed: int = 1,
     files: Files | None = None,
 ) -> Batch:
@@ -36,15 +36,15 @@ def inspect_many(
     from hdopt.parallel.engine import engine_from
 
     source, wanted = recorded_drive(drive), checked_files(files, FILES)
-    limits = dict(limits_for(source, limits))
-    work = partial(_unit, source=source, limits=limits, seed=seed)
+    required = dict(limits_for(source, limits))
+    work = partial(_unit, source=source, limits=required, seed=seed)
     units = list(engine_from(None).map(work, list(recordings)))
     sound = [unit for unit in units if not unit.error]
     if not sound:
         raise HdoptError(f"none of {len(units)} recordings can be read; the first: {units[0].error[:200]}")
     values = [unit.peak_to_peak for unit in sound if unit.peak_to_peak is not None]
     far = {sound[k].name for k in outliers(values)}
-    limit = limits.get("peak_to_peak")
+    limit = required.get("peak_to_peak")
     batch = Batch(
         tuple(replace(unit, outlier=unit.name in far and not unit.error) for unit in units),
         limit,

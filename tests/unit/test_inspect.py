@@ -13,7 +13,7 @@ from hdopt.errors import HdoptError
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.recordings import figures
 from hdopt.recordings.capability import gauge, outliers, performance
-from hdopt.recordings.decision import decide, parse_limits
+from hdopt.recordings.decision import checked_limits, decide, parse_limits
 from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.sheet import Batch, Unit
 from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
@@ -130,6 +130,25 @@ def test_guard_band_of_iso_14253():
 def test_bad_limits(text, message):
     with pytest.raises(HdoptError, match=message):
         parse_limits(text)
+
+
+@pytest.mark.parametrize(
+    ("limits", "message"),
+    [
+        ("peak=1", "unknown figure in --limit 'peak'"),
+        ({"peak2peak": 1.0}, "unknown figure among the limits 'peak2peak'; did you mean 'peak_to_peak'"),
+        ({"rms": 0}, "the limit of rms is 0; give a number of arcmin above 0"),
+        ({"rms": "1arcmin"}, "the limit of rms is '1arcmin'; give a number of arcmin above 0"),
+    ],
+)
+def test_bad_limits_from_python_end_with_a_message(limits, message):
+    """Would catch a limit from Python that is taken unread: words, an unknown name, a limit of 0."""
+    with pytest.raises(HdoptError, match=message):
+        checked_limits(limits)
+
+
+def test_limits_in_words_are_those_by_name():
+    assert checked_limits("rms=30arcsec, slope=2") == checked_limits({"rms": 0.5, "slope": 2})
 
 
 def test_torsion_of_a_known_spring():
