@@ -73,9 +73,9 @@ class Points:
 
 @dataclass(frozen=True)
 class Ruling:
-    """Whether a requirement is `met`, and the sentence that says by what."""
+    """Whether a requirement is `met`, None where that cannot be decided, and the sentence that says by what."""
 
-    met: bool
+    met: bool | None
     text: str
 
 

@@ -157,7 +157,8 @@ class _Preparation:
 
     @item.register
     def _(self, item: Ruling) -> dict[str, Any]:
-        return {"kind": "ruling", "met": item.met, "text": self.prose(item.text)}
+        kind, says = {True: ("met", "Met"), False: ("missed", "Missed"), None: ("open", "Not decidable")}[item.met]
+        return {"kind": "ruling", "met": kind, "says": says, "text": self.prose(item.text)}
 
     @item.register
     def _(self, item: Download) -> dict[str, Any]:

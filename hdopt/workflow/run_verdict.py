@@ -8,7 +8,7 @@ from typing import Any  # Any: results of steps, JSON-ready
 from hdopt.report import Ruling, Section
 from hdopt.report.cells import in_words
 from hdopt.report.sections.verdict import verdict_section
-from hdopt.report.sections.words import in_sentence, label, listed
+from hdopt.report.sections.words import in_sentence, label, listed, percent
 from hdopt.workflow.requirement import Verdict
 
 Found = Mapping[str, Mapping[str, Any]]
@@ -31,8 +31,8 @@ def section_of_run(verdict: Verdict | None, found: Found) -> Section | None:
 def _of_yield(verdict: Verdict, stack: Mapping[str, Any]) -> str:
     limit, unit = _limit(stack)
     return (
-        f"{_percent(verdict.value)} of drives to these tolerances stay within {limit:.4g} {unit}; "
-        f"{_percent(verdict.limit)} must."
+        f"{percent(verdict.value)} of {_of_what(stack)} to these tolerances stay within {limit:.4g} {unit}; "
+        f"{percent(verdict.limit)} must."
     )
 
 
@@ -58,11 +58,9 @@ def _limit(stack: Mapping[str, Any]) -> tuple[float, str]:
     return float(stack[key]), key.removeprefix("limit_")
 
 
-def _percent(share: float) -> str:
-    """A share in percent, with enough digits to tell it from a whole: 99.07 %, 99.9987 %."""
-    left = 100 * (1 - share)
-    digits = 2 if left >= 0.01 or left <= 0 else 4
-    return f"{100 * share:.{digits}f}\u00a0%"
+def _of_what(stack: Mapping[str, Any]) -> str:
+    """What a `stack` samples: drives, or assemblies of dimensions where there is no drive."""
+    return "assemblies" if stack.get("method", "") is None else "drives"
 
 
 def _of_stack(found: Found) -> list[str]:
@@ -74,8 +72,8 @@ def _of_stack(found: Found) -> list[str]:
     quantile = stack["quantiles"][f"{needed:g}"]["value"]
     side = "above" if quantile > limit else "below"
     says = [
-        f"{_percent(needed)} of the drives stay below {quantile:.4g} {unit}, {abs(quantile - limit):.3g} {unit} {side} "
-        "the limit: [[stack-distribution]]."
+        f"{percent(needed)} of the {_of_what(stack)} stay below {quantile:.4g} {unit}, "
+        f"{abs(quantile - limit):.3g} {unit} {side} the limit: [[stack-distribution]]."
     ]
     shares = sorted(stack.get("contributions", {}).items(), key=lambda item: -item[1])
     most = [f"{in_sentence(in_words(name))} ({100 * share:.0f} %)" for name, share in shares[:3] if share > 0.01]
@@ -111,9 +109,9 @@ def _of_allocation(found: Found) -> list[str]:
         return [f"No tolerances are enough: {allocation['reason']}."]
     if "total_cost" not in allocation:
         return []
-    check = allocation["verified_yield"]["value"]
+    check, what = allocation["verified_yield"]["value"], _of_what(found.get("stack", {}))
     return [
-        f"The least-cost tolerances that keep it cost {allocation['total_cost']:.4g}, and {_percent(check)} of drives "
+        f"The least-cost tolerances that keep it cost {allocation['total_cost']:.4g}, and {percent(check)} of {what} "
         "then stay within the limit: [[allocate-tolerances]]."
     ]
 

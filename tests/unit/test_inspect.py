@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -17,7 +18,9 @@ from hdopt.recordings.decision import checked_limits, decide, parse_limits
 from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.sheet import Batch, Unit
 from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
-from hdopt.report.sections.inspection import batch_report
+from hdopt.report import Ruling
+from hdopt.report.html import render
+from hdopt.report.sections.inspection import batch_report, inspection_report
 from hdopt.study import load_study
 from hdopt.workflow.inspect import inspect
 
@@ -149,6 +152,28 @@ def test_bad_limits_from_python_end_with_a_message(limits, message):
 
 def test_limits_in_words_are_those_by_name():
     assert checked_limits("rms=30arcsec, slope=2") == checked_limits({"rms": 0.5, "slope": 2})
+
+
+def test_the_sheet_begins_with_its_verdicts():
+    """Would catch a sheet whose decision stands only in a table, and raw keys among its words."""
+    decisions = (
+        decide("peak_to_peak", None, 0.1, 1.5, "the model does not explain the record"),
+        decide("return_error", 0.4, 0.02, 0.5, "median"),
+        decide("slope", 0.4, 0.01, 0.25),
+    )
+    table = pd.DataFrame({"input_angle_deg": np.arange(0.0, 1800.0, 4.0)})
+    table["output_angle_deg"] = table["input_angle_deg"] / 80 + 0.001 * np.cos(np.radians(2 * table["input_angle_deg"]))
+    sheet = replace(inspect(recording_from_table(table, 80.0)), limits=decisions, checks={"slipped_counts": "none"})
+    page = inspection_report(sheet)
+    rulings = [item for item in page.sections[0].items if isinstance(item, Ruling)]
+    assert list(page.sections[0].items[:3]) == rulings
+    assert [ruling.met for ruling in rulings] == [None, True, False]
+    assert rulings[0].text == "Peak-to-peak, at most 1.5 arcmin: the model does not explain the record."
+    assert rulings[1].text == "Return error (median) 0.4 arcmin, at most 0.5 arcmin: 0.1 to spare, guard band 0.033."
+    assert rulings[2].text == "Slope 0.4 arcmin per deg, at most 0.25 arcmin per deg: 0.15 too much, guard band 0.016."
+    html = render(page)
+    assert "Not decidable." in html and html.index("Missed.") < html.index("Standard uncertainty")
+    assert "slipped counts" in html and "<td>peak_to_peak" not in html
 
 
 def test_torsion_of_a_known_spring():

@@ -15,6 +15,7 @@ from hdopt.drive.geometry import Structure
 from hdopt.errors import HdoptError, MissingLibrary
 from hdopt.kinematics import peak_to_peak_arcmin
 from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin
+from hdopt.report.sections.words import percent
 from hdopt.study import load_study
 from hdopt.workflow.requirement import of_run
 from hdopt.workflow.run import run_study, steps_of
@@ -117,6 +118,15 @@ def test_a_verdict_on_many_drives_says_what_the_one_drive_is():
     assert "CS tooth amplitude (70 %) and WG tilt major (20 %)" in said
     assert "It is one example" in said
     assert section_of_run(None, found) is None
+    parts = section_of_run(of_run(load_study("csf-25-80"), found), {"stack": {**found["stack"], "method": None}})
+    said = parts.items[0].text + " ".join(parts.items[1].sentences)
+    assert "assemblies" in said and "drives" not in said, "a stack of dimensions has no drives"
+
+
+def test_a_share_is_never_rounded_to_a_whole():
+    """Would catch 100.00 % beside 99.9989 % on one page."""
+    said = [percent(share).replace("\u00a0", " ") for share in (0.98812, 0.9998, 0.999989, 1 - 2e-9, 1.0)]
+    assert said == ["98.81 %", "99.98 %", "99.9989 %", "99.99999980 %", "100.00 %"]
 
 
 def test_a_study_lists_its_steps(tmp_path, study):

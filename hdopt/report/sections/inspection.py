@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any  # Any: Plotly's dictionaries and traces, 
 
 import numpy as np
 
-from hdopt.report import Figure, Item, KeyFigures, Report, Section, Table, Text
+from hdopt.recordings.decision import GUARD
+from hdopt.report import Figure, Item, KeyFigures, Report, Ruling, Section, Table, Text
 from hdopt.report.theme import BLUE, DIVERGING, GREY, INK, VERMILLION, figure
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from hdopt.recordings.decision import Decision
     from hdopt.recordings.figures import Cells
     from hdopt.recordings.sheet import Batch, Inspection
 
@@ -50,15 +52,15 @@ def _summary(found: Inspection) -> Section:
     if found.returned is not None:
         values["Return error, median"] = f"{found.returned.median:.3f} arcmin"
     values["Standard uncertainty of a peak-to-peak"] = f"{found.uncertainty:.3f} arcmin"
-    items: list[Item] = [KeyFigures(values)]
+    items: list[Item] = [*(_ruling(decision) for decision in found.limits), KeyFigures(values)]
     if found.limits:
         frame = pd.DataFrame(
             [
                 {
-                    "figure": d.name,
+                    "figure": _name(d.name),
                     "value_arcmin": d.value,
                     "limit_arcmin": d.limit,
-                    "guard_band_arcmin": 1.645 * d.uncertainty,
+                    "guard_band_arcmin": GUARD * d.uncertainty,
                     "decision": d.verdict,
                     "what": d.note,
                 }
@@ -75,6 +77,23 @@ def _summary(found: Inspection) -> Section:
         tuple(items),
         "Makers state the angular transmission accuracy over one turn of the output in one direction: the full beat.",
     )
+
+
+def _name(key: str) -> str:
+    """A figure's or a check's name as it is read."""
+    return key.replace("peak_to_peak", "peak-to-peak").replace("_", " ")
+
+
+def _ruling(decision: Decision) -> Ruling:
+    """A limit's verdict in words, with the figure that was held against it."""
+    unit = "arcmin per deg" if decision.name == "slope" else "arcmin"
+    name, allowed = _name(decision.name).capitalize(), f"{decision.limit:.4g} {unit}"
+    if decision.value is None:
+        return Ruling(None, f"{name}, at most {allowed}: {decision.note or 'not measured'}.")
+    off = decision.limit - abs(decision.value)
+    by = f"{abs(off):.3g} {'to spare' if off >= 0 else 'too much'}, guard band {GUARD * decision.uncertainty:.2g}"
+    note = f" ({decision.note})" if decision.note else ""
+    return Ruling(decision.met, f"{name}{note} {abs(decision.value):.4g} {unit}, at most {allowed}: {by}.")
 
 
 def _waveform(found: Inspection) -> Section:
@@ -143,6 +162,7 @@ def _carpet(cells: Cells) -> Any:
         zmax=size,
         colorscale=[list(stop) for stop in DIVERGING],
         colorbar={"title": {"text": "arcmin"}},
+        hovertemplate="turn %{y}, %{x:.1f} deg: %{z:.4f} arcmin<extra></extra>",
     )
     return made
 
@@ -196,7 +216,7 @@ def _torsion(found: Inspection) -> Section:
 def _checks(found: Inspection) -> Section:
     import pandas as pd
 
-    frame = pd.DataFrame([{"check": name, "finding": said} for name, said in found.checks.items()])
+    frame = pd.DataFrame([{"check": _name(name), "finding": said} for name, said in found.checks.items()])
     notes = [Text(text) for text in (*found.understood, *found.warnings)]
     return Section("checks", "Checks, and how the files were read", (Table("check-table", "Checks", frame), *notes))
 

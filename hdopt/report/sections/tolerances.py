@@ -8,7 +8,7 @@ import numpy as np
 
 from hdopt.report import Figure, Item, KeyFigures, Section, Table, Text
 from hdopt.report.cells import EACH, NAMES, in_words
-from hdopt.report.sections.words import in_sentence, listed
+from hdopt.report.sections.words import in_sentence, listed, percent
 from hdopt.report.theme import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, faded, figure
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
     shares = _shares(stack)
     verdict = "keep" if conforming.low >= stack.required_yield else "do not keep"
     most = [in_sentence(in_words(name)) for name in shares["input"][:2]]
+    what = "drives" if result.method is not None else "assemblies"
     return Section(
         key,
         "What the tolerances give",
@@ -58,7 +59,7 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
                 f"{key}-distribution",
                 "Distribution under the tolerances",
                 _distribution(stack),
-                f"{stack.n} drives, {stack.sampling}. The vertical lines are the limit and the quantile of the "
+                f"{stack.n} {what}, {stack.sampling}. The vertical lines are the limit and the quantile of the "
                 "required yield with its interval.",
             ),
             Table(
@@ -71,7 +72,7 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
                 f"{key}-contributions",
                 "Contributions to the variance",
                 _contributions(shares),
-                "Linearised where drives are: magnitudes and absolute tilts at their mean, directions and phases "
+                f"Linearised where {what} are: magnitudes and absolute tilts at their mean, directions and phases "
                 f"averaged. The line's spread is {line.std:.4g} {unit}, the real one {stack.std.value:.4g} {unit}; its "
                 f"root-sum-square value at the required yield is off by {stack.rss - quantile.value:+.4g} {unit}.",
             ),
@@ -84,8 +85,8 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
             ),
             *(Text(note) for note in (*stack.notes, *result.notes)),
         ),
-        f"As toleranced the drives {verdict} the requirement: {100 * conforming.value:.2f} % stay within "
-        f"{stack.limit:g} {unit}, {100 * stack.required_yield:.2f} % must. Most comes from {listed(most)}.",
+        f"As toleranced the {what} {verdict} the requirement: {percent(conforming.value)} stay within "
+        f"{stack.limit:g} {unit}, {percent(stack.required_yield)} must. Most comes from {listed(most)}.",
     )
 
 

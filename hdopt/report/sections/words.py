@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from hdopt.effects import EFFECTS
@@ -68,3 +69,10 @@ def listed(words: Sequence[str]) -> str:
         return ""
     *first, last = words
     return f"{', '.join(first)} and {last}" if first else last
+
+
+def percent(share: float) -> str:
+    """A `share` of 0 to 1 in percent, with enough digits to tell it from a whole: 99.07 %, 99.9987 %."""
+    left = 100 * (1 - share)
+    digits = 2 if left >= 0.01 or left <= 0 else math.ceil(-math.log10(left)) + 1
+    return f"{100 * share:.{digits}f}\u00a0%"
