@@ -9,7 +9,7 @@ from test_cross_validation import RATE, noisy, rows_of, without_base
 from test_diagnosis_evidence import state
 
 from hdopt.diagnosis.checks import assessment
-from hdopt.diagnosis.checks.assessment import assess, detection_limits, look_at_remainder
+from hdopt.diagnosis.checks.assessment import assess, best_placebo, detection_limits, look_at_remainder
 from hdopt.diagnosis.inference.catalogue import SCALE
 from hdopt.diagnosis.inference.fit import extend
 from hdopt.diagnosis.inference.neighbour_noise import noise_between_neighbours
@@ -111,3 +111,16 @@ def test_a_scale_alone_explains_nothing(hidden):
     off = extend(base, [base.problem.explanations[SCALE].term(base.problem.rows, {})])
     selection = replace(hidden.selection, candidates=(Candidate(off, 50.0, 100.0), *hidden.selection.candidates))
     assert not find(replace(hidden, selection=selection)).facts.explained
+
+
+@pytest.mark.parametrize(
+    ("found", "placebo"),
+    [((), "lost_motion"), (("lost_motion",), "hysteresis"), (("lost_motion", "hysteresis"), None)],
+)
+def test_a_placebo_is_the_best_of_what_was_not_found(found, placebo):
+    """Would catch a placebo that is what was found, or a description that is no effect."""
+    gains = {"hysteresis": 5.0, "lost_motion": 10.0, "scale": 20.0}
+    pool = [SimpleNamespace(effect=name) for name in gains]
+    probe = SimpleNamespace(gain=lambda term: gains[term.effect])
+    chosen = best_placebo(probe, pool, SimpleNamespace(terms=[SimpleNamespace(effect=name) for name in found]))
+    assert (None if chosen is None else chosen.effect) == placebo
