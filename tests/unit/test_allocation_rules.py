@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from hdopt.allocation import rules
+from hdopt.allocation import convex, rules
 from hdopt.allocation.convex import Item, rss_rule, solve, worst_case_rule
 from hdopt.allocation.cost import Exponential, Grade, GradeTable, Piecewise, Reciprocal
 from hdopt.allocation.rules import AllocationProblem, allocate_by_equal_scaling, allocate_by_rss, allocate_by_yield
+from hdopt.errors import HdoptError
 from hdopt.tolerance.distributions import Normal, Uniform
 from hdopt.tolerance.space import InputSpace, Tolerance
 
@@ -136,3 +137,13 @@ def test_equal_scaling_takes_the_finer_grade_and_keeps_the_bounds(quick):
     narrow = Item("b", Reciprocal(0.0, 0.2), 0.4, lower=0.01, upper=0.45)
     bounded = AllocationProblem(given.response, given.space, (given.items[0], narrow), 1.0, 0.9, "mm")
     assert allocate_by_equal_scaling(bounded, seed=3).tolerances["b"] == 0.45
+
+
+def test_tolerances_that_break_the_requirement_are_no_answer():
+    """A millionth too much is more than rounding; a billionth is not."""
+    items = [Item("a", Reciprocal(0.0, 0.1), 0.1)]
+    requirement = worst_case_rule([2.0], 1.0)
+    end = {"lower_bound": 0.0, "marginal_cost": None, "solver": "none"}
+    assert convex._finish(items, requirement, np.array([0.5 * (1 + 1e-10)]), **end).slack < 0
+    with pytest.raises(HdoptError, match="break the requirement by 1e-06"):
+        convex._finish(items, requirement, np.array([0.5 * (1 + 1e-6)]), **end)
