@@ -1,5 +1,7 @@
 """What a name rests on besides its evidence: every part of an effect shows, and no other's orders are borrowed."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -8,6 +10,7 @@ from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.nuisance import nuisances_for
 from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.search import acceptance
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import Candidate, joint_fit
 from hdopt.diagnosis.search.high_order import strong_ripple
@@ -169,3 +172,14 @@ def test_strong_ripple_waits_for_its_own_search(study, size, set_aside):
     if set_aside:
         expected = size * np.sin(101.3 * recording.input_angle)
         assert np.std(ripple - expected) < 0.2 * np.std(expected)
+
+
+@pytest.mark.parametrize(("lost", "said"), [((False, False), True), ((True, False), False), ((False, True), False)])
+def test_a_term_that_slow_wander_could_be_is_not_named(lost, said, monkeypatch):
+    """Of whichever term; would catch an acceptance that asks nothing of slow terms, or of the first alone."""
+    monkeypatch.setattr(acceptance, "properties_of", lambda effect: SimpleNamespace(has_parts=False))
+    monkeypatch.setattr(acceptance, "is_driven", lambda term: False)
+    monkeypatch.setattr(acceptance, "slow_penalty", lambda fit, term: 10.0 * term.number)
+    monkeypatch.setattr(acceptance, "lost_in_wander", lambda fit, i, needed: lost[i] and needed == 10.0 * i)
+    terms = [SimpleNamespace(effect="thermal_drift", number=i) for i in range(2)]
+    assert is_acceptable(SimpleNamespace(terms=terms)) is said

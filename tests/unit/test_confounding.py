@@ -126,3 +126,11 @@ def test_effects_of_one_fit_stand_against_each_other(study):
 def test_what_the_recording_cannot_show_is_not_in_the_list(study):
     fit = fitted(study, ["output_coupling"])
     assert {pair.other for pair in confounded_with(fit, 0)} <= set(EFFECTS) - {"output_coupling", "tooth_mesh"}
+
+
+def test_evidence_apart_falls_with_rougher_noise(study):
+    fit = fitted(study, ["channel_delay"])
+    (plain,), (rough,) = (confounded_with(fit, 0, inflation, others=["lost_motion"]) for inflation in (1.0, 4.0))
+    assert plain.evidence_apart > 0
+    assert rough.evidence_apart == pytest.approx(plain.evidence_apart / 4)
+    assert rough.imitates == plain.imitates

@@ -126,4 +126,4 @@ def test_a_clearance_moves_a_part_by_half_and_leans_it_over_its_length():
     bounds = budget.Bounds(0.05, None)
     # Half of the bound for one fit: its play is no more than the bound itself.
     assert budget._fit(joint, 1, 1, 0.05, bounds).largest_play <= 0.05
-    assert budget._fit(joint, 1, 1, 0.03, bounds).largest_play <= 0.03
+    assert budget._fit(joint, 1, 1, 0.02, bounds).largest_play <= 0.02
