@@ -21,15 +21,15 @@ if TYPE_CHECKING:
 @click.option("--fronts/--no-fronts", default=True, help="Also trace the fronts between the two objectives.")
 @click.option(
     "--regions/--no-regions",
-    default=False,
-    help="Also follow each constant of the trade to where another choice is the better.",
+    default=None,
+    help="Also follow each constant of the trade to where another choice is the better; as [search] regions if left.",
 )
 @click.option(
     "--write-study", "study_file", metavar="FILE", type=OutputFile(), help="Write the best design as a study (TOML)."
 )
 @work_options
 def command(
-    asked: StudyOptions, fronts: bool, regions: bool, study_file: Path | None, json_file: Path | None, seed: int
+    asked: StudyOptions, fronts: bool, regions: bool | None, study_file: Path | None, json_file: Path | None, seed: int
 ) -> int:
     """Which design: profile, structure, pressure angle, width, module and deflection; and what they cost.
 

@@ -13,6 +13,7 @@ from hdopt.optimize.records import SearchResult
 from hdopt.optimize.region_maps import find_regions
 from hdopt.optimize.search import search_designs
 from hdopt.study import AnyStudy, Study, as_study
+from hdopt.study.search import SearchSection
 from hdopt.workflow.output_files import Files, checked_files, write_table_files
 from hdopt.workflow.placed import numbers_named
 from hdopt.workflow.search_setup import setup_of
@@ -29,24 +30,30 @@ def search(
     progress: Progress = lambda stage: None,
     fronts: bool = True,
     files: Files | None = None,
-    regions: bool = False,
+    regions: bool | None = None,
 ) -> SearchResult:
     """Search a study's designs for the best, and for fronts between its two objectives.
 
     `study` is a study, its name or its path; `seed` that of what is done at random; `progress` is told what comes
-    next; without `fronts` only the best design is looked for; with `regions` each constant of the trade is followed to
-    where another choice is the better, which takes a few times as long. An interrupt (Ctrl-C) ends it with the best
-    so far. `files` to write: {"study": PATH} the chosen design as a study, {"csv": PATH} or {"xlsx": PATH} the tables.
+    next; without `fronts` only the best design is looked for; with `regions` (as [search] of the study says, if None)
+    each constant of the trade is followed to where another choice is the better, which takes ten times as long. An
+    interrupt (Ctrl-C) ends it with the best so far. `files` to write: {"study": PATH} the chosen design as a study,
+    {"csv": PATH} or {"xlsx": PATH} the tables.
     Raises `HdoptError` before any work where a file cannot be written.
     """
     study, wanted = as_study(study), checked_files(files, FILES)
     setup = setup_of(study, seed)
     result = search_designs(setup, seed, progress, fronts=fronts, study=study.name, notes=_notes(study))
     result = replace(result, notes=(*result.notes, *words_on_model(result)))
-    if regions:
+    if _asks_for_regions(study) if regions is None else regions:
         result = with_regions(result, seed, progress)
     write_search(result, wanted, study)
     return result
+
+
+def _asks_for_regions(study: Study) -> bool:
+    section = study.find("search", SearchSection)
+    return section is not None and section.regions
 
 
 def with_regions(result: SearchResult, seed: int = 1, progress: Progress = lambda stage: None) -> SearchResult:

@@ -14,7 +14,9 @@ from hdopt.optimize.region_maps import _map
 from hdopt.optimize.region_records import NONE_LEFT, Boundary, ConstantRange, Regions
 from hdopt.optimize.regions import Ground, bisect, follow
 from hdopt.optimize.summary import nearest_boundary
+from hdopt.report import Text
 from hdopt.report.sections.regions import region_items
+from hdopt.report.sections.search import confidence_section
 from hdopt.study import load_study
 from hdopt.workflow.search import search
 
@@ -31,8 +33,13 @@ def study(*more: str):
 
 
 @pytest.fixture(scope="module")
-def ground():
-    return Ground.of(search(study(), fronts=False), 1)
+def result():
+    return search(study(), fronts=False)
+
+
+@pytest.fixture(scope="module")
+def ground(result):
+    return Ground.of(result, 1)
 
 
 def constant(ground, name):
@@ -43,6 +50,24 @@ def constant(ground, name):
 @pytest.fixture(scope="module")
 def lag(ground):
     return follow(ground, constant(ground, "Limit: Largest lag"))
+
+
+@pytest.mark.parametrize(
+    ("key", "asked", "followed"),
+    [("false", None, 0), ("true", None, 1), ("false", True, 1), ("true", False, 0)],
+    ids=["nobody", "the study", "the call", "not in this call"],
+)
+def test_constants_are_followed_where_someone_asks(result, monkeypatch, key, asked, followed):
+    """Would catch a run that follows them unasked, which takes ten times as long, or a key that nobody reads."""
+    calls = []
+    monkeypatch.setattr("hdopt.workflow.search.search_designs", lambda *_, **__: result)
+    monkeypatch.setattr("hdopt.workflow.search.words_on_model", lambda _: ())
+    monkeypatch.setattr("hdopt.workflow.search.find_regions", lambda *_: calls.append(1) or Regions((), ()))
+    found = search(study(f"search.regions={key}"), regions=asked)
+    assert (len(calls), found.regions is not None) == (followed, bool(followed))
+    monkeypatch.setattr("hdopt.report.sections.search._checked_figures", lambda _: {})
+    words = [item.text for item in confidence_section(found, None).items if isinstance(item, Text)]
+    assert any("--set search.regions=true" in text for text in words) != bool(followed)
 
 
 @pytest.mark.slow

@@ -10,7 +10,6 @@ import pandas as pd
 from hdopt.optimize.design_space import VARIABLES
 from hdopt.optimize.objectives import NOMINAL, QUANTITIES, ROBUST, Quantity, find_quantity
 from hdopt.optimize.records import DesignRecord, Front, SearchResult, Verification
-from hdopt.optimize.region_records import Regions
 from hdopt.optimize.summary import (
     NOT_MODELLED,
     break_evens,
@@ -61,13 +60,12 @@ def trade_sections(
     result: SearchResult,
     views: TradeViews,
     checked: Verification,
-    regions: Regions,
     file: str,
 ) -> tuple[Section, ...]:
     """All sections of the trade report, in reading order.
 
-    `result` is that of the search, `views` its map and rings, `checked` its best design checked by other means,
-    `regions` where it holds; `file` is the name of the chosen design's study file.
+    `result` is that of the search, `views` its map and rings, `checked` its best design checked by other means;
+    `file` is the name of the chosen design's study file.
     """
     return (
         chosen_section(result, file),
@@ -75,7 +73,7 @@ def trade_sections(
         designs_section(result),
         map_section(result, views.design_map),
         rings_section(result, views.rings),
-        confidence_section(result, checked, regions),
+        confidence_section(result, checked),
     )
 
 
@@ -472,18 +470,23 @@ def rings_section(result: SearchResult, rings: Rings) -> Section:
     )
 
 
-def confidence_section(
-    result: SearchResult, checked: Verification, regions: Regions, key: str = "trade-confidence"
-) -> Section:
-    """The choice of a `result` as `checked` by other means, and the `regions` of the trade's constants in which it
-    holds; `key` names the section."""
-    said = nearest_boundary(regions)
+NOT_FOLLOWED = (
+    "Where the choice holds was not asked for: regions = true in [search] of the study, or --set search.regions=true, "
+    "follows each constant of the trade to where another choice is the better, in about ten times a search's time."
+)
+
+
+def confidence_section(result: SearchResult, checked: Verification, key: str = "trade-confidence") -> Section:
+    """The choice of a `result` as `checked` by other means, and the regions of the trade's constants in which it holds,
+    or how to ask for them; `key` names the section."""
+    regions = result.regions
+    said = nearest_boundary(regions) if regions else "the choice, checked by other means"
     return Section(
         key,
         "How sure the choice is",
         (
             KeyFigures(_checked_figures(checked)),
-            *region_items(result.best, regions, key),
+            *(region_items(result.best, regions, key) if regions else (Text(NOT_FOLLOWED),)),
             Text(
                 f"First-order optimality holds to {result.optimality_residual:.1e} of the objective's slope. "
                 f"Algorithms: {result.algorithm}; {result.evaluations} designs evaluated, {result.impossible} of them "

@@ -18,10 +18,10 @@ from hdopt.workflow.write_design import chosen_study_toml
 
 
 def search(study: Study, context: Context) -> StepResult:
-    """Best design of the `study`, fronts, its price, its verification and the regions in which it holds; names the
-    choice and writes its study file to the folder of the `context`."""
-    result = search_designs(study, context.seed, regions=True)
-    if not result.feasible or result.regions is None:
+    """Best design of the `study`, fronts, its price, its verification and, where [search] asks, the regions in which it
+    holds; names the choice and writes its study file to the folder of the `context`."""
+    result = search_designs(study, context.seed)
+    if not result.feasible:
         return _no_design(study, result)
     checked = verify(study, result, context.seed)
     file = context.folder / f"{study.name}-chosen.toml"
@@ -31,13 +31,13 @@ def search(study: Study, context: Context) -> StepResult:
         "verification": checked.to_dict(),
         "chosen_study": file.name,
     }
-    first, *others = trade_sections(result, trade_views(result), checked, result.regions, file.name)
+    first, *others = trade_sections(result, trade_views(result), checked, file.name)
     notes = tuple(Text(f"{note[:1].upper()}{note[1:]}.") for note in result.notes)
     chosen = Download(file.name, text, "The study file of the chosen design, for every other command.")
     sections = (replace(first, items=(*notes, *first.items, chosen)), *others)
     says = (
         f"chosen wave generator: {chosen_words(result)}",
-        nearest_boundary(result.regions),
+        *(() if result.regions is None else (nearest_boundary(result.regions),)),
         f"study file: {file}  (hdopt export {file} --step wg.step)",
     )
     return StepResult(sections, results, (file,), says)
