@@ -12,9 +12,7 @@ OPERATION = {
     "time_s": 0.0,
 }
 
-EXAMPLES: list[tuple[str, dict]] = [
-    (name, dict(keys)) for name, effect in EFFECTS.items() for keys in effect.examples
-]
+EXAMPLES: list[tuple[str, dict]] = [(name, dict(keys)) for name, effect in EFFECTS.items() for keys in effect.examples]
 """As each effect's own file gives them."""
 
 NAMES = [f"{name}-{i}" for i, (name, _) in enumerate(EXAMPLES)]

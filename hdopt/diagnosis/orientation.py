@@ -80,7 +80,7 @@ def as_counted(parameters: dict[str, Parameter], term: Term) -> dict[str, Parame
     turned = {}
     for name, one in parameters.items():
         if name.startswith("phase") and one.unit == "deg":
-            offset = RIGHT_ANGLES_DEG if term.zones is not None else 0.0
+            offset = RIGHT_ANGLES_DEG if term.in_zones else 0.0
             value = (offset - one.value + RIGHT_ANGLES_DEG) % (2 * RIGHT_ANGLES_DEG) - RIGHT_ANGLES_DEG
             one = Parameter(value, value - (one.high - one.value), value + (one.value - one.low), one.unit)
         elif name == "angle_deg":

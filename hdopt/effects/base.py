@@ -13,6 +13,7 @@ from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Category, Declared, Quantity, Sines, needed
 from hdopt.effects.estimate import FitEstimate, Parameter, counted
 from hdopt.effects.grid_search import Axis, search_on_grid
+from hdopt.effects.met import Met
 from hdopt.effects.probe import Probe
 from hdopt.effects.requirements import requirement
 from hdopt.effects.term import Shape, Term
@@ -101,8 +102,8 @@ def terms_at(effect: Explanation, conditions: Conditions, shapes: Sequence[Shape
 class Effect(Explanation):
     """One physics left out of the base model: one file that says all that is known of it.
 
-    The least that an effect says: `id`, `domain`, `separating`, `declared`, and its `columns` (or `zones`). What
-    follows from these by default may be said otherwise by any effect.
+    The least that an effect says: `id`, `domain`, `separating`, `declared`, and its `columns` (or `met`, or `zones`).
+    What follows from these by default may be said otherwise by any effect.
     """
 
     place: ClassVar[int] = 1000
@@ -143,8 +144,13 @@ class Effect(Explanation):
         scale, then sine and cosine of each of the declared sines; None where it acts in the zones."""
         return None
 
+    def met(self, shape: Shape) -> Met | None:
+        """The deviation on a spline's teeth or rim, which each zone meets where its deepest point is, mm of arc per
+        coefficient; None where it stands on neither."""
+        return None
+
     def zones(self, conditions: Conditions, shape: Shape) -> Array | None:
-        """What it adds to the deviation of zones 1 and 2, mm of arc per coefficient, (2, n, p)."""
+        """What it adds to the deviation of zones 1 and 2 otherwise, mm of arc per coefficient, (2, n, p)."""
         return None
 
     def term(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
@@ -155,7 +161,7 @@ class Effect(Explanation):
             steps[axis.name] = axis.step(kept[axis.name])
         trials = float(max(self._grid_size, 1))
         columns, zones = self.columns(conditions, kept), self.zones(conditions, kept)
-        return Term(self.id, kept, columns=columns, zones=zones, steps=steps, trials=trials)
+        return Term(self.id, kept, columns=columns, zones=zones, met=self.met(kept), steps=steps, trials=trials)
 
     def predict(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
         """The same physics where it is simulated: without the limits of a record, and settled where it has a memory."""

@@ -1,8 +1,8 @@
 """Circular spline out of round, as by clamping with n bolts.
 
 A radial deviation w cos(n theta + phi) of the circular spline changes the meshing depth in each zone by as much, and
-so the arc by w tan(alpha) (Jia 2021, Eqs. (24)-(26)); zone 2 meets it half a turn on. Clamping by n bolts makes n
-lobes. Units: um of radius; prior 0 to 50 um, n 2 to 16.
+so the arc by w tan(alpha) (Jia 2021, Eqs. (24)-(26)); each zone meets it at its deepest point, zone 2 half a turn on.
+Clamping by n bolts makes n lobes. Units: um of radius; prior 0 to 50 um, n 2 to 16.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from collections.abc import Mapping, Sequence
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
-from hdopt.effects._zone_harmonics import zone_harmonics
 from hdopt.effects.base import Effect, Keys, terms_at
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import UM, Quantity, Sines, needed, polar
 from hdopt.effects.estimate import FitEstimate, Parameter, counted
+from hdopt.effects.met import Spline, Waves
 from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.term import Shape, Term
 
@@ -62,7 +62,7 @@ class CircularSplineLobing(Effect):
         return Term(
             self.id,
             {"lobes": n},
-            zones=zone_harmonics(conditions.theta, (n,)),
+            met=Waves(Spline.CIRCULAR, (n,)),
             trials=float(len(LOBES)),
             odds=FEW_LOBES_ODDS if n < BOLT_CIRCLE else 0.0,
         )

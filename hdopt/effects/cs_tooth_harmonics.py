@@ -2,8 +2,9 @@
 
 Jia 2021, Eqs. (31a), (31b) take the long-wave tangential composite deviation as a_CS sin(theta + phi); cumulative pitch
 deviation of a real gear (ISO 1328-1, F_p) has further harmonics a_h sin(h theta + phi_h), h = 2, 3, ... Each zone meets
-them at its own angle; even ones act directly, odd ones through the change of the driving zone. Jia 2021, Sec. 5, names
-this as a cause of the mismatch with its own rig. Units: amplitude um of arc at the pitch line, prior 0 to 10 um.
+them at its own deepest point; even ones act directly, odd ones through the change of the driving zone. Jia 2021,
+Sec. 5, names this as a cause of the mismatch with its own rig. Units: amplitude um of arc at the pitch line, prior 0 to
+10 um.
 """
 
 from __future__ import annotations
@@ -16,11 +17,12 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
-from hdopt.effects._zone_harmonics import strongest_few, zone_harmonics
+from hdopt.effects._zone_harmonics import strongest_few
 from hdopt.effects.base import Effect, Keys, terms_at
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import UM, Sines
 from hdopt.effects.estimate import FitEstimate, Parameter
+from hdopt.effects.met import Spline, Waves
 from hdopt.effects.probe import Probe, widest_that_pays
 from hdopt.effects.term import Shape, Term
 
@@ -67,15 +69,12 @@ class CircularSplineToothHarmonics(Effect):
         "turn the circular spline in its housing by a quarter turn and record again: its tooth errors turn with it, "
         "the housing's clamping does not"
     )
-    spline: ClassVar[str] = "circular spline"
+    part: ClassVar[str] = "circular spline"
+    spline: ClassVar[Spline] = Spline.CIRCULAR
     declared = (SINES,)
     examples: ClassVar[tuple[Keys, ...]] = (
         {"amplitude_2_um": 1.5, "phase_2_deg": 30.0, "amplitude_3_um": 0.5, "phase_3_deg": -60.0},
     )
-
-    def phase(self, conditions: Conditions) -> Array:
-        """The angle of the first harmonic, rad, (n,)."""
-        return conditions.theta
 
     def search(self, probe: Probe) -> Sequence[Term]:
         limit = min(0.5 * probe.samples.rows_per_turn, 1.5 * probe.samples.highest_order)
@@ -126,7 +125,7 @@ class CircularSplineToothHarmonics(Effect):
         trials = float(len(RUNS))
         if members not in RUNS:
             trials *= math.comb(len(FEW), len(members))
-        return Term(self.id, dict(shape), zones=zone_harmonics(self.phase(conditions), members), trials=trials)
+        return Term(self.id, dict(shape), met=Waves(self.spline, members), trials=trials)
 
     def orders(self, shape: Shape, ratio: float) -> list[float]:
         return [float(h) for h in members_of(shape)]
@@ -154,6 +153,6 @@ class CircularSplineToothHarmonics(Effect):
         if len(sizes) > SAID:
             parts.append(f"less at {len(sizes) - SAID} others")
         return (
-            f"The {self.spline}'s teeth deviate from their place by more than one wave round the rim: "
+            f"The {self.part}'s teeth deviate from their place by more than one wave round the rim: "
             f"{', '.join(parts)} ({rms_arcmin:.2g} arcmin rms at the output)."
         )

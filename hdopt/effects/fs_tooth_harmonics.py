@@ -7,9 +7,9 @@ arc, prior 0 to 10 um.
 
 from __future__ import annotations
 
-from hdopt.arrays import Array
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.cs_tooth_harmonics import CircularSplineToothHarmonics
+from hdopt.effects.met import Spline
 from hdopt.effects.term import Shape
 
 
@@ -21,7 +21,8 @@ class FlexsplineToothHarmonics(CircularSplineToothHarmonics):
         "record one whole output turn (N input turns) or more: only then do orders h(1 + 1/N) of the flexspline stand "
         "apart from orders h of the circular spline"
     )
-    spline = "flexspline"
+    part = "flexspline"
+    spline = Spline.FLEX
     examples = ({"amplitude_2_um": 1.0, "phase_2_deg": 100.0},)
 
     def lacks(self, conditions: Conditions) -> str | None:
@@ -35,6 +36,3 @@ class FlexsplineToothHarmonics(CircularSplineToothHarmonics):
 
     def orders(self, shape: Shape, ratio: float) -> list[float]:
         return [h * (1 + 1 / ratio) for h in super().orders(shape, ratio)]
-
-    def phase(self, conditions: Conditions) -> Array:
-        return conditions.theta * (1 + 1 / conditions.ratio)

@@ -23,6 +23,7 @@ from hdopt.effects.base import Effect, Keys
 from hdopt.effects.conditions import TURN, Conditions
 from hdopt.effects.declared import UM, Category, Quantity, needed, number
 from hdopt.effects.estimate import FitEstimate, Parameter
+from hdopt.effects.met import Pulse, Spline
 from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.term import Shape, Term
 from hdopt.errors import HdoptError
@@ -51,6 +52,11 @@ class Seat(StrEnum):
     def in_zones(self) -> bool:
         """Whether the driving zone meets it."""
         return self in (Seat.CIRCULAR_SPLINE, Seat.FLEXSPLINE)
+
+    @property
+    def spline(self) -> Spline:
+        """The spline of a tooth that the driving zone meets."""
+        return Spline.FLEX if self.value.startswith("flexspline") else Spline.CIRCULAR
 
     @property
     def twice(self) -> bool:
@@ -180,8 +186,7 @@ class LocalToothDefect(Effect):
         steps = {"centre": 0.05 * sigma, "width_deg": 0.05 * kept["width_deg"]}
         trials = 60.0 * period / TURN
         if seat.in_zones:
-            zones = np.stack([pulse(0.0), pulse(math.pi)])[:, :, None]
-            return Term(self.id, kept, zones=zones, steps=steps, trials=trials)
+            return Term(self.id, kept, met=Pulse(seat.spline, kept["centre"], sigma), steps=steps, trials=trials)
         pulses = [pulse(0.0), pulse(math.pi)] if seat.twice else [pulse(0.0)]
         return Term(self.id, kept, columns=np.column_stack(pulses), steps=steps, trials=trials)
 
@@ -234,7 +239,11 @@ class LocalToothDefect(Effect):
         return found
 
     def sentence(self, shape: Shape, parameters: Mapping[str, Parameter], rms_arcmin: float) -> str:
+        angle = parameters["angle_deg"].value % 360
+        where = f"{angle:.1f} deg"
+        if shape["on"].in_zones:  # the ends of the wave generator are alike, and so are drives half a turn apart
+            where = f"{angle % 180:.1f} or {angle % 180 + 180:.1f} deg"
         return (
-            f"A local defect on the {shape['on'].part} at {parameters['angle_deg'].value % 360:.1f} deg makes a pulse "
+            f"A local defect on the {shape['on'].part} at {where} makes a pulse "
             f"{parameters['width_deg'].value:.2g} deg wide each time it is met."
         )

@@ -46,3 +46,46 @@ def _whole_sines(phase: Array, harmonics: Index) -> Array:
                 columns[i, 2 * place[h]] = s
                 columns[i, 2 * place[h] + 1] = c
     return columns
+
+
+def sine_sum(phase: Array, harmonics: Sequence[float] | Array, coefficients: Array) -> tuple[Array, Array]:
+    """The columns of `sine_columns` at `phase` (n,) and `harmonics` (k,) times `coefficients` (2 k,), and the slope of
+    their sum over the phase, (n,) each."""
+    phase, multiples = np.ascontiguousarray(phase, float), np.asarray(harmonics, float)
+    whole = multiples.astype(np.int64)
+    if np.all(whole == multiples) and 0 < whole.min() and whole.max() <= max(4 * len(whole), FEW_STEPS):
+        by_order = np.zeros((2, whole.max() + 1))
+        by_order[0, whole], by_order[1, whole] = coefficients[0::2], coefficients[1::2]
+        return _whole_sum(phase, by_order)
+    return _sum(phase, multiples, np.ascontiguousarray(coefficients, float))
+
+
+FEW_STEPS = 16
+"""Multiples up to which the addition theorems are quicker than a sine of each."""
+
+
+@late(calls=0)
+def _sum(phase: Array, harmonics: Array, coefficients: Array) -> tuple[Array, Array]:
+    value, slope = np.zeros(len(phase)), np.zeros(len(phase))
+    for i in range(len(phase)):
+        for k in range(len(harmonics)):
+            sine, cosine = math.sin(harmonics[k] * phase[i]), math.cos(harmonics[k] * phase[i])
+            a, b = coefficients[2 * k], coefficients[2 * k + 1]
+            value[i] += a * sine + b * cosine
+            slope[i] += harmonics[k] * (a * cosine - b * sine)
+    return value, slope
+
+
+@late(calls=0)
+def _whole_sum(phase: Array, by_order: Array) -> tuple[Array, Array]:
+    """The same where `by_order` (2, h + 1) holds the coefficients of sine and cosine of every whole multiple."""
+    value, slope = np.zeros(len(phase)), np.zeros(len(phase))
+    for i in range(len(phase)):
+        sine, cosine = math.sin(phase[i]), math.cos(phase[i])
+        s, c = 0.0, 1.0
+        for h in range(1, by_order.shape[1]):
+            s, c = c * sine + s * cosine, c * cosine - s * sine
+            a, b = by_order[0, h], by_order[1, h]
+            value[i] += a * s + b * c
+            slope[i] += h * (a * c - b * s)
+    return value, slope

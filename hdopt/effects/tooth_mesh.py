@@ -12,14 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects.base import Effect, Keys
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import UM, Sines, smallest_set
 from hdopt.effects.estimate import FitEstimate, Parameter
+from hdopt.effects.met import Spline, ZoneWaves
 from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Shape, Term
@@ -130,12 +129,10 @@ class ToothMesh(Effect):
         return [{"sidebands": sides, "zones": True} for sides in ZONE_SIDEBANDS]
 
     def term(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
-        waves = sine_columns(conditions.theta, self.orders(shape, conditions.ratio))
-        if "zones" not in shape:
-            return Term(self.id, dict(shape), columns=waves, trials=len(SIDEBANDS))
-        none = np.zeros_like(waves)
-        zones = np.stack([np.column_stack([waves, none]), np.column_stack([none, waves])])
-        return Term(self.id, dict(shape), zones=zones, trials=len(ZONE_SIDEBANDS))
+        orders = tuple(self.orders(shape, conditions.ratio))
+        if "zones" in shape:
+            return Term(self.id, dict(shape), met=ZoneWaves(Spline.CIRCULAR, orders), trials=len(ZONE_SIDEBANDS))
+        return Term(self.id, dict(shape), columns=sine_columns(conditions.theta, orders), trials=len(SIDEBANDS))
 
     def orders(self, shape: Shape, ratio: float) -> list[float]:
         return [mesh_order(ratio) + k for k in shape["sidebands"]]

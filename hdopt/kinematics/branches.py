@@ -26,6 +26,13 @@ class DeepestPoints:
     offset_fs: Array
     rim: Array
 
+    @property
+    def beyond(self) -> Array:
+        """How far each zone's deepest point lies beyond its end of the major axis the way the wave generator turns,
+        rad, (2, 2, ...): first the spline (o for the CS, o' for the FS), then the zone."""
+        first, second = self.offset_cs, self.offset_fs
+        return np.stack([np.stack([first[0], -first[1]]), np.stack([second[0], -second[1]])])
+
 
 @dataclass(frozen=True)
 class Branches:

@@ -17,7 +17,7 @@ import numpy as np
 from hdopt.arrays import Array, Index
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
-from hdopt.kinematics.cartesian_kernel import evaluated
+from hdopt.kinematics.cartesian_kernel import beyond, evaluated
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
 from hdopt.kinematics.load_sharing import NO_TABLE, mesh_tables
 
@@ -116,18 +116,32 @@ class CartesianModel:
         advance = self.advance * np.asarray(theta, float)
         return np.stack([np.cos(theta), np.sin(theta), np.cos(advance), np.sin(advance)])
 
-    def evaluate(self, theta: Array, errors: Array, extra: Array | None = None) -> Evaluated:
+    def evaluate(
+        self, theta: Array, errors: Array, extra: Array | None = None, rises: Array | None = None
+    ) -> Evaluated:
         """`evaluate_at` for input angles `theta` (n,) rad."""
-        return self.evaluate_at(self.rotation(theta), errors, extra)
+        return self.evaluate_at(self.rotation(theta), errors, extra, rises)
 
-    def evaluate_at(self, rotation: Array, errors: Array, extra: Array | None = None) -> Evaluated:
+    def beyond_at(self, rotation: Array, errors: Array) -> Array:
+        """How far each zone's deepest point lies beyond its end of the major axis the way the wave generator turns,
+        rad, (2, 2, n): first the spline (o seen from the CS centre, o' for the FS), then the zone. `rotation` (4, n),
+        `errors` (12,) mm."""
+        return beyond(rotation, self.tip, np.asarray(errors, float))
+
+    def evaluate_at(
+        self, rotation: Array, errors: Array, extra: Array | None = None, rises: Array | None = None
+    ) -> Evaluated:
         """KE (arcmin, n), the driving zone (0 or 1, n) and dKE/derrors (arcmin/mm, n x 12) at a `rotation` (4, n).
 
         `errors` (12,) mm. `extra` (2, n) in mm is added to the deviation of each zone before the
-        larger one is taken. The slope is that of the branch that drives: it jumps where the zone or the rim changes.
+        larger one is taken, and `rises` (2, 2, n) is its slope over the angle at which each spline (CS, FS) is met,
+        mm/rad: the errors move that angle. The slope is that of the branch that drives: it jumps where the zone or the
+        rim changes.
         """
         if extra is None:
             extra = np.zeros((2, 1))
+        if rises is None:
+            rises = np.zeros((2, 2, 1))
         value, zone, slopes = evaluated(
             rotation,
             self.tip,
@@ -135,7 +149,7 @@ class CartesianModel:
             self.arcmin_per_mm,
             np.asarray(errors, float),
             np.ascontiguousarray(extra),
-            self.cs_table,
-            self.fs_table,
+            np.ascontiguousarray(rises),
+            (self.cs_table, self.fs_table),
         )
         return value, zone, slopes.T

@@ -31,8 +31,8 @@ BLOCK = 128
 
 # Rows of the work array, each of BLOCK numbers: a constant distance apart, so that the compiler sees that they do not
 # overlap. First what comes in, then what is known of either zone, then what goes out.
-COS, SIN, COS_FS, SIN_FS, EXTRA = (BLOCK * row for row in (0, 1, 2, 3, 4))
-ZONE = 6 * BLOCK
+COS, SIN, COS_FS, SIN_FS, EXTRA, RISE = (BLOCK * row for row in (0, 1, 2, 3, 4, 6))
+ZONE = 10 * BLOCK
 TAU, RIM, OFFSET, OFFSET_FS, SIN_O, COS_O, SIN_OF, COS_OF, RISE_CS, RISE_FS = (BLOCK * row for row in range(10))
 ZONE_ROWS = 10 * BLOCK
 VALUE = ZONE + 2 * ZONE_ROWS
@@ -62,6 +62,15 @@ def _one_of(other: bool, there: float, here: float) -> float:
     return there if other else here
 
 
+@inlined
+def _motion_of(tip: TipGeometry, p: Array) -> RigidMotion[float]:
+    """What the errors `p` (12,) mm make of the wave generator of `tip`."""
+    half = tip.half_width
+    return rigid_motion(
+        tip, ErrorComponents(p[0], p[1], p[2] / half, p[3] / half, p[4], p[5], p[6] / half, p[7] / half)
+    )
+
+
 @compiled
 def _both_zones(work: Array, rim: RimConstants, motion: RigidMotion[float], p: Array, tan_alpha: float) -> None:
     """Deviation (mm of arc), deeper rim and offsets of either zone at the angles in `work`, without measured teeth;
@@ -86,7 +95,8 @@ def _both_zones(work: Array, rim: RimConstants, motion: RigidMotion[float], p: A
             work[at + OFFSET + i], work[at + OFFSET_FS + i] = o, of
             work[at + SIN_O + i], work[at + COS_O + i] = sin_o, cos_o
             work[at + SIN_OF + i], work[at + COS_OF + i] = sin_of, cos_of
-            work[at + RISE_CS + i], work[at + RISE_FS + i] = 0.0, 0.0
+            work[at + RISE_CS + i] = work[RISE + number * BLOCK + i]
+            work[at + RISE_FS + i] = work[RISE + (2 + number) * BLOCK + i]
 
 
 @compiled
@@ -161,22 +171,31 @@ def _driving(
 
 @entry
 def evaluated(
-    rotation: Array, tip: TipGeometry, tan_alpha: float, scale: float, p: Array, extra: Array, cs: Array, fs: Array
+    rotation: Array,
+    tip: TipGeometry,
+    tan_alpha: float,
+    scale: float,
+    p: Array,
+    extra: Array,
+    rises: Array,
+    tables: tuple[Array, Array],
 ) -> tuple[Array, Index, Array]:
     """The error (arcmin, n), the driving zone (0 or 1, n) and the slopes (arcmin/mm, 12 x n) at a `rotation` (4, n).
 
     `tip` has the wave generator's constants, `tan_alpha` is that of the pressure angle, `scale` arcmin per mm of arc,
-    `p` the errors (12,) mm, `extra` what is added to either zone, (2, n) or (2, 1), mm of arc; `cs`, `fs` the tables of
-    measured teeth, mm of arc, empty where they were not measured.
+    `p` the errors (12,) mm, `extra` what is added to either zone, (2, n) or (2, 1), mm of arc, and `rises` its slope
+    over the angle at which CS and FS are met, (2, 2, n) or (2, 2, 1), mm/rad; `tables` those of the measured teeth of
+    CS and FS, mm of arc, empty where they were not measured.
     """
+    cs, fs = tables
     n = rotation.shape[1]
     value, zone, slopes = np.empty(n), np.empty(n, np.int64), np.empty((PARAMETERS, n))
     work = np.zeros(WORK)
-    half_width, rim = tip.half_width, rim_constants(tip)
-    components = ErrorComponents(
-        p[0], p[1], p[2] / half_width, p[3] / half_width, p[4], p[5], p[6] / half_width, p[7] / half_width
-    )
-    motion = rigid_motion(tip, components)
+    rim, motion = rim_constants(tip), _motion_of(tip, p)
+    has_rises = rises.shape[2] == n and n > 1
+    for k in range(4):
+        at = RISE + k * BLOCK
+        work[at : at + BLOCK] = 0.0 if has_rises else rises[k // 2, k % 2, 0]
     has_extra = extra.shape[1] == n and n > 1
     for number in range(2):
         work[EXTRA + number * BLOCK : EXTRA + (number + 1) * BLOCK] = 0.0 if has_extra else extra[number, 0]
@@ -188,6 +207,10 @@ def evaluated(
             for number in range(2):
                 at = EXTRA + number * BLOCK
                 work[at : at + rows] = extra[number, start : start + rows]
+        if has_rises:
+            for k in range(4):
+                at = RISE + k * BLOCK
+                work[at : at + rows] = rises[k // 2, k % 2, start : start + rows]
         _both_zones(work, rim, motion, p, tan_alpha)
         if len(cs) > 0:
             _add_measured(work, cs, COS, SIN, OFFSET, RISE_CS)
@@ -201,3 +224,22 @@ def evaluated(
             at = SLOPES + row * BLOCK
             slopes[row, start : start + rows] = work[at : at + rows]
     return value, zone, slopes
+
+
+@entry
+def beyond(rotation: Array, tip: TipGeometry, p: Array) -> Array:
+    """How far the deepest point of each zone lies beyond its end of the major axis, rad, (2, 2, n): s o and s o', first
+    the spline (CS, FS), then the zone with s +1 and -1. `rotation`, `tip` and `p` as for `evaluated`."""
+    n = rotation.shape[1]
+    found = np.empty((2, 2, n))
+    rim, motion = rim_constants(tip), _motion_of(tip, p)
+    for number in range(2):
+        z = 1.0 - 2.0 * number
+        for i in range(n):
+            e_a, e_l, t_a, t_l = motion_at(motion, rotation[0, i], rotation[1, i])
+            high, o_high, of_high = rim_depth(rim, e_a, e_l, t_a, t_l, z, 1.0)
+            low, o_low, of_low = rim_depth(rim, e_a, e_l, t_a, t_l, z, -1.0)
+            lower = low > high
+            found[0, number, i] = z * (o_low if lower else o_high)
+            found[1, number, i] = z * (of_low if lower else of_high)
+    return found

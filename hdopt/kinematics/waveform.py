@@ -138,10 +138,17 @@ def relative_turn_deviation(
     Arguments as in `relative_turn`: `drive`, `errors`, `samples_per_turn`, `geometry`. The deepest points repeat every
     input turn and are found once; only the FS teeth met differ from turn to turn.
     """
+    theta, points = relative_turn_points(drive, errors, samples_per_turn, geometry)
+    return theta, deviation_at(drive, errors, theta, points)
+
+
+def relative_turn_points(
+    drive: Drive, errors: DriveErrors, samples_per_turn: int, geometry: str = DEFAULT_METHOD
+) -> tuple[Array, DeepestPoints]:
+    """Input angles (rad, shape (n,)) of one full relative turn, and the deepest points there; arguments as in
+    `relative_turn`: `drive`, `errors`, `samples_per_turn`, `geometry`."""
     theta = full_turn(drive, samples_per_turn)
     one_turn = geometry_for(drive, geometry)(drive, errors, theta[:samples_per_turn])
     turns = drive.geometry.beat_phases
-    points = DeepestPoints(
-        *(np.tile(values, turns) for values in (one_turn.depth, one_turn.offset_cs, one_turn.offset_fs, one_turn.rim))
-    )
-    return theta, deviation_at(drive, errors, theta, points)
+    repeated = (np.tile(v, turns) for v in (one_turn.depth, one_turn.offset_cs, one_turn.offset_fs, one_turn.rim))
+    return theta, DeepestPoints(*repeated)

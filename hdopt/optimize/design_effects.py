@@ -39,7 +39,7 @@ class DesignEffects:
                 for e in effects
             ]
             radial = tabulate(drive, silent, operation)
-        fixed = whole if radial is None else replace(whole, zones=whole.zones - radial.zones)
+        fixed = whole if radial is None else _sum(whole, radial, -1.0)
         return cls(effects, operation, math.tan(drive.geometry.pressure_angle), fixed, radial)
 
     def at(self, drive: Drive) -> tuple[EffectValues, ...]:
@@ -54,7 +54,7 @@ class DesignEffects:
         """Their table."""
         if self.radial is None:
             return self.fixed
-        return replace(self.fixed, zones=self.fixed.zones + self._factor(drive) * self.radial.zones)
+        return _sum(self.fixed, self.radial, self._factor(drive))
 
     def peak_to_peak_arcmin(self, drive: Drive, row: Array, homogenization: float = 1.0) -> float:
         """Converged peak-to-peak of a design with errors `row` (12) and the effects, arcmin."""
@@ -73,3 +73,13 @@ class DesignEffects:
 
     def _factor(self, drive: Drive) -> float:
         return math.tan(drive.geometry.pressure_angle) / self.tan_alpha
+
+
+def _sum(table: AddedTable, other: AddedTable, factor: float) -> AddedTable:
+    """`table` with so many times (`factor`) what the `other` adds in the zones."""
+    return replace(
+        table,
+        zones=table.zones + factor * other.zones,
+        cs=table.cs + factor * other.cs,
+        fs=table.fs + factor * other.fs,
+    )

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hdopt.arrays import Array, Index
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
+from hdopt.effects.met import Spline
 from hdopt.errors import HdoptError
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
 from hdopt.kinematics.waveform import full_turn
@@ -20,28 +22,52 @@ from hdopt.simulation.effect_values import EffectValues
 from hdopt.simulation.model import ExtendedModel
 from hdopt.simulation.operation import Operation
 
+if TYPE_CHECKING:
+    from hdopt.simulation.cell_kernel import SplineTables
+    from hdopt.simulation.walk_kernel import Added
+
 WALK_PER_TURN, TABLE_PER_TURN = 180, 1440
 """Cells, and places of the table, in an input turn at least."""
 WALK_PER_PERIOD, TABLE_PER_PERIOD = 8, 32
 """The same in a period of the highest order."""
+ON_SPLINE = 2
+"""How many times finer the tables over a turn of a spline are: they are short."""
 BLOCK = 64
 """Drives a thread takes at a time."""
+
+
+NO_PLACES: Array = np.empty((2, 0))
 
 
 @dataclass(frozen=True)
 class AddedTable:
     """Effects over one full relative turn: `zones` (d, 2, m) mm of arc in both meshing zones, `beside` (d, m) arcmin at
-    the output, for each of d directions of the motion, on m even places. A first walk takes every `stride`-th."""
+    the output, for each of d directions of the motion, on m even places. A first walk takes every `stride`-th. `cs` and
+    `fs` (2, places): what zones 1 and 2 meet of effects on the splines over a turn of each, mm of arc, counted from
+    where the zone's end of the major axis stands at input angle 0; on no places where there are none. Where on it a
+    zone stands is a matter of each drive's errors."""
 
     zones: Array
     beside: Array
     stride: int
+    cs: Array = field(default_factory=lambda: NO_PLACES)
+    fs: Array = field(default_factory=lambda: NO_PLACES)
 
     @cached_property
-    def walked(self) -> tuple[Array, Array]:
-        """Both on the places of the first walk."""
+    def walked(self) -> Added:
+        """The same as the compiled walk takes it, on the places of the first walk."""
+        from hdopt.simulation.walk_kernel import Added
+
         every = slice(None, None, self.stride)
-        return np.ascontiguousarray(self.zones[..., every]), np.ascontiguousarray(self.beside[:, every])
+        zones, beside = self.zones[..., every], self.beside[:, every]
+        return Added(np.ascontiguousarray(zones), np.ascontiguousarray(beside), self.cs, self.fs)
+
+    @property
+    def every_place(self) -> Added:
+        """The same on all places."""
+        from hdopt.simulation.walk_kernel import Added
+
+        return Added(self.zones, self.beside, self.cs, self.fs)
 
     @property
     def widest_arcmin(self) -> float:
@@ -51,7 +77,7 @@ class AddedTable:
     @property
     def widest_mm(self) -> float:
         """Range of what is in the zones, mm of arc."""
-        return float(np.ptp(self.zones))
+        return float(np.ptp(self.zones)) + sum(float(np.ptp(t)) for t in (self.cs, self.fs) if t.size)
 
 
 def tabulate(drive: Drive, effects: Sequence[EffectValues], operation: Operation) -> AddedTable:
@@ -85,10 +111,27 @@ def tabulate(drive: Drive, effects: Sequence[EffectValues], operation: Operation
     theta = full_turn(drive, walk * stride)
     directions = operation.directions
     return AddedTable(
-        np.stack([model.in_zones(theta, direction) for direction in directions]),
+        np.stack([model.fixed_in_zones(theta, direction) for direction in directions]),
         np.stack([model.beside(theta, direction) for direction in directions]),
         stride,
+        *(_on_spline(model, spline, ON_SPLINE * walk * stride) for spline in Spline),
     )
+
+
+def _on_spline(model: ExtendedModel, spline: Spline, places: int) -> Array:
+    """What both zones meet of the effects of `model` on a `spline` over a turn of it, mm of arc, (2, so many places at
+    least); (2, 0) where nothing stands on it. Places are a multiple of the turns after which the teeth meet again."""
+    found = [(met, c) for met, c in model.on_splines() if met.spline is spline]
+    if not found:
+        return NO_PLACES
+    turns = model.drive.geometry.beat_phases
+    places = math.ceil(places / turns) * turns
+    angle = np.arange(places, dtype=np.float64) * (2 * math.pi / places)
+    table = np.zeros((2, places))
+    for met, c in found:
+        for zone in (0, 1):
+            table[zone] += met.added(angle + math.pi * zone, zone, c)[0]
+    return table
 
 
 def matrix_peak_to_peak_arcmin(drive: Drive, matrix: Array, added: AddedTable, homogenization: float = 1.0) -> Array:
@@ -104,13 +147,51 @@ def matrix_peak_to_peak_arcmin(drive: Drive, matrix: Array, added: AddedTable, h
     out = np.empty(len(matrix))
     tip, tan_alpha, advance, turns, scale = _constants(drive, homogenization)
     cells = added.zones.shape[2] // (added.stride * turns)
-    table = cell_table(added.zones, added.beside, cells, turns, scale)
+    splines = _spline_tables(added, advance, cells)
+    table = cell_table(added.zones, added.beside, cells, turns, scale, splines)
 
     def fill(rows: slice) -> None:
         extended_block(tip, tan_alpha, advance, scale, matrix[rows], table, out[rows])
 
     in_blocks(len(matrix), BLOCK, fill)
     return out
+
+
+WIDER = 1.2
+"""How much more of a spline a zone may pass than the wave generator turns: offsets as shipped change by 0.04 a rad."""
+
+
+def _spline_tables(added: AddedTable, advance: float, cells: int) -> SplineTables:
+    """The effects on the splines as the kernel takes them, for so many `cells` a turn."""
+    from hdopt.simulation.cell_kernel import SplineTables
+
+    fs, window = added.fs, advance * WIDER / cells
+    least = fs.min(axis=1) if fs.size else np.zeros(2)
+    largest = fs.max(axis=1) if fs.size else np.zeros(2)
+    cs_sag = float(_sags(added.cs, window).max(initial=0.0))
+    return SplineTables(
+        added.cs,
+        fs,
+        round((advance - 1) * fs.shape[1]),
+        least,
+        largest,
+        np.ascontiguousarray(_sags(fs, window)),
+        cs_sag,
+    )
+
+
+def _sags(table: Array, window: float) -> Array:
+    """How far `table` (2, places) goes beyond its chord over so much of a turn (`window`) that begins at a place or
+    just beside it, mm of arc, (2, places)."""
+    if not table.size:
+        return table
+    length = math.ceil(window * table.shape[1]) + 1
+    ends, worst = np.roll(table, -length, axis=1) - table, np.zeros_like(table)
+    for k in range(1, length):
+        off = np.roll(table, -k, axis=1) - table - ends * (k / length)
+        worst = np.maximum(worst, np.abs(off))
+    beside = range(-math.ceil((1 - 1 / WIDER) * length) - 1, 2)
+    return np.asarray(np.max([np.roll(worst, k, axis=1) for k in beside], axis=0))
 
 
 CLOSEST = math.radians(8)
@@ -145,7 +226,7 @@ def local_extremes(drive: Drive, row: Array, added: AddedTable, most: int) -> tu
     """
     from hdopt.simulation.walk_kernel import extended_walk
 
-    values = extended_walk(*_constants(drive), np.ascontiguousarray(row), *added.walked)
+    values = extended_walk(*_constants(drive), np.ascontiguousarray(row), added.walked)
     step = 2 * math.pi * drive.geometry.beat_phases / values.shape[1]
     found = []
     for sign in (1.0, -1.0):
@@ -171,9 +252,7 @@ def _near(drive: Drive, row: Array, added: AddedTable, at: LocalExtremes, half: 
     from hdopt.simulation.walk_kernel import extended_near
 
     row = np.ascontiguousarray(row)
-    return extended_near(
-        *_constants(drive), row, added.zones, added.beside, at.way, at.theta, half, at.sign, LOCAL_STEPS
-    )
+    return extended_near(*_constants(drive), row, added.every_place, at.way, at.theta, half, at.sign, LOCAL_STEPS)
 
 
 def _constants(drive: Drive, homogenization: float = 1.0) -> tuple[TipGeometry, float, float, int, float]:

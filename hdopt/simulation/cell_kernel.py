@@ -18,7 +18,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.kinematics.closed_form import TipGeometry
 from hdopt.kinematics.compiled_closed_form import compiled, entry, inlined, motion_at, rim_depth
-from hdopt.simulation.walk_kernel import EDGE, MOST_CUTS, WalkedDrive, drive_of, rims, rims_apart
+from hdopt.simulation.walk_kernel import EDGE, MOST_CUTS, WalkedDrive, drive_of, on_spline, on_splines, rims, rims_apart
 
 ROUNDS = 2
 """Times that parabolas are laid through a cell: the second is eight times narrower."""
@@ -31,14 +31,35 @@ U, W, U_SIN, U_COS, W_SIN, W_COS = range(6)
 """Rows of a grid: both zones without FS teeth, and the sine and cosine part of these, mm of arc."""
 GAP_ONE, GAP_TWO = 6, 7
 """How much deeper rim 1 lies than rim 2 in either zone, mm."""
-ROWS = 8
+FS_ONE, FS_TWO = 8, 9
+"""Angles of the FS that either zone meets, rad, zone 2 counted from its own end."""
+ROWS = 10
+FS_CHORDS, FS_SAGS = 2, 6
+"""First rows of a cell's estimates, after those of the driving deviation and of its negative, for what both zones meet
+of effects on the FS at the cell's ends, and for how far that goes beyond the chord, mm of arc."""
+ESTIMATES = 8
+
+
+class SplineTables(NamedTuple):
+    """What each zone meets of effects on CS and FS over a turn of the spline, mm of arc, (2, places) each, on no places
+    where there are none; the places by which the FS goes on from turn to turn; the least and the largest that a zone
+    meets on the FS, (2,) each; how far a cell that begins at a place of `fs` goes beyond its chord, (2, places), and
+    one anywhere on `cs`, mm of arc."""
+
+    cs: Array
+    fs: Array
+    fs_advance: int
+    fs_least: Array
+    fs_largest: Array
+    fs_sag: Array
+    cs_sag: float
 
 
 class CellTable(NamedTuple):
     """Effects of one direction over a full relative turn of t input turns of c cells, mm of arc, those beside the zones
     counted into both: at the cells' edges (2, c + 1, t), how far below and above its chord a cell goes (2, c, t) each,
-    the least (3, c) and the largest (2, c) of a cell over all turns, the third row that of both zones' mean; and all
-    places of the table, (2, m)."""
+    the least (3, c) and the largest (2, c) of a cell over all turns, the third row that of both zones' mean; all
+    places of the table, (2, m); and the effects that stand on the splines."""
 
     edges: Array
     below: Array
@@ -46,6 +67,7 @@ class CellTable(NamedTuple):
     least: Array
     largest: Array
     fine: Array
+    splines: SplineTables
 
 
 class Circle(NamedTuple):
@@ -61,8 +83,8 @@ class Circle(NamedTuple):
 
 
 @inlined
-def _deeper(drive: WalkedDrive, cos: float, sin: float, s: float) -> tuple[float, float, float]:
-    """Deviation of zone s (+1, -1) without its FS teeth at the deeper rim, the FS offset there, and the depths'
+def _deeper(drive: WalkedDrive, cos: float, sin: float, s: float) -> tuple[float, float, float, float]:
+    """Deviation of zone s (+1, -1) without its FS teeth at the deeper rim, the offsets o and o' there, and the depths'
     difference; offsets are small here, so that series do."""
     rim = drive.rim
     e_a, e_l, t_a, t_l = motion_at(drive.motion, cos, sin)
@@ -76,17 +98,22 @@ def _deeper(drive: WalkedDrive, cos: float, sin: float, s: float) -> tuple[float
     ahead = drive.cs_sin * cos - drive.cs_cos * sin
     square = o * o
     teeth = s * here * (1.0 - 0.5 * square) + ahead * o * (1.0 - square / 6.0)
-    return drive.tan_alpha * depth + teeth, o_fs, gap
+    return drive.tan_alpha * depth + teeth, o, o_fs, gap
 
 
 @compiled
-def _fill_grid(drive: WalkedDrive, circle: Circle, grid: Array) -> None:
-    """Fill `grid` (ROWS, c + 1) with both zones at the cells' edges."""
+def _fill_grid(drive: WalkedDrive, circle: Circle, cs: Array, grid: Array) -> None:
+    """Fill `grid` (ROWS, c + 1) with both zones at the cells' edges; `cs` holds the effects on the CS."""
+    step = 2 * math.pi / (len(circle.cos) - 1)
     a_sin, a_cos = drive.a_fs * math.sin(drive.fs_phase), drive.a_fs * math.cos(drive.fs_phase)
     for g in range(len(circle.cos)):
         cos, sin = circle.cos[g], circle.sin[g]
-        u, o_one, gap_one = _deeper(drive, cos, sin, 1.0)
-        w, o_two, gap_two = _deeper(drive, cos, sin, -1.0)
+        u, cs_one, o_one, gap_one = _deeper(drive, cos, sin, 1.0)
+        w, cs_two, o_two, gap_two = _deeper(drive, cos, sin, -1.0)
+        if cs.shape[1] > 0:
+            u += on_spline(cs, 0, g * step + cs_one)
+            w += on_spline(cs, 1, g * step - cs_two)
+        grid[FS_ONE, g], grid[FS_TWO, g] = drive.advance * g * step + o_one, drive.advance * g * step - o_two
         sine = a_cos * circle.fs_sin[g] + a_sin * circle.fs_cos[g]
         cosine = a_cos * circle.fs_cos[g] - a_sin * circle.fs_sin[g]
         c_one, s_one = 1.0 - 0.5 * o_one * o_one, o_one * (1.0 - o_one * o_one / 6.0)
@@ -98,11 +125,15 @@ def _fill_grid(drive: WalkedDrive, circle: Circle, grid: Array) -> None:
 
 
 @compiled
-def _fill_edge(drive: WalkedDrive, theta: float, edge: Array) -> None:
-    """Fill one column `edge` (ROWS,) of a grid at `theta`, rad."""
+def _fill_edge(drive: WalkedDrive, theta: float, cs: Array, edge: Array) -> None:
+    """Fill one column `edge` (ROWS,) of a grid at `theta`, rad, as in `_fill_grid`."""
     cos, sin = math.cos(theta), math.sin(theta)
-    edge[U], o_one = rims(drive, cos, sin, 1.0)
-    edge[W], o_two = rims(drive, cos, sin, -1.0)
+    edge[U], cs_one, o_one = rims(drive, cos, sin, 1.0)
+    edge[W], cs_two, o_two = rims(drive, cos, sin, -1.0)
+    if cs.shape[1] > 0:
+        edge[U] += on_spline(cs, 0, theta + cs_one)
+        edge[W] += on_spline(cs, 1, theta - cs_two)
+    edge[FS_ONE], edge[FS_TWO] = drive.advance * theta + o_one, drive.advance * theta - o_two
     phase = drive.advance * theta + drive.fs_phase
     edge[U_SIN], edge[U_COS] = drive.a_fs * math.sin(phase + o_one), drive.a_fs * math.cos(phase + o_one)
     edge[W_SIN], edge[W_COS] = -drive.a_fs * math.sin(phase - o_two), -drive.a_fs * math.cos(phase - o_two)
@@ -160,11 +191,11 @@ def _changes(drive: WalkedDrive, grid: Array, cuts: Array) -> int:
 
 
 @compiled
-def _zones_at(drive: WalkedDrive, theta: float, fine: Array) -> tuple[float, float]:
-    """Both zones (mm of arc) at `theta` (rad), with effects interpolated in the table `fine` (2, m)."""
-    cos, sin = math.cos(theta), math.sin(theta)
-    one, o_one = rims(drive, cos, sin, 1.0)
-    two, o_two = rims(drive, cos, sin, -1.0)
+def _zones_at(drive: WalkedDrive, theta: float, table: CellTable) -> tuple[float, float]:
+    """Both zones (mm of arc) at `theta` (rad), with effects interpolated in the `table`."""
+    fine, splines, cos, sin = table.fine, table.splines, math.cos(theta), math.sin(theta)
+    one, cs_one, o_one = rims(drive, cos, sin, 1.0)
+    two, cs_two, o_two = rims(drive, cos, sin, -1.0)
     m = fine.shape[1]
     place = theta / drive.span
     place = (place - math.floor(place)) * m
@@ -174,6 +205,8 @@ def _zones_at(drive: WalkedDrive, theta: float, fine: Array) -> tuple[float, flo
     phase = drive.advance * theta + drive.fs_phase
     one += drive.a_fs * math.sin(phase + o_one) + fine[0, i] + share * (fine[0, j] - fine[0, i])
     two += -drive.a_fs * math.sin(phase - o_two) + fine[1, i] + share * (fine[1, j] - fine[1, i])
+    one += on_splines(splines.cs, splines.fs, 0, theta, drive.advance * theta, (cs_one, o_one))
+    two += on_splines(splines.cs, splines.fs, 1, theta, drive.advance * theta, (cs_two, o_two))
     return one, two
 
 
@@ -209,17 +242,17 @@ def _best_place(one: tuple[float, float, float], two: tuple[float, float, float]
 
 
 @compiled
-def _refined(drive: WalkedDrive, low: float, high: float, sign: float, fine: Array) -> float:
+def _refined(drive: WalkedDrive, low: float, high: float, sign: float, table: CellTable) -> float:
     """The least (sign +1) or the largest (-1) driving deviation between `low` and `high` (rad), mm of arc."""
     centre, half, best = 0.5 * (low + high), 0.5 * (high - low), math.inf
     for _ in range(ROUNDS):
-        one_a, two_a = _zones_at(drive, centre - half, fine)
-        one_b, two_b = _zones_at(drive, centre, fine)
-        one_c, two_c = _zones_at(drive, centre + half, fine)
+        one_a, two_a = _zones_at(drive, centre - half, table)
+        one_b, two_b = _zones_at(drive, centre, table)
+        one_c, two_c = _zones_at(drive, centre + half, table)
         one = (one_b, 0.5 * (one_c - one_a), 0.5 * (one_a + one_c) - one_b)
         two = (two_b, 0.5 * (two_c - two_a), 0.5 * (two_a + two_c) - two_b)
         x = centre + half * _best_place(one, two, sign)
-        one_x, two_x = _zones_at(drive, x, fine)
+        one_x, two_x = _zones_at(drive, x, table)
         seen = min(sign * max(one_a, two_a), sign * max(one_b, two_b), sign * max(one_c, two_c))
         best = min(best, seen, sign * max(one_x, two_x))
         half *= NARROWER
@@ -240,30 +273,58 @@ def _bounds(at: Array, to: Array, table: CellTable, g: int, a_fs: float) -> tupl
     and `to` of a grid in cell `g`."""
     apart = abs(at[U_SIN] + at[W_SIN]) + abs(at[U_COS] + at[W_COS])
     apart = max(apart, abs(to[U_SIN] + to[W_SIN]) + abs(to[U_COS] + to[W_COS]))
-    mean = 0.5 * (min(at[U] + at[W], to[U] + to[W]) - apart) + table.least[2, g]
-    one, two = min(at[U], to[U]) - a_fs + table.least[0, g], min(at[W], to[W]) - a_fs + table.least[1, g]
-    high_one = max(at[U], to[U]) + a_fs + table.largest[0, g]
-    high_two = max(at[W], to[W]) + a_fs + table.largest[1, g]
+    fs_one, fs_two = table.splines.fs_least
+    mean = 0.5 * (min(at[U] + at[W], to[U] + to[W]) - apart + fs_one + fs_two) + table.least[2, g]
+    one = min(at[U], to[U]) - a_fs + table.least[0, g] + fs_one
+    two = min(at[W], to[W]) - a_fs + table.least[1, g] + fs_two
+    high_one = max(at[U], to[U]) + a_fs + table.largest[0, g] + table.splines.fs_largest[0]
+    high_two = max(at[W], to[W]) + a_fs + table.largest[1, g] + table.splines.fs_largest[1]
     return max(mean, one, two), -max(high_one, high_two)
+
+
+@compiled
+def _fill_fs(table: Array, advance: int, angle: float, out: Array) -> None:
+    """Fill `out` (t,) with a `table` of the FS, (places,), in every turn, where it stands at `angle` (rad) in the first
+    and goes on by `advance` places."""
+    n = len(table)
+    place = angle / (2 * math.pi)
+    place = (place - math.floor(place)) * n
+    i = int(place)
+    share = place - i
+    i = i % n
+    for t in range(len(out)):
+        after = i + 1 if i + 1 < n else 0
+        out[t] = (1.0 - share) * table[i] + share * table[after]
+        i += advance
+        i = i - n if i >= n else i
 
 
 @compiled
 def _fill_estimates(
     at: Array, to: Array, first: float, last: float, table: CellTable, g: int, circle: Circle, out: Array
 ) -> None:
-    """Fill `out` (2, t) with the chords' least driving deviation in every turn, and with that of its negative, between
-    two columns `at` and `to` of a grid at the shares `first` and `last` of cell `g`."""
+    """Fill the first rows of `out` (ESTIMATES, t) with the chords' least driving deviation in every turn, and with that
+    of its negative, between two columns `at` and `to` of a grid at the shares `first` and `last` of cell `g`; the
+    others are 0, or filled with what stands on the FS."""
+    if table.splines.fs.shape[1] > 0:
+        fs, advance, sag = table.splines.fs, table.splines.fs_advance, table.splines.fs_sag
+        for zone in range(2):
+            _fill_fs(fs[zone], advance, at[FS_ONE + zone], out[FS_CHORDS + zone])
+            _fill_fs(fs[zone], advance, to[FS_ONE + zone], out[FS_CHORDS + 2 + zone])
+            _fill_fs(sag[zone], advance, at[FS_ONE + zone], out[FS_SAGS + zone])
     left, right = 1.0 - first, 1.0 - last
     one, one_next, two, two_next = table.edges[0, g], table.edges[0, g + 1], table.edges[1, g], table.edges[1, g + 1]
     low_one, low_two, high_one, high_two = table.below[0, g], table.below[1, g], table.above[0, g], table.above[1, g]
     for t in range(len(circle.turn_cos)):
         c, s = circle.turn_cos[t], circle.turn_sin[t]
-        u0 = at[U] + c * at[U_SIN] + s * at[U_COS] + left * one[t] + first * one_next[t]
-        w0 = at[W] + c * at[W_SIN] + s * at[W_COS] + left * two[t] + first * two_next[t]
-        u1 = to[U] + c * to[U_SIN] + s * to[U_COS] + right * one[t] + last * one_next[t]
-        w1 = to[W] + c * to[W_SIN] + s * to[W_COS] + right * two[t] + last * two_next[t]
-        out[1, t] = -max(max(u0, u1) + high_one[t], max(w0, w1) + high_two[t])
-        u0, u1, w0, w1 = u0 + low_one[t], u1 + low_one[t], w0 + low_two[t], w1 + low_two[t]
+        u0 = at[U] + c * at[U_SIN] + s * at[U_COS] + left * one[t] + first * one_next[t] + out[FS_CHORDS, t]
+        w0 = at[W] + c * at[W_SIN] + s * at[W_COS] + left * two[t] + first * two_next[t] + out[FS_CHORDS + 1, t]
+        u1 = to[U] + c * to[U_SIN] + s * to[U_COS] + right * one[t] + last * one_next[t] + out[FS_CHORDS + 2, t]
+        w1 = to[W] + c * to[W_SIN] + s * to[W_COS] + right * two[t] + last * two_next[t] + out[FS_CHORDS + 3, t]
+        sag_one, sag_two = out[FS_SAGS, t], out[FS_SAGS + 1, t]
+        out[1, t] = -max(max(u0, u1) + high_one[t] + sag_one, max(w0, w1) + high_two[t] + sag_two)
+        down_one, down_two = low_one[t] - sag_one, low_two[t] - sag_two
+        u0, u1, w0, w1 = u0 + down_one, u1 + down_one, w0 + down_two, w1 + down_two
         d0, d1 = u0 - w0, u1 - w1
         crosses = d0 * d1 < 0.0
         share = d0 / (d0 - d1 if crosses else 1.0)
@@ -273,7 +334,7 @@ def _fill_estimates(
 
 @compiled
 def _least_of_piece(
-    drive: WalkedDrive, piece: Piece, estimates: Array, slack: float, sign: float, fine: Array, least: float
+    drive: WalkedDrive, piece: Piece, estimates: Array, slack: float, sign: float, table: CellTable, least: float
 ) -> float:
     """The lower of `least` and sign times the driving deviation of a `piece`, in the turns whose `estimates` (t,) may
     go below by `slack`; the most promising turn first."""
@@ -282,7 +343,7 @@ def _least_of_piece(
         t = best if k < 0 else k
         if estimates[t] - slack < least and (k < 0 or k != best):
             start = 2 * math.pi * t
-            least = min(least, sign * _refined(drive, start + piece.low, start + piece.high, sign, fine))
+            least = min(least, sign * _refined(drive, start + piece.low, start + piece.high, sign, table))
     return least
 
 
@@ -304,7 +365,7 @@ def _least_at_changes(
 ) -> None:
     """Lower `least` (2,) to what the cells hold in which the deeper rim changes at one of `cuts`, part by part."""
     step = 2 * math.pi / cells
-    at, to, estimates = np.empty(ROWS), np.empty(ROWS), np.empty((2, len(circle.turn_cos)))
+    at, to, estimates = np.empty(ROWS), np.empty(ROWS), np.zeros((ESTIMATES, len(circle.turn_cos)))
     for k in range(len(cuts)):
         g = min(int(cuts[k] / step), cells - 1)
         new = k == 0 or min(int(cuts[k - 1] / step), cells - 1) != g
@@ -314,14 +375,14 @@ def _least_at_changes(
             high = cuts[k] - EDGE if part == 0 else min(next_cut - EDGE, (g + 1) * step)
             if high - low < 2 * EDGE:
                 continue
-            _fill_edge(drive, low, at)
-            _fill_edge(drive, high, to)
+            _fill_edge(drive, low, table.splines.cs, at)
+            _fill_edge(drive, high, table.splines.cs, to)
             bounds = _bounds(at, to, table, g, drive.a_fs)
             for side in range(2):
                 if (bounds[1] if side else bounds[0]) - slack < least[side]:
                     _fill_estimates(at, to, low / step - g, high / step - g, table, g, circle, estimates)
                     sign, piece = (-1.0 if side else 1.0), Piece(low, high)
-                    least[side] = _least_of_piece(drive, piece, estimates[side], slack, sign, table.fine, least[side])
+                    least[side] = _least_of_piece(drive, piece, estimates[side], slack, sign, table, least[side])
 
 
 @compiled
@@ -332,8 +393,8 @@ def _least_of_turns(
     all turns: cell by cell, the lowest bound first, until no bound is below what was found."""
     cells = grid.shape[1] - 1
     step = 2 * math.pi / cells
-    slack = 0.125 * step * step * _curvature(drive)
-    bounds, estimates = np.empty((2, cells)), np.empty((2, len(circle.turn_cos)))
+    slack = 0.125 * step * step * _curvature(drive) + table.splines.cs_sag
+    bounds, estimates = np.empty((2, cells)), np.zeros((ESTIMATES, len(circle.turn_cos)))
     for g in range(cells):
         bounds[0, g], bounds[1, g] = _bounds(grid[:, g], grid[:, g + 1], table, g, drive.a_fs)
     for k in range(len(cuts)):
@@ -346,7 +407,7 @@ def _least_of_turns(
                 break
             _fill_estimates(grid[:, g], grid[:, g + 1], 0.0, 1.0, table, g, circle, estimates)
             piece = Piece(g * step, (g + 1) * step)
-            least[side] = _least_of_piece(drive, piece, estimates[side], slack, sign, table.fine, least[side])
+            least[side] = _least_of_piece(drive, piece, estimates[side], slack, sign, table, least[side])
             bounds[side, g] = math.inf
     _least_at_changes(drive, cuts, cells, slack, table, circle, least)
 
@@ -359,11 +420,11 @@ def _circle(cells: int, turns: int, advance: float) -> Circle:
 
 
 @entry
-def cell_table(zones: Array, beside: Array, cells: int, turns: int, scale: float) -> CellTable:
+def cell_table(zones: Array, beside: Array, cells: int, turns: int, scale: float, splines: SplineTables) -> CellTable:
     """The effects of d directions as the kernel takes them, each array with one more axis in front.
 
     `zones` (d, 2, m) mm of arc and `beside` (d, m) arcmin lie on an even grid of `turns` input turns of `cells` cells;
-    `scale` is arcmin per mm of arc, times k_e.
+    `scale` is arcmin per mm of arc, times k_e. `splines` holds the effects that stand on the splines.
     """
     directions, _, m = zones.shape
     stride = m // (cells * turns)
@@ -393,7 +454,7 @@ def cell_table(zones: Array, beside: Array, cells: int, turns: int, scale: float
                 right = edges[d, 0, g + 1, t] + edges[d, 1, g + 1, t]
                 low = below[d, 0, g, t] + below[d, 1, g, t]
                 least[d, 2, g] = min(least[d, 2, g], 0.5 * (min(left, right) + low))
-    return CellTable(edges, below, above, least, largest, fine)
+    return CellTable(edges, below, above, least, largest, fine, splines)
 
 
 @entry
@@ -416,12 +477,18 @@ def extended_block(
     grid, every_cut, least = np.empty((ROWS, edges)), np.empty(MOST_CUTS), np.empty(2)
     for row in range(matrix.shape[0]):
         drive = drive_of(tip, tan_alpha, advance, turns, scale, matrix[row])
-        _fill_grid(drive, circle, grid)
+        _fill_grid(drive, circle, tables.splines.cs, grid)
         cuts = every_cut[: _changes(drive, grid, every_cut)]
         least[:] = math.inf
         for d in range(directions):
             table = CellTable(
-                tables.edges[d], tables.below[d], tables.above[d], tables.least[d], tables.largest[d], tables.fine[d]
+                tables.edges[d],
+                tables.below[d],
+                tables.above[d],
+                tables.least[d],
+                tables.largest[d],
+                tables.fine[d],
+                tables.splines,
             )
             _least_of_turns(drive, grid, cuts, table, circle, least)
         out[row] = -scale * (least[0] + least[1])

@@ -12,9 +12,11 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
+from hdopt.effects.met import Met, met_angles, sum_of
 from hdopt.effects.term import Term
 from hdopt.errors import MissingValue
-from hdopt.kinematics.waveform import full_turn, relative_turn_deviation, zone_deviation
+from hdopt.kinematics.branches import DeepestPoints
+from hdopt.kinematics.waveform import deviation_at, full_turn, geometry_for, relative_turn_points
 from hdopt.simulation.effect_values import EffectValues
 from hdopt.simulation.operation import NO_LOAD, Operation
 
@@ -30,9 +32,9 @@ class ExtendedModel:
     """One drive's errors with `effects` beside them, at `operation`.
 
     Effects of the meshing zones add to the deviation of each zone before the larger one drives (Jia 2021, Eqs. (31),
-    (32)); the others add to the kinematic error itself. `homogenization` is k_e, which evens out the driving deviation
-    only. `geometry` is that of `hdopt.kinematics.waveform`. Raises `MissingValue` where an effect needs a number that
-    `operation` does not have.
+    (32)), those of the splines where the zone's deepest point meets them, as the base's own teeth do; the others add to
+    the kinematic error itself. `homogenization` is k_e, which evens out the driving deviation only. `geometry` is that
+    of `hdopt.kinematics.waveform`. Raises `MissingValue` where an effect needs a number that `operation` does not have.
     """
 
     drive: Drive
@@ -77,26 +79,41 @@ class ExtendedModel:
         """Kinematic error (arcmin) at input angles `theta` (rad, shape (n,), within one relative turn) passed in
         `direction`; shape (n,)."""
         theta = np.mod(theta, self.span)
-        deviation = zone_deviation(self.drive, self.errors, theta, self.geometry)
-        return self.driven(theta, deviation, direction) + self.beside(theta, direction)
+        points = geometry_for(self.drive, self.geometry)(self.drive, self.errors, theta)
+        return self.driven(theta, points, direction) + self.beside(theta, direction)
 
     def relative_turn(self, direction: float = 1.0) -> tuple[Array, Array]:
         """Input angles (rad) of one full relative turn and the kinematic error there (arcmin); shapes (n,)."""
-        theta, deviation = relative_turn_deviation(self.drive, self.errors, self.samples_per_turn, self.geometry)
-        return theta, self.driven(theta, deviation, direction) + self.beside(theta, direction)
+        theta, points = relative_turn_points(self.drive, self.errors, self.samples_per_turn, self.geometry)
+        return theta, self.driven(theta, points, direction) + self.beside(theta, direction)
 
-    def driven(self, theta: Array, deviation: Array, direction: float = 1.0) -> Array:
-        """What the driving zone makes of the base's `deviation`, mm, shape (2, n), and the zones' effects, arcmin."""
-        driving = np.max(deviation + self.in_zones(theta, direction), axis=0)
+    def driven(self, theta: Array, points: DeepestPoints, direction: float = 1.0) -> Array:
+        """What the driving zone makes of the base's deviation and the zones' effects, arcmin, shape (n,); `points` are
+        the deepest ones at `theta`, rad."""
+        deviation = deviation_at(self.drive, self.errors, theta, points)
+        driving = np.max(deviation + self.in_zones(theta, points, direction), axis=0)
         return np.asarray(self.homogenization * self.drive.geometry.arcmin_per_mm * driving)
 
-    def in_zones(self, theta: Array, direction: float = 1.0) -> Array:
-        """What effects add to the deviation of each meshing zone, mm of arc, shape (2, n)."""
+    def in_zones(self, theta: Array, points: DeepestPoints, direction: float = 1.0) -> Array:
+        """What effects add to the deviation of each meshing zone, mm of arc, shape (2, n); `points` are the
+        deepest ones at `theta`, rad."""
+        added = self.fixed_in_zones(theta, direction)
+        if found := self.on_splines(direction):
+            added += sum_of(found, met_angles(theta, self.drive.geometry.flexspline_advance, points.beyond))[0]
+        return added
+
+    def fixed_in_zones(self, theta: Array, direction: float = 1.0) -> Array:
+        """What of the same the input angles `theta` (n,), rad, alone decide, mm of arc, shape (2, n)."""
         added = np.zeros((2, len(theta)))
         for effect, term in self._terms(theta, direction):
             if term.zones is not None:
                 added += self.operation.of_pass(term.zones @ np.array(effect.coefficients))
         return added
+
+    def on_splines(self, direction: float = 1.0) -> list[tuple[Met, Array]]:
+        """The deviations on the splines, with their coefficients."""
+        terms = self._terms(np.array([0.0, self.span]), direction)
+        return [(term.met, np.array(effect.coefficients)) for effect, term in terms if term.met is not None]
 
     def beside(self, theta: Array, direction: float = 1.0) -> Array:
         """What effects add to the kinematic error outside the zones, arcmin, shape (n,)."""
@@ -121,14 +138,14 @@ class ExtendedModel:
         followers = [effect for effect in self.effects if effect.follows_base]
         if not followers:
             return {}
-        theta, deviation = relative_turn_deviation(self.drive, self.errors, self.samples_per_turn, self.geometry)
+        theta, points = relative_turn_points(self.drive, self.errors, self.samples_per_turn, self.geometry)
         # Each direction runs on by itself here: what a reversal stirs up dies away and is left out.
         running = replace(self.operation, motion="forward")
         settled = {}
         for direction in self.operation.directions:
             order = slice(None, None, int(direction))
             moving = [values for effect, values in self._columns(theta, direction) if effect.moves_the_output]
-            excitation = sum(moving, self.driven(theta, deviation, direction))[order]
+            excitation = sum(moving, self.driven(theta, points, direction))[order]
             rows = running.conditions(self.ratio, full_turn(self.drive, self.samples_per_turn), 1.0, self.span)
             settled[direction] = tuple(
                 (theta, (effect.term(rows, excitation).columns @ np.array(effect.coefficients))[order])

@@ -1,7 +1,8 @@
 """The compiled walk of one drive with effects: its kinematic error over every turn, and extremes near a place.
 
 Effects break the order that lets the base's kernel look at one input turn only. The base is the closed form
-(Jia 2021, Eqs. (16) to (32)); effects are interpolated in their table.
+(Jia 2021, Eqs. (16) to (32)); effects are interpolated in their tables, those of the splines where each drive's zones
+meet them.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from hdopt.kinematics.closed_form import RigidMotion, RimConstants, TipGeometry
 from hdopt.kinematics.compiled_closed_form import (
     compiled,
     entry,
+    inlined,
     motion_at,
     motion_of_row,
     rim_constants,
@@ -48,10 +50,48 @@ class WalkedDrive(NamedTuple):
     span: float
 
 
+class Added(NamedTuple):
+    """Effects of one direction: `zones` (2, m) mm of arc and `beside` (m,) arcmin over the full relative turn, and what
+    each zone meets of effects on the CS and on the FS over a turn of that spline, mm of arc, (2, places) each, counted
+    from where the zone's end of the major axis stands at input angle 0, on no places where there are none."""
+
+    zones: Array
+    beside: Array
+    cs: Array
+    fs: Array
+
+
+@inlined
+def on_spline(table: Array, zone: int, angle: float) -> float:
+    """What `zone` (0, 1) meets of a `table` (2, places), mm of arc, at an `angle`, rad."""
+    n = table.shape[1]
+    place = angle / (2 * math.pi)
+    place = (place - math.floor(place)) * n
+    i = int(place)
+    share = place - i
+    i = i % n
+    here: float = table[zone, i]
+    after: float = table[zone, i + 1 if i + 1 < n else 0]
+    between: float = here + share * (after - here)
+    return between
+
+
 @compiled
-def rims(drive: WalkedDrive, cos: float, sin: float, s: float) -> tuple[float, float]:
-    """Deviation (mm of arc) of zone `s` (+1, -1) of a `drive` without its FS teeth, and the FS offset o', at the deeper
-    rim; `cos` and `sin` are those of the input angle."""
+def on_splines(cs: Array, fs: Array, zone: int, theta: float, turned: float, beyond: tuple[float, float]) -> float:
+    """What `zone` (0, 1) meets of the tables `cs` and `fs`, mm of arc, at the input angle `theta`, where the FS stands
+    at `turned`, and its deepest point lies `beyond` its end by o and o', all in rad."""
+    s, found = 1.0 - 2.0 * zone, 0.0
+    if cs.shape[1] > 0:
+        found += on_spline(cs, zone, theta + s * beyond[0])
+    if fs.shape[1] > 0:
+        found += on_spline(fs, zone, turned + s * beyond[1])
+    return found
+
+
+@compiled
+def rims(drive: WalkedDrive, cos: float, sin: float, s: float) -> tuple[float, float, float]:
+    """Deviation (mm of arc) of zone `s` (+1, -1) of a `drive` without its FS teeth, and the offsets o and o', at the
+    deeper rim; `cos` and `sin` are those of the input angle."""
     rim = drive.rim
     e_a, e_l, t_a, t_l = motion_at(drive.motion, cos, sin)
     depth, o, o_fs = rim_depth(rim, e_a, e_l, t_a, t_l, s, 1.0)
@@ -59,16 +99,17 @@ def rims(drive: WalkedDrive, cos: float, sin: float, s: float) -> tuple[float, f
     if other > depth:
         depth, o, o_fs = other, o_other, o_fs_other
     teeth = tooth_deviation(drive.cs_cos, drive.cs_sin, cos, sin, s, math.cos(o), math.sin(o))
-    return drive.tan_alpha * depth + teeth, o_fs
+    return drive.tan_alpha * depth + teeth, o, o_fs
 
 
 @compiled
-def _at(drive: WalkedDrive, theta: float, zones: Array, beside: Array) -> float:
-    """Kinematic error (arcmin) at `theta` (rad), with effects interpolated in `zones` (2, n, mm) and `beside` (n)."""
+def _at(drive: WalkedDrive, theta: float, added: Added) -> float:
+    """Kinematic error (arcmin) at `theta` (rad), with the effects `added`."""
+    zones, beside = added.zones, added.beside
     a_fs, fs_phase, advance, scale, span = drive.a_fs, drive.fs_phase, drive.advance, drive.scale, drive.span
     cos, sin = math.cos(theta), math.sin(theta)
-    one, o_one = rims(drive, cos, sin, 1.0)
-    two, o_two = rims(drive, cos, sin, -1.0)
+    one, cs_one, o_one = rims(drive, cos, sin, 1.0)
+    two, cs_two, o_two = rims(drive, cos, sin, -1.0)
     n = len(beside)
     place = theta / span
     place = (place - math.floor(place)) * n
@@ -78,6 +119,8 @@ def _at(drive: WalkedDrive, theta: float, zones: Array, beside: Array) -> float:
     phase = advance * theta + fs_phase
     one += a_fs * math.sin(phase + o_one) + zones[0, i] + share * (zones[0, j] - zones[0, i])
     two += -a_fs * math.sin(phase - o_two) + zones[1, i] + share * (zones[1, j] - zones[1, i])
+    one += on_splines(added.cs, added.fs, 0, theta, advance * theta, (cs_one, o_one))
+    two += on_splines(added.cs, added.fs, 1, theta, advance * theta, (cs_two, o_two))
     error: float = scale * max(one, two) + beside[i] + share * (beside[j] - beside[i])
     return error
 
@@ -138,29 +181,29 @@ def _between(cuts: Array, centre: float, half: float, ends: Array) -> int:
 
 @compiled
 def _lowest_between(
-    drive: WalkedDrive, low: float, high: float, sign: float, zones: Array, beside: Array, steps: int
+    drive: WalkedDrive, low: float, high: float, sign: float, added: Added, steps: int
 ) -> tuple[float, float]:
     """Least of sign times the kinematic error between `low` and `high`, ends included, and where, by golden section."""
-    left, right = sign * _at(drive, low, zones, beside), sign * _at(drive, high, zones, beside)
+    left, right = sign * _at(drive, low, added), sign * _at(drive, high, added)
     least, where = (left, low) if left < right else (right, high)
     x, y = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-    at_x, at_y = sign * _at(drive, x, zones, beside), sign * _at(drive, y, zones, beside)
+    at_x, at_y = sign * _at(drive, x, added), sign * _at(drive, y, added)
     for _ in range(steps):
         if at_x < at_y:
             high, y, at_y = y, x, at_x
             x = high - GOLDEN * (high - low)
-            at_x = sign * _at(drive, x, zones, beside)
+            at_x = sign * _at(drive, x, added)
         else:
             low, x, at_x = x, y, at_y
             y = low + GOLDEN * (high - low)
-            at_y = sign * _at(drive, y, zones, beside)
+            at_y = sign * _at(drive, y, added)
     inner, place = (at_x, x) if at_x < at_y else (at_y, y)
     return (inner, place) if inner < least else (least, where)
 
 
 @compiled
 def _lowest_near(
-    drive: WalkedDrive, cuts: Array, centre: float, half: float, sign: float, zones: Array, beside: Array, steps: int
+    drive: WalkedDrive, cuts: Array, centre: float, half: float, sign: float, added: Added, steps: int
 ) -> tuple[float, float]:
     """Least of sign times the kinematic error within `half` of `centre`, and where: between the changes of rim."""
     ends = np.empty(len(cuts) + 2)
@@ -169,29 +212,30 @@ def _lowest_near(
     for k in range(count - 1):
         if ends[k + 1] - ends[k] > 4 * EDGE:
             low, high = ends[k] + EDGE, ends[k + 1] - EDGE
-            value, place = _lowest_between(drive, low, high, sign, zones, beside, steps)
+            value, place = _lowest_between(drive, low, high, sign, added, steps)
             if value < least:
                 least, where = value, place
     return least, where
 
 
 @compiled
-def _walk(
-    drive: WalkedDrive, per_turn: int, turns: int, zones: Array, beside: Array, grid: Array, values: Array
-) -> None:
+def _walk(drive: WalkedDrive, per_turn: int, turns: int, added: Added, grid: Array, values: Array) -> None:
     """Fill `values` (turns * per_turn) with the kinematic error (arcmin) on an even grid of the relative turn.
 
     Without its FS teeth a zone repeats every input turn; their phase moves on by as much from turn to turn. `grid`
-    (6, per_turn) holds, for both zones, that part and the FS teeth's sine and cosine part.
+    (8, per_turn) holds, for both zones, that part, the FS teeth's sine and cosine part, and the offset o'.
     """
     a_fs, fs_phase, advance, scale = drive.a_fs, drive.fs_phase, drive.advance, drive.scale
     for g in range(per_turn):
         theta = 2 * math.pi * g / per_turn
         cos, sin = math.cos(theta), math.sin(theta)
-        one, o_one = rims(drive, cos, sin, 1.0)
-        two, o_two = rims(drive, cos, sin, -1.0)
+        one, cs_one, o_one = rims(drive, cos, sin, 1.0)
+        two, cs_two, o_two = rims(drive, cos, sin, -1.0)
         phase = advance * theta + fs_phase
-        grid[0, g], grid[1, g] = one, two
+        if added.cs.shape[1] > 0:
+            one += on_spline(added.cs, 0, theta + cs_one)
+            two += on_spline(added.cs, 1, theta - cs_two)
+        grid[0, g], grid[1, g], grid[6, g], grid[7, g] = one, two, o_one, o_two
         grid[2, g], grid[3, g] = a_fs * math.sin(phase + o_one), a_fs * math.cos(phase + o_one)
         grid[4, g], grid[5, g] = -a_fs * math.sin(phase - o_two), -a_fs * math.cos(phase - o_two)
     for t in range(turns):
@@ -199,10 +243,14 @@ def _walk(
         cos, sin = math.cos(turned), math.sin(turned)
         start = t * per_turn
         for g in range(per_turn):
-            one = grid[0, g] + cos * grid[2, g] + sin * grid[3, g] + zones[0, start + g]
-            two = grid[1, g] + cos * grid[4, g] + sin * grid[5, g] + zones[1, start + g]
+            one = grid[0, g] + cos * grid[2, g] + sin * grid[3, g] + added.zones[0, start + g]
+            two = grid[1, g] + cos * grid[4, g] + sin * grid[5, g] + added.zones[1, start + g]
+            if added.fs.shape[1] > 0:
+                along = turned + advance * (2 * math.pi * g / per_turn)
+                one += on_spline(added.fs, 0, along + grid[6, g])
+                two += on_spline(added.fs, 1, along - grid[7, g])
             driving = one if one > two else two
-            values[start + g] = scale * driving + beside[start + g]
+            values[start + g] = scale * driving + added.beside[start + g]
 
 
 @compiled
@@ -225,19 +273,19 @@ def extended_walk(
     turns: int,
     scale: float,
     row: Array,
-    coarse_zones: Array,
-    coarse_beside: Array,
+    added: Added,
 ) -> Array:
     """Kinematic error (arcmin) of one drive on the grid of the first walk, for each direction: shape (d, walked).
 
-    `row` (12,) holds its errors as in ERROR_NAMES; `tip`, `tan_alpha`, `advance`, `turns`, `scale`, `coarse_zones` and
-    `coarse_beside` as in `cell_kernel.extended_block`.
+    `row` (12,) holds its errors as in ERROR_NAMES; `tip`, `tan_alpha`, `advance`, `turns`, `scale` as in
+    `cell_kernel.extended_block`; of `added` zones and beside have one more axis in front, that of the directions.
     """
-    directions, walked = coarse_beside.shape
-    values, grid = np.empty((directions, walked)), np.empty((6, walked // turns))
+    directions, walked = added.beside.shape
+    values, grid = np.empty((directions, walked)), np.empty((8, walked // turns))
     drive = drive_of(tip, tan_alpha, advance, turns, scale, row)
     for d in range(directions):
-        _walk(drive, walked // turns, turns, coarse_zones[d], coarse_beside[d], grid, values[d])
+        of_direction = Added(added.zones[d], added.beside[d], added.cs, added.fs)
+        _walk(drive, walked // turns, turns, of_direction, grid, values[d])
     return values
 
 
@@ -249,8 +297,7 @@ def extended_near(
     turns: int,
     scale: float,
     row: Array,
-    zones: Array,
-    beside: Array,
+    added: Added,
     way: Index,
     theta: Array,
     half: float,
@@ -260,8 +307,8 @@ def extended_near(
     """Least of sign times the kinematic error (arcmin) within `half` (rad) of each of `theta` (k) in the direction
     `way` (k), and where: shape (2, k).
 
-    `row` (12,) holds the drive's errors as in ERROR_NAMES; `tip`, `tan_alpha`, `advance`, `turns`, `scale`, `zones` and
-    `beside` as in `cell_kernel.extended_block`. `steps` is the number of golden-section steps.
+    `row` (12,) holds the drive's errors as in ERROR_NAMES; `tip`, `tan_alpha`, `advance`, `turns`, `scale` and
+    `added` as in `extended_walk`. `steps` is the number of golden-section steps.
     """
     found = np.empty((2, len(theta)))
     drive = drive_of(tip, tan_alpha, advance, turns, scale, row)
@@ -269,5 +316,6 @@ def extended_near(
     cuts = every_cut[: _switches(drive, every_cut)]
     for k in range(len(theta)):
         d = way[k]
-        found[0, k], found[1, k] = _lowest_near(drive, cuts, theta[k], half, sign, zones[d], beside[d], steps)
+        of_direction = Added(added.zones[d], added.beside[d], added.cs, added.fs)
+        found[0, k], found[1, k] = _lowest_near(drive, cuts, theta[k], half, sign, of_direction, steps)
     return found

@@ -9,7 +9,7 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.kinematics.extremes import extremes_arcmin, held_peak_to_peak, tooth_width_peak_to_peak_arcmin
-from hdopt.kinematics.waveform import DEFAULT_METHOD, relative_turn, relative_turn_deviation
+from hdopt.kinematics.waveform import DEFAULT_METHOD, relative_turn, relative_turn_points
 from hdopt.recordings.orders import ModelOrder, model_orders
 from hdopt.simulation import ExtendedModel
 from hdopt.simulation.extremes import extremes_arcmin as extended_extremes_arcmin
@@ -49,8 +49,8 @@ def waveform_of(study: Study, method: str = DEFAULT_METHOD) -> WaveformResult:
     model = resolved(model_of(study, method))
     directions = model.operation.directions
     theta, error = model.relative_turn(directions[0])
-    _, deviation = relative_turn_deviation(model.drive, model.errors, model.samples_per_turn, method)
-    driven = model.driven(theta, deviation, directions[0])
+    _, points = relative_turn_points(model.drive, model.errors, model.samples_per_turn, method)
+    driven = model.driven(theta, points, directions[0])
     orders = (*named, *effect_orders(model))
     return WaveformResult(method, theta, error, driven, orders, directions[0], len(directions))
 

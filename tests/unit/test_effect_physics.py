@@ -18,6 +18,7 @@ from hdopt.effects.declared import Shaft
 from hdopt.effects.estimate import FitEstimate
 from hdopt.effects.hysteresis import friction_state
 from hdopt.effects.local_tooth_defect import Seat
+from hdopt.effects.met import met_angles, sum_of
 from hdopt.effects.resonance import Foot
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.thermal_drift import elapsed, warming
@@ -294,7 +295,9 @@ def test_sines_by_addition_are_sines():
 
 def test_the_flexsplines_teeth_advance_by_one_more_in_n():
     c = moving()
-    circular, flex = (EFFECTS[f"{part}_tooth_harmonics"].term(c, {"members": (2, 3)}).zones[0] for part in ("cs", "fs"))
+    angles = met_angles(c.theta, 1 + 1 / RATIO, np.zeros((2, 2, 1)))
+    terms = [EFFECTS[f"{part}_tooth_harmonics"].term(c, {"members": (2, 3)}) for part in ("cs", "fs")]
+    circular, flex = (term.met.columns(angles[term.met.spline, 0], 0) for term in terms)
     assert spanned(circular, sine(3, c.theta, 1.0, 0.2))
     assert spanned(flex, sine(3 * (1 + 1 / RATIO), c.theta, 1.0, 0.2))
     assert not spanned(flex, sine(3, c.theta, 1.0, 0.2))
@@ -321,7 +324,8 @@ def test_lobes_act_by_the_tangent_of_the_pressure_angle():
     effect = EFFECTS["circular_spline_lobing"]
     shape, coefficients = effect.values({"lobes": 5, "radial_amplitude_um": 5.0, "phase_deg": 30.0}, GEAR)
     c = moving()
-    first, second = effect.term(c, shape).zones @ np.array(coefficients)
+    angles = met_angles(c.theta, 1 + 1 / RATIO, np.zeros((2, 2, 1)))
+    first, second = sum_of([(effect.term(c, shape).met, np.array(coefficients))], angles)[0]
     arc = 0.005 * tan(radians(12))
     assert first == pytest.approx(arc * np.sin(5 * c.theta + radians(30)))
     assert second == pytest.approx(arc * np.sin(5 * (c.theta + pi) + radians(30)))
@@ -348,8 +352,9 @@ def test_a_damaged_tooth_is_met_where_it_sits(seat, advance, turns):
         return np.exp(-((away / radians(6.0)) ** 2) / 2)
 
     if seat.in_zones:
-        assert term.zones[0][:, 0] == pytest.approx(pulse(0.0), abs=1e-9)
-        assert term.zones[1][:, 0] == pytest.approx(pulse(pi), abs=1e-9)
+        first, second = met_angles(c.theta, 1 + 1 / RATIO, np.zeros((2, 2, 1)))[term.met.spline]
+        assert term.met.columns(first, 0)[:, 0] == pytest.approx(pulse(0.0), abs=1e-9)
+        assert term.met.columns(second, 1)[:, 0] == pytest.approx(pulse(pi), abs=1e-9)
     else:
         assert term.columns[:, 0] == pytest.approx(pulse(0.0), abs=1e-9)
     assert (term.columns is not None and term.columns.shape[1] == 2) is seat.twice

@@ -1,6 +1,7 @@
 """The joint fit and its covariance: prior, box, zones, degrees of freedom, wander."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -55,7 +56,8 @@ def test_the_base_stays_in_its_box(base):
 def test_a_term_in_the_zones_shows_in_the_zone_that_drives(base):
     first, second = np.arange(6.0)[:, None], 10 + np.arange(6.0)[:, None]
     term = Term("cs_tooth_harmonics", {}, zones=np.stack([first, second]))
-    shown = term_columns(term, np.array([0, 1, 1, 0, 1, 0]), base)[:, 0] / base.arcmin_per_mm
+    fit = SimpleNamespace(problem=SimpleNamespace(base=base), zone=np.array([0, 1, 1, 0, 1, 0]))
+    shown = term_columns(term, fit)[:, 0] / base.arcmin_per_mm
     assert shown == pytest.approx([0, 11, 12, 3, 14, 5])
 
 

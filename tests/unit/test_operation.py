@@ -5,6 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hdopt.kinematics.closed_form import deepest_points
+from hdopt.kinematics.waveform import deviation_at
 from hdopt.simulation.model import ExtendedModel
 from hdopt.simulation.operation import RPM, Operation
 from hdopt.study import load_study
@@ -55,7 +57,7 @@ class Lifted:
     def term(self, rows):
         n = len(rows)
         zones = None if self.beside else np.stack([np.full((n, 1), 0.01), np.zeros((n, 1))])
-        return SimpleNamespace(zones=zones, columns=np.full((n, 1), 0.3) if self.beside else None)
+        return SimpleNamespace(zones=zones, met=None, columns=np.full((n, 1), 0.3) if self.beside else None)
 
 
 @pytest.fixture(scope="module")
@@ -66,10 +68,11 @@ def model():
 
 def test_the_zones_are_lifted_before_the_larger_drives(model):
     """k_e (2 pi/l_FS) max(tau_1 + lift, tau_2), Jia 2021, Eqs. (31), (32)."""
-    theta, deviation = np.linspace(0, 50, 300), np.random.default_rng(0).normal(0, 0.01, (2, 300))
-    lifted = model.with_effects([Lifted(beside=False)])
+    theta, lifted = np.linspace(0, 50, 300), model.with_effects([Lifted(beside=False)])
+    points = deepest_points(model.drive, model.errors, theta)
+    deviation = deviation_at(model.drive, model.errors, theta, points)
     expected = np.maximum(deviation[0] + 0.01, deviation[1]) * 0.2 * model.drive.geometry.arcmin_per_mm
-    assert lifted.driven(theta, deviation) == pytest.approx(expected)
+    assert lifted.driven(theta, points) == pytest.approx(expected)
 
 
 def test_what_is_beside_the_zones_is_not_evened_out(model):

@@ -12,6 +12,7 @@ from hdopt.drive.roundness import MeasuredRoundness, transmission
 from hdopt.drive.teeth import MeasuredTeeth
 from hdopt.drive.values import DriveError
 from hdopt.errors import HdoptError
+from hdopt.kinematics.closed_form import deepest_points
 from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin
 from hdopt.kinematics.load_sharing import LoadSharing, mesh_tables
 from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin
@@ -78,7 +79,7 @@ def test_lobes_act_as_the_effect_of_a_clamped_ring_less_what_the_teeth_share():
     study = load_study("csf-25-80", [f"effects.circular_spline_lobing={keys}"])
     theta = np.linspace(0, 2 * np.pi, 181)
     model = ExtendedModel(drive(), DriveErrors(), study.effects, Operation())
-    zones = model.in_zones(theta, study.operation.directions[0])
+    zones = model.in_zones(theta, deepest_points(drive(), DriveErrors(), theta), study.operation.directions[0])
     lobed = replace(drive(), cs_roundness=MeasuredRoundness.of(TURN, RADIUS + amplitude * np.sin(n * TURN), 150))
     found = kinematic_error_arcmin(lobed, DriveErrors(), theta, "closed form")
     expected = zones.max(axis=0) * drive().geometry.arcmin_per_mm

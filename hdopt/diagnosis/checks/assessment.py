@@ -154,7 +154,7 @@ def best_placebo(probe: FitProbe, pool: Sequence[Term], best: Fit) -> Term | Non
 
 def placebo_error(probe: FitProbe, placebo: Term, folds: Index) -> HeldOut:
     """Held-out error, on `folds` (n,), with the `placebo` beside the base that `probe` looks at."""
-    return held_out(probe.fit, term_columns(placebo, probe.fit.zone, probe.fit.problem.base), folds)
+    return held_out(probe.fit, term_columns(placebo, probe.fit), folds)
 
 
 def lacking_effects(state: State, strange: Sequence[str]) -> dict[str, str]:
@@ -199,7 +199,7 @@ def detection_limits(probe: FitProbe, terms: Sequence[Term], scale: PenaltyScale
     """
     limits: dict[str, float] = {}
     for term in terms:
-        raw = term_columns(term, probe.fit.zone, probe.fit.problem.base)
+        raw = term_columns(term, probe.fit)
         left = (probe.columns(term) ** 2).sum(0)
         power = np.maximum((raw**2).mean(0), TINY)
         visible = float(np.mean(left / power))

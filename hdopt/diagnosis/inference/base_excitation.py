@@ -13,7 +13,7 @@ from hdopt.recordings.rows import Rows
 
 def excites(term: Term) -> bool:
     """Whether a term moves the drive's output itself: it acts in the meshing zones, or its effect `excites`."""
-    return term.zones is not None or properties_of(term.effect).excites
+    return term.in_zones or properties_of(term.effect).excites
 
 
 def is_driven(term: Term) -> bool:

@@ -24,6 +24,7 @@ from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
 from hdopt.effects.base import Explanation
 from hdopt.effects.estimate import FitEstimate
+from hdopt.effects.met import met_angles, sum_of
 from hdopt.effects.term import Shape, Term
 from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel
 from hdopt.recordings.rows import Rows
@@ -58,6 +59,13 @@ class FitProblem:
     def rotation(self) -> Array:
         """The rows' angles as the base takes them, (n, 4); none for a gear without a base."""
         return np.empty((len(self.rows), 0)) if self.base is None else self.base.rotation(self.rows.theta)
+
+    def met_angles(self, errors: Array) -> Array:
+        """Angles of both splines at which both zones of a base with these `errors` (12,) mm meet them, rad,
+        (2, 2, n)."""
+        if self.base is None:
+            raise ValueError("a gear without a base has no meshing zones")
+        return met_angles(self.rows.theta, self.base.advance, self.base.beyond_at(self.rotation, errors))
 
     @property
     def base_width(self) -> int:
@@ -108,6 +116,13 @@ class Fit:
         return self.problem.rows.error - self.prediction
 
     @cached_property
+    def met_angle(self) -> Array:
+        """Angles of both splines at which the driving zone meets them, rad, (2, n)."""
+        angles = self.problem.met_angles(self.errors)
+        chosen: Array = np.where(self.zone == 0, angles[:, 0], angles[:, 1])
+        return chosen
+
+    @cached_property
     def motion(self) -> Array:
         """The drive's motion before its spring, arcmin, (n,): what excites a resonance."""
         return motion_of(self.base_value, self.terms, self.coefficients)
@@ -118,7 +133,7 @@ class Fit:
 
     def contribution(self, index: int) -> Array:
         """What term `index` adds to the prediction, arcmin: with its zones' driving switched as fitted."""
-        return term_columns(self.terms[index], self.zone, self.problem.base) @ self.coefficients[index]
+        return term_columns(self.terms[index], self) @ self.coefficients[index]
 
     @property
     def contributions(self) -> Array:
@@ -133,7 +148,7 @@ class Fit:
 
     def columns_of(self, term: Term, keep: Sequence[int] | None = None) -> Array:
         """A term's columns as the output shows them beside the terms of `keep`, all by default, (n, p)."""
-        columns = term_columns(term, self.zone, self.problem.base)
+        columns = term_columns(term, self)
         return self.seen(columns, keep) if excites(term) else columns
 
     def design(self, keep: Sequence[int] | None = None, move_shapes: bool = True) -> Array:
@@ -143,7 +158,7 @@ class Fit:
         blocks, excite = [self.base_jacobian, self.problem.nuisance], [True, False]
         for i in range(len(self.terms)) if keep is None else keep:
             term = self.terms[i]
-            blocks.append(term_columns(term, self.zone, self.problem.base))
+            blocks.append(term_columns(term, self))
             if move_shapes and term.steps:
                 blocks.append(shape_columns(self, i))
             excite += [excites(term)] * (len(blocks) - len(excite))
@@ -232,14 +247,17 @@ def side_by_side(blocks: Sequence[Array]) -> Array:
     return columns
 
 
-def term_columns(term: Term, zone: Index, base: CartesianModel | None) -> Array:
-    """The term's columns in arcmin per coefficient, with the zones as they drive now. `zone` (n,) is 0 or 1; `base`
-    is None for a gear without one.
-    """
-    if term.zones is None or base is None:
-        return term.columns if term.columns is not None else np.zeros((len(zone), term.width))
-    columns: Array = base.arcmin_per_mm * np.where((zone == 0)[:, None], term.zones[0], term.zones[1])
-    return columns
+def term_columns(term: Term, fit: Fit) -> Array:
+    """The term's columns in arcmin per coefficient, (n, p), with the zones as they drive, and as they meet the
+    splines, in `fit`."""
+    base, zone = fit.problem.base, fit.zone
+    if base is not None and term.met is not None:
+        met: Array = base.arcmin_per_mm * term.met.columns(fit.met_angle[term.met.spline], zone)
+        return met
+    if base is not None and term.zones is not None:
+        columns: Array = base.arcmin_per_mm * np.where((zone == 0)[:, None], term.zones[0], term.zones[1])
+        return columns
+    return term.columns if term.columns is not None else np.zeros((len(zone), term.width))
 
 
 def shape_columns(fit: Fit, index: int) -> Array:
@@ -253,7 +271,7 @@ def shape_columns(fit: Fit, index: int) -> Array:
         for sign in (1, -1):
             shifted = {**term.shape, name: term.shape[name] + sign * step}
             moved = problem.explanations[term.effect].term(problem.rows, shifted, fit.motion)
-            sides.append(term_columns(moved, fit.zone, problem.base) @ fit.coefficients[index])
+            sides.append(term_columns(moved, fit) @ fit.coefficients[index])
         columns.append((sides[0] - sides[1]) / (2 * step))
     return np.column_stack(columns) if columns else np.empty((len(problem.rows), 0))
 
@@ -265,12 +283,9 @@ def evaluate(
     (q,), and `terms` with their `coefficients`.
     """
     rows = problem.rows
-    extra: Array | None = None
-    for term, c in zip(terms, coefficients, strict=True):
-        if term.zones is not None:
-            extra = term.zones @ c if extra is None else extra + term.zones @ c
     if problem.base is not None:
-        base_value, zone, jacobian = problem.base.evaluate_at(problem.rotation, errors, extra)
+        extra, rises = _in_zones(problem, errors, terms, coefficients)
+        base_value, zone, jacobian = problem.base.evaluate_at(problem.rotation, errors, extra, rises)
     else:
         base_value, zone, jacobian = (
             np.zeros(len(rows)),
@@ -289,6 +304,25 @@ def evaluate(
     return Fit(
         problem, errors, offsets, tuple(terms), tuple(coefficients), base_value, zone, prediction, objective, jacobian
     )
+
+
+def _in_zones(
+    problem: FitProblem, errors: Array, terms: Sequence[Term], coefficients: Sequence[Array]
+) -> tuple[Array | None, Array | None]:
+    """What `terms` add to the deviation of both zones, mm of arc, (2, n), and its slopes over the angles at which the
+    splines are met, mm/rad, (2, 2, n); None where nothing does."""
+    extra: Array | None = None
+    rises: Array | None = None
+    on_splines = []
+    for term, c in zip(terms, coefficients, strict=True):
+        if term.met is not None:
+            on_splines.append((term.met, c))
+        elif term.zones is not None:
+            extra = term.zones @ c if extra is None else extra + term.zones @ c
+    if on_splines:
+        added, rises = sum_of(on_splines, problem.met_angles(errors))
+        extra = added if extra is None else extra + added
+    return extra, rises
 
 
 def refine(fit: Fit, iterations: int | None = None, tolerance: float | None = None, move_shapes: bool = True) -> Fit:

@@ -92,7 +92,7 @@ class FitProbe:
     def _whitened(self, term: Term) -> tuple[Array, Array]:
         """The term's whitened columns and their inner products."""
         known = self.fit.problem.whitened
-        alone = term.kept and term.zones is None and not (self.swings and excites(term))
+        alone = term.kept and not term.in_zones and not (self.swings and excites(term))
         if alone and id(term) in known:
             return known[id(term)][1:]
         white = self.white_columns(term)

@@ -69,7 +69,7 @@ def fit_in_zones(rows: Rows, low: Fit, nuisances: Nuisances, ripple: Fit) -> Zon
 
 def _seed(bare: Fit, term: Term) -> Array:
     """First coefficients of `term`, with the zones as they drive without it."""
-    columns = term_columns(term, bare.zone, bare.problem.base)
+    columns = term_columns(term, bare)
     return np.asarray(np.linalg.lstsq(columns, bare.residual, rcond=None)[0], float)
 
 

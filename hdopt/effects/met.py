@@ -1,0 +1,136 @@
+"""A deviation that stands on a spline, as a function of the angle of that spline at which a meshing zone meets it.
+
+The deepest point of a zone lies off its end of the major axis, by o seen from the circular spline's centre and by o' in
+the wave generator's frame (Jia 2021, Eqs. (16)-(23)). So zone 1 meets the circular spline at theta + o and zone 2 at
+theta + pi - o, the flexspline at Z_CS/Z_FS theta with o' in place of o (Eqs. (31a), (31b)). With errors as shipped o is
+up to a few hundredths of a radian, h of it in phase for a deviation of h waves: no expansion in o would do for narrow
+pulses or for the waves of single teeth, so that the deviation is taken at the angle itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hdopt.arrays import Array
+from hdopt.effects.sines import sine_columns, sine_sum
+
+
+class Spline(IntEnum):
+    """The spline that a deviation stands on; its value is the place in arrays of both."""
+
+    CIRCULAR = 0
+    FLEX = 1
+
+
+class Met(Protocol):
+    """A deviation of p coefficients on a `spline`, mm of arc per coefficient, at angles of the spline."""
+
+    @property
+    def spline(self) -> Spline:
+        """The spline that it stands on."""
+
+    @property
+    def width(self) -> int:
+        """Number of coefficients, p."""
+
+    def columns(self, angle: Array, zone: ArrayLike) -> Array:
+        """What zone `zone` (0 or 1, one for all or (n,)) meets at `angle` (n,) rad, (n, p)."""
+
+    def added(self, angle: Array, zone: int, coefficients: Array) -> tuple[Array, Array]:
+        """The sum of the columns with these `coefficients` (p,) at `angle` (n,) rad in `zone`, mm of arc, and its slope
+        over the angle, mm/rad, (n,) each."""
+
+
+@dataclass(frozen=True)
+class Waves:
+    """sin and cos of each of `harmonics` round a `spline`."""
+
+    spline: Spline
+    harmonics: tuple[int, ...]
+
+    @property
+    def width(self) -> int:
+        return 2 * len(self.harmonics)
+
+    def columns(self, angle: Array, zone: ArrayLike) -> Array:
+        return sine_columns(angle, self.harmonics)
+
+    def added(self, angle: Array, zone: int, coefficients: Array) -> tuple[Array, Array]:
+        return sine_sum(angle, self.harmonics, coefficients)
+
+
+@dataclass(frozen=True)
+class ZoneWaves:
+    """sin and cos of each of `orders` on a `spline`, in zone 1 and, with coefficients of their own, in zone 2, each
+    counted from the zone's own end of the major axis."""
+
+    spline: Spline
+    orders: tuple[float, ...]
+
+    @property
+    def width(self) -> int:
+        return 4 * len(self.orders)
+
+    def columns(self, angle: Array, zone: ArrayLike) -> Array:
+        second = np.broadcast_to(np.asarray(zone), np.shape(angle))
+        waves = sine_columns(angle - math.pi * second, self.orders)
+        return np.hstack([waves * (second == 0)[:, None], waves * (second == 1)[:, None]])
+
+    def added(self, angle: Array, zone: int, coefficients: Array) -> tuple[Array, Array]:
+        half = self.width // 2
+        return sine_sum(angle - math.pi * zone, self.orders, coefficients[half * zone : half * (zone + 1)])
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """A Gaussian of standard deviation `sigma` (rad) about `centre` (rad), once round a `spline`."""
+
+    spline: Spline
+    centre: float
+    sigma: float
+
+    @property
+    def width(self) -> int:
+        return 1
+
+    def columns(self, angle: Array, zone: ArrayLike) -> Array:
+        return np.exp(-0.5 * (self._off(angle) / self.sigma) ** 2)[:, None]
+
+    def added(self, angle: Array, zone: int, coefficients: Array) -> tuple[Array, Array]:
+        off = self._off(angle)
+        value = coefficients[0] * np.exp(-0.5 * (off / self.sigma) ** 2)
+        return value, -off / self.sigma**2 * value
+
+    def _off(self, angle: Array) -> Array:
+        return np.mod(angle - self.centre + math.pi, 2 * math.pi) - math.pi
+
+
+def met_angles(theta: Array, advance: float, beyond: Array) -> Array:
+    """Angles of both splines at which both zones meet them at input angles `theta` (n,), rad, (2, 2, n): first the
+    spline, then the zone.
+
+    `advance` is Z_CS/Z_FS; `beyond` (2, 2, n), rad, how far the deepest point lies beyond the zone's end of the major
+    axis the way the wave generator turns, o and o' with the zone's sign.
+    """
+    turned = np.stack([theta, advance * theta])[:, None, :]
+    angles: Array = turned + beyond + np.array([0.0, math.pi])[:, None]
+    return angles
+
+
+def sum_of(found: Sequence[tuple[Met, Array]], angles: Array) -> tuple[Array, Array]:
+    """What the zones meet of all `found`, deviations with their coefficients: the sum in both zones, mm of arc, (2, n),
+    and its slopes over the angle of each spline, mm/rad, (2, 2, n). `angles` as `met_angles` gives them."""
+    total, slopes = np.zeros(angles.shape[1:]), np.zeros(angles.shape)
+    for met, coefficients in found:
+        for zone in (0, 1):
+            value, slope = met.added(angles[met.spline, zone], zone, coefficients)
+            total[zone] += value
+            slopes[met.spline, zone] += slope
+    return total, slopes
