@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,8 +22,13 @@ class Assumption:
     value: Any  # of the option's own type: a size, a name, whether there is a hub
     reason: str
 
+    @property
+    def written(self) -> str:
+        """The value as a study file gives it."""
+        return json.dumps(self.value) if isinstance(self.value, bool | str) else str(self.value)
+
     def __str__(self) -> str:
-        return f"{self.key} = {self.value} ({self.reason})"
+        return f"{self.key} = {self.written} ({self.reason})"
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any  # Any: parsed TOML and JSON
 
@@ -14,6 +14,7 @@ from hdopt.study.defaults import USED, defaults_taken
 if TYPE_CHECKING:
     import pandas as pd
 
+VERDICT = "verdict on the requirement"
 MOST_TRIES = 16
 """Times that a missing number is put in and the rest tried; the longest list of missing keys has fewer."""
 PASSING = ("drive", "wave_generator")
@@ -80,8 +81,17 @@ def check_study(study: AnyStudy = None) -> StudyCheck:
     """
     loaded, lacking = (study, ()) if isinstance(study, Study) else _loaded(study)
     found = [_tried(replace(one, missing=lacking), probe, loaded) for one, probe in PROBES]
+    found = [_judged(one, found) for one in found]
     names = tuple(dict.fromkeys(name for sections in USED.values() for name in sections if name in loaded.sections))
     return StudyCheck(loaded.name, tuple(found), defaults_taken(loaded.sections, names))
+
+
+def _judged(one: Capability, found: Sequence[Capability]) -> Capability:
+    """The verdict, `one` of what is `found`, with only the commands whose own work can be done; others as they are."""
+    if one.what != VERDICT or not one.can:
+        return one
+    work = {name: other for other in reversed(found) if other.what != VERDICT for name in other.commands}
+    return replace(one, commands=tuple(name for name in one.commands if work[name].can) or one.commands)
 
 
 def _loaded(source: Any) -> tuple[Study, tuple[str, ...]]:
@@ -215,7 +225,7 @@ def _export(study: Study) -> None:
 
 PROBES: tuple[tuple[Capability, Callable[[Study], object]], ...] = (
     (Capability("kinematic error of one drive", ("ke", "run")), _one_drive),
-    (Capability("verdict on the requirement", ("ke", "stack", "sobol", "allocate")), _verdict),
+    (Capability(VERDICT, ("ke", "stack", "sobol", "allocate")), _verdict),
     (Capability("contact angle, teeth in mesh and k_e", ("ke", "profile")), _contact),
     (Capability("lag at reversal", ("ke",)), _lag),
     (Capability("curvature of the ring", ("profile",)), _curvature),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 
 import pytest
 
@@ -136,6 +137,25 @@ def test_check_tells_what_an_own_drive_allows(tmp_path, capsys):
     assert found["missing"]["tolerance stack and sensitivities"] == ["[tolerances]", "[requirement]"]
     frame = hdopt.check_study(file).to_frame()
     assert list(frame["what"]) == [one.what for one, _ in PROBES]
+
+
+def test_the_verdict_names_no_command_that_cannot_be_run(tmp_path, capsys):
+    """Would catch `hdopt ke` offered for a verdict beside a line that says it needs [errors]."""
+    file = tmp_path / "own.toml"
+    tolerance = 'axis_eccentricity_mm = { distribution = "rayleigh", scale = 0.005 }'
+    limit = "[requirement]\npeak_to_peak_arcmin = 0.8\n"
+    file.write_text(f"{OWN.partition('[errors]')[0]}\n[tolerances]\n{tolerance}\n{limit}")
+    _, out, _ = said(capsys, "check", str(file))
+    assert "no   kinematic error of one drive: give [errors]" in out
+    assert "yes  verdict on the requirement (hdopt stack, hdopt sobol)\n" in out
+
+
+@pytest.mark.parametrize("value", [True, "keyway", 14.0, 6])
+def test_an_assumed_size_is_printed_as_a_study_takes_it(value):
+    """Would catch `hub = True` and `mount = keyway`, which no study file may say."""
+    from hdopt.geometry.model import Assumption
+
+    assert tomllib.loads(str(Assumption("size", value, "a rule")).partition(" (")[0]) == {"size": value}
 
 
 def test_check_of_an_incomplete_drive_says_all_at_once(tmp_path, capsys):

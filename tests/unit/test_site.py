@@ -10,6 +10,7 @@ import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -137,6 +138,19 @@ def test_links_between_pages_lead_somewhere(page):
     for link in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
         if not link.startswith(("generated/", "examples/")):
             assert (page.parent / link).exists(), link
+
+
+SOURCES = [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CITATION.cff", *DOCS.glob("gallery/*")]
+
+
+@pytest.mark.parametrize("page", SOURCES, ids=lambda page: page.name)
+def test_links_to_elsewhere_are_well_formed(page):
+    """Would catch a link with a bracket or a full stop in it, to this machine, or unencrypted: no network is asked."""
+    for link in re.findall(r"\bhttps?:[^\s<>\"'`]*", page.read_text(encoding="utf-8")):
+        link = link.rstrip(").,;") if link.count(")") > link.count("(") else link
+        parts = urlsplit(link)
+        assert parts.scheme == "https" and re.fullmatch(r"([a-z0-9-]+\.)+[a-z]{2,}", parts.netloc), link
+        assert not re.search(r"[.,;:]$|//|[()\[\]]", parts.path), link
 
 
 def test_the_citation_is_of_this_version():

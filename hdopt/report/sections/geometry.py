@@ -81,7 +81,7 @@ def _dimensions(key: str, result: ExportResult) -> Table:
 def _assumptions(key: str, result: ExportResult) -> list[Table]:
     if not result.model.assumptions:
         return []
-    rows = [(assumption.key, str(assumption.value), assumption.reason) for assumption in result.model.assumptions]
+    rows = [(assumption.key, assumption.written, assumption.reason) for assumption in result.model.assumptions]
     frame = pd.DataFrame(rows, columns=["key", "value", "why"])
     caption = "Give a key in the study's [export] section to replace it."
     return [Table(f"{key}-assumed", "Sizes that the study does not give", frame, caption)]
