@@ -24,9 +24,12 @@ def front_ends(
     problem: DesignProblem, second: str, method: Method, start: dict[str, float]
 ) -> tuple[tuple[Solution, Solution] | None, int]:
     """The ends of a front of `problem`, the best of its objective and the best of `second`, searched by `method` from
-    the values `start`; None where either cannot be had. And the evaluations spent."""
+    the values `start`; None where either cannot be had. And the evaluations spent. Raises an interrupt as `front` does.
+    """
     best = solve(problem, method, [start])
     extreme = solve(_with_objective(problem, second), method, [start])
+    if best.outcome.interrupted or extreme.outcome.interrupted:
+        raise KeyboardInterrupt
     spent = best.evaluations + extreme.evaluations
     return ((best, extreme) if best.feasible and extreme.feasible else None), spent
 
@@ -38,7 +41,8 @@ def front(
     (`extreme`), at most `points`, searched by `method`.
 
     Epsilon-constraint: the second quantity's limit is moved in even steps from what the best design has to the best it
-    can be, and each search starts from its neighbour's design. Not yet freed of dominated points.
+    can be, and each search starts from its neighbour's design. Not yet freed of dominated points. An interrupt that a
+    search answered with its best so far is raised here: a front that was cut off is none.
     """
     quantity = find_quantity(second)
     ends = [
@@ -56,7 +60,7 @@ def front(
         if solution.feasible:
             found.append(solution)
         if solution.outcome.interrupted:
-            break
+            raise KeyboardInterrupt
     return found
 
 

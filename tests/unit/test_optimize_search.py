@@ -245,7 +245,7 @@ def test_an_interrupted_combination_is_no_finished_part_and_still_counts(setup, 
 def test_a_search_with_random_numbers_is_the_same_on_two_threads_of_a_dask_worker():
     """NLopt's random numbers are a stream a thread, seeded in each."""
     distributed = pytest.importorskip("distributed")
-    words = ('search.profiles=["ellipse"]', 'search.structures=["automatic", "integral"]')
+    words = ('search.profiles=["ellipse"]', 'search.structures=["automatic", "integral"]', "search.front_points=7")
     study = load_study("csf-25-80", (*words, 'search.global_algorithm="GN_CRS2_LM"'))
     found = {}
     with distributed.LocalCluster(
@@ -253,5 +253,34 @@ def test_a_search_with_random_numbers_is_the_same_on_two_threads_of_a_dask_worke
     ) as cluster:
         for engine in ("process", Dask(cluster.scheduler_address.removeprefix("tcp://"))):
             with engine_in_force(engine):
-                found[engine] = json.dumps(hdopt.search(study, fronts=False).to_dict())
+                found[engine] = json.dumps(hdopt.search(study).to_dict())
     assert len(set(found.values())) == 1
+
+
+def test_fronts_go_to_the_engine_and_an_interrupt_within_one_is_not_swallowed(monkeypatch):
+    """Both coarse fronts and the fine one are items of an engine; one that Ctrl-C cut off is left out, and said."""
+    items = []
+
+    class Watching(ThisProcess):
+        elsewhere = True
+
+        def map(self, function, given):
+            for item in given:
+                items.append(function.func.__name__)
+                yield function(item)
+
+    words = ('search.profiles=["ellipse"]', 'search.structures=["automatic", "integral"]', "search.front_points=7")
+    setup = setup_of(load_study("csf-25-80", words), 1)
+    with engine_in_force(Watching()):
+        whole = search_designs(setup)
+    assert items == ["_solved", "_solved", "_coarse", "_coarse", "_fine"]
+    assert len(whole.fronts) == 1 and not whole.interrupted
+
+    def cut(problem, method, starts=()):
+        solution = solve(problem, method, starts)
+        return replace(solution, outcome=replace(solution.outcome, interrupted=True))
+
+    monkeypatch.setattr("hdopt.optimize.pareto.solve", cut)
+    result = search_designs(setup)
+    assert result.interrupted and result.fronts == ()
+    assert len(result.solutions) == 2
