@@ -41,6 +41,10 @@ def test_what_was_searched_and_what_is_unlikely_is_paid_for():
     """A hundred shapes looked at, and odds of 1 to e^3 against it."""
     term = Term("hysteresis", {}, columns=np.zeros((4, 1)), trials=100.0, odds=-3.0)
     assert searched(term) == pytest.approx(log(100.0) + 3.0)
+    plain = Term("hysteresis", {}, columns=np.zeros((4, 1)))
+    for count in (1, 2):
+        more = penalty([term] * count, 0.0, Scale(100.0)) - penalty([plain] * count, 0.0, Scale(100.0))
+        assert more == pytest.approx(count * (log(100.0) + 3.0))
 
 
 def test_effects_of_one_kind_pay_for_their_inexact_shapes():
