@@ -151,7 +151,7 @@ class SearchSection(Section):
     front_points: int = Field(default=30, ge=2, le=1000)
     """Points of a front."""
     regions: bool = False
-    """Whether constants are followed to where another choice is the better: ten times a search's processor time."""
+    """Whether constants are followed to where another choice is the better: a few times a search's processor time."""
     perturbation: float = Field(default=0.5, ge=0.05, le=3)
     """How far each constant is followed to see where the choice changes: 0.5 is down to 1/1.5 and up to 1.5 times."""
     global_algorithm: str | None = None

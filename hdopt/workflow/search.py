@@ -36,7 +36,7 @@ def search(
 
     `study` is a study, its name or its path; `seed` that of what is done at random; `progress` is told what comes
     next; without `fronts` only the best design is looked for; with `regions` (as [search] of the study says, if None)
-    each constant of the trade is followed to where another choice is the better, which takes ten times as long. An
+    each constant of the trade is followed to where another choice is the better, which takes a few times as long. An
     interrupt (Ctrl-C) ends it with the best so far. `files` to write: {"study": PATH} the chosen design as a study,
     {"csv": PATH} or {"xlsx": PATH} the tables.
     Raises `HdoptError` before any work where a file cannot be written.

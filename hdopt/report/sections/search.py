@@ -472,7 +472,7 @@ def rings_section(result: SearchResult, rings: Rings) -> Section:
 
 NOT_FOLLOWED = (
     "Where the choice holds was not asked for: regions = true in [search] of the study, or --set search.regions=true, "
-    "follows each constant of the trade to where another choice is the better, in about ten times a search's time."
+    "follows each constant of the trade to where another choice is the better, in a few times a search's time."
 )
 
 
