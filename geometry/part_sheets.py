@@ -29,7 +29,7 @@ from hdopt.geometry.sheet import FRAME_HEIGHT, SMALL, TEXT, Point, Sheet, Solid,
 from hdopt.geometry.sheet_details import draw_details, mark_details
 from hdopt.geometry.sheet_lengths import STACK, axial_spans, draw_lengths
 from hdopt.geometry.step import ProductData
-from hdopt.geometry.views import half_behind_minor_axis_zero, section_at_minor_axis_zero, seen_from
+from hdopt.geometry.views import Region, half_behind_minor_axis_zero, section_at_minor_axis_zero, seen_from
 
 if TYPE_CHECKING:
     import cadquery as cq
@@ -155,6 +155,7 @@ def _section(sheet: Sheet, place: Placed, part: Part, solid: cq.Solid) -> None:
     fill = sheet.hatch("section", "#30506a", 45, 1.9)
     for region in section_at_minor_axis_zero(solid):
         sheet.region(place(region.outer), [place(hole) for hole in region.holes], fill)
+        _outline(sheet, place, region)
     draw_view(sheet, place, seen_from([half_behind_minor_axis_zero(solid)], *FROM_LEFT))
     box, over = part.box, 5 / place.scale
     sheet.line(place.point(part.bottom - over, 0), place.point(part.top + over, 0), "axis")
@@ -165,6 +166,12 @@ def _section(sheet: Sheet, place: Placed, part: Part, solid: cq.Solid) -> None:
     _diameters(sheet, place, part)
     mark_details(sheet, part, place.point(0, 0), place.scale)
     draw_details(sheet, part, DETAILS)
+
+
+def _outline(sheet: Sheet, place: Placed, region: Region) -> None:
+    """The edges of a cut face, which are seen whatever lies behind it: Open CASCADE cannot halve every solid."""
+    for ring in (region.outer, *region.holes):
+        sheet.polyline(place(ring), "visible", closed=True)
 
 
 def _diameters(sheet: Sheet, place: Placed, part: Part) -> None:
@@ -322,6 +329,7 @@ def _assembly(job: Job) -> Sheet:
         fill = sheet.hatch(f"part{index}", colour, 45 if index % 2 else -45, (1.7, 2.4, 3.0)[index % 3])
         for region in section_at_minor_axis_zero(solid):
             sheet.region(place(region.outer), [place(hole) for hole in region.holes], fill)
+            _outline(sheet, place, region)
     draw_view(sheet, place, seen_from([half_behind_minor_axis_zero(solid) for _, solid in made], *FROM_LEFT))
     low, high = float(boxes[:, 2].min()), float(boxes[:, 5].max())
     bottom, top = place.point(0, float(boxes[:, 1].min()))[1], place.point(0, float(boxes[:, 4].max()))[1]

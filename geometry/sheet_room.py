@@ -8,13 +8,17 @@ import numpy as np
 
 from hdopt.geometry.sheet import Label, Line, Point, Ring, Sheet, label_box
 
+GAP = 0.3
+"""What is left free round a text, mm."""
+
 Box = tuple[float, float, float, float]
 """Left, top, right, bottom, mm."""
 
 
 def is_free(sheet: Sheet, label: Label) -> bool:
     """Whether a `label` would stand on the `sheet` clear of all that is drawn so far, hatches apart."""
-    box = label_box(label)
+    left, top, right, low = label_box(label)
+    box = left - GAP, top - GAP, right + GAP, low + GAP
     for mark in sheet.marks:
         if isinstance(mark, Label):
             left, top, right, low = label_box(mark)

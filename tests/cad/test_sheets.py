@@ -17,7 +17,7 @@ from hdopt.geometry.job import make_job
 from hdopt.geometry.mating_drawing import fill_mating_sheet
 from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.part_sheets import HEIGHT, WIDTH, sheets
-from hdopt.geometry.sheet import Line, Ring, Sheet, label_box, text_width
+from hdopt.geometry.sheet import Area, Line, Ring, Sheet, label_box, text_width
 from hdopt.geometry.sheet_details import outline
 from hdopt.geometry.undercut import AT_SHOULDER, IN_CORNER, Undercut
 
@@ -36,6 +36,7 @@ CASES = [
     ("two_disk", Structure.ONE_WAY_MAJOR, 0.4),
     ("two_disk", Structure.ONE_WAY_MINOR, 0.2),
     ("ellipse", Structure.INTEGRAL, 0.2),
+    ("two_disk", Structure.INTEGRAL, 0.2),
 ]
 """Every structure with a cam and with discs; drives of 12 mm to 250 mm."""
 
@@ -58,6 +59,18 @@ def test_no_text_lies_on_another_or_off_the_sheet(profile, structure, scale):
             apart = a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
             assert apart, f"{sheet.title}: {first!r} lies on {second!r}"
         assert crossed(sheet) == [], sheet.title
+        assert cut_without_outline(sheet) == [], sheet.title
+
+
+def cut_without_outline(sheet):
+    """Hatched faces whose outermost points no visible line passes: a section of loose hatches. Details, on
+    the right, end in the open."""
+    seen = np.concatenate(
+        [mark.points for mark in sheet.marks if isinstance(mark, Line) and mark.kind == "visible"] or [[(0, 0)]]
+    )
+    cut = [mark.outer for mark in sheet.marks if isinstance(mark, Area) and mark.outer[:, 0].max() < 270]
+    far = [ring[at] for ring in cut for at in (*ring.argmin(0), *ring.argmax(0))]
+    return [tuple(point) for point in far if np.hypot(*(seen - point).T).min() > 0.2]
 
 
 def crossed(sheet):
