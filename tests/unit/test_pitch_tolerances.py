@@ -22,7 +22,7 @@ from hdopt.tolerance.drive_inputs import drive_problem
 from hdopt.tolerance.linearise import linearise
 from hdopt.tolerance.screening import run_screening
 from hdopt.tolerance.space import InputSpace, Tolerance
-from hdopt.tolerance.tooth_field import ToothField, largest_single, tooth_field
+from hdopt.tolerance.tooth_field import CALIBRATION_SEED, ToothField, _normal_pairs, largest_single, tooth_field
 from hdopt.tolerance.worst_case import Unbounded, check_bounded
 from hdopt.workflow.search_setup import sample_rows
 from hdopt.workflow.stack import study_problem
@@ -213,3 +213,35 @@ def test_teeth_that_were_measured_are_not_drawn(tmp_path):
     )
     with pytest.raises(HdoptError, match="measured one by one in .cs_teeth. and toleranced"):
         study_problem(load_study(tmp_path / "own.toml"))
+
+
+def test_a_fall_between_teeth_is_a_single_pitch_as_a_rise_is():
+    """Fault caught: the largest of rises alone, which a spline whose one step falls would pass with."""
+    falls = np.array([[3.0, 0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0, 3.0, 0.0]])
+    assert largest_single(falls).tolist() == [3.0, 3.0]
+    assert largest_single(-falls).tolist() == [3.0, 3.0]
+
+
+@pytest.mark.parametrize("teeth", [8, 9])
+def test_equal_waves_are_independent_teeth(teeth):
+    """What all waves of one size make of the teeth is, but for their mean, the same for each and in common with no
+    other: the covariance of the linear map itself, not of a sample. Fault caught: the last wave of an even number of
+    teeth, which has one part only, with the variance of half a wave.
+    """
+    waves = teeth // 2
+    field = ToothField(teeth, (1.0,) * waves, 0.0)
+    parts = np.concatenate([np.eye(waves, dtype=complex), 1j * np.eye(waves)])
+    made = field._teeth(parts)
+    covariance = made.T @ made
+    alone = np.eye(teeth) - 1 / teeth
+    assert covariance == pytest.approx(alone * covariance[0, 0] / alone[0, 0], abs=1e-12 * teeth)
+
+
+def test_the_splines_of_the_calibration_are_not_those_that_are_judged():
+    """A figure that was set on the very splines it is tested on comes out right by itself. Fault caught: one stream for
+    both.
+    """
+    u = (np.arange(4000) + 0.5) / 4000
+    judged, calibrated = _normal_pairs(u, 2), _normal_pairs(u, 2, CALIBRATION_SEED)
+    together = np.corrcoef(judged.view(float).T, calibrated.view(float).T)[:4, 4:]
+    assert np.abs(together).max() < 4.5 / np.sqrt(4000)  # 16 coefficients: 1e-4 of chance
