@@ -256,7 +256,11 @@ def _solve_convex(items: Sequence[Item], requirement: Requirement) -> Solution:
     with warnings.catch_warnings():
         # asked for more digits than it may reach, the solver says so; slack and gap are computed anew below
         warnings.filterwarnings("ignore", "Solution may be inaccurate")
-        _solve(problem, cp.CLARABEL, tol_gap_abs=1e-12, tol_gap_rel=1e-12, tol_feas=1e-12, max_iter=500)
+        try:
+            _solve(problem, cp.CLARABEL, tol_gap_abs=1e-12, tol_gap_rel=1e-12, tol_feas=1e-12, max_iter=500)
+        except NoResult:
+            # scaled once more, numbers that are near 1 already can make it give up
+            _solve(problem, cp.CLARABEL, equilibrate_enable=False, warm_start=False, max_iter=500)
     if problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
         raise HdoptError(f"the solver ended with {problem.status!r}; check the cost data and the bounds")
     multiplier = float(meets.dual_value) * cost_unit / unit

@@ -39,10 +39,14 @@ STEP = 0.01
 REACH = 1.6
 """Factor by which one convex model may move a tolerance."""
 SHRINK = 0.6
-"""What is left of that reach after each step."""
-SETTLED = 5e-4
+"""What is left of a tolerance's reach after a step in which it did not use it up, or turned back."""
+LEAST_REACH = 1.005
+"""No reach is shorter: a solver needs room between the ends."""
+AT_THE_END = 0.99
+"""Share of a reach from which it counts as used up."""
+SETTLED = 5e-5
 """Relative change of cost and of the constraint below which successive models agree."""
-MAX_STEPS = 25
+MAX_STEPS = 60
 CORRECTIONS = 8
 CLOSE = 1e-4
 """How near below the limit, relative to it, the measured response of a continuous design is brought."""
@@ -334,11 +338,12 @@ def _successive(
     problem: AllocationProblem, constraint: _Constraint, measured: Callable[[Array], float]
 ) -> tuple[Solution, int]:
     """Renew the convex model at its own solution until it stays there, then correct the last model's limit until the
-    response as `measured` keeps the limit. A shrinking reach keeps the steps within what a model can know."""
-    at, reach, cost, step = problem.current, REACH, math.inf, 0
+    response as `measured` keeps the limit. Each tolerance has a reach of its own, within what a model can know."""
+    at, cost, step = problem.current, math.inf, 0
+    reach, before = np.full(len(at), REACH), np.zeros(len(at))
     for step in range(1, MAX_STEPS + 1):
         requirement = constraint.model(at)
-        near = [_within(item, t, reach) for item, t in zip(problem.items, at, strict=True)]
+        near = [_within(item, t, r) for item, t, r in zip(problem.items, at, reach, strict=True)]
         try:
             solution = solve(near, requirement)
         except Infeasible:
@@ -347,17 +352,28 @@ def _successive(
             if np.allclose(tightest, at, rtol=1e-9) or step == MAX_STEPS:
                 _refuse_unreachable(problem, requirement.value(tightest))
                 raise
-            at = tightest
+            at, reach = tightest, np.full(len(at), REACH)
             continue
         moved = np.array(list(solution.tolerances.values()))
-        change = float(np.max(np.abs(np.log(moved / at))))
-        settled = abs(solution.total_cost - cost) <= SETTLED * abs(solution.total_cost) and change < 0.02
+        went = np.log(moved / at)
+        change = float(np.max(np.abs(went)))
+        settled = abs(solution.total_cost - cost) <= SETTLED * abs(solution.total_cost) and change < 0.005
         at, cost = moved, solution.total_cost
         if settled:
             break
-        reach = 1 + (reach - 1) * SHRINK
+        reach, before = _next_reach(reach, went, before), went
     near = [_chosen(_within(item, t, 1.2), t) for item, t in zip(problem.items, at, strict=True)]
     return _corrected(problem, near, constraint.model(at), measured), step
+
+
+def _next_reach(reach: Array, went: Array, before: Array) -> Array:
+    """Factors by which each tolerance may move next, where each moved by the logarithms `went` within `reach`, and by
+    `before` in the step before: more for one that is still on its way at the end of its reach, less for the others,
+    which have arrived or turn to and fro. All (k,).
+    """
+    on_its_way = (np.abs(went) > AT_THE_END * np.log(reach)) & (went * before >= 0)
+    wider = np.minimum(1 + (reach - 1) / SHRINK, REACH)
+    return np.where(on_its_way, wider, np.maximum(1 + (reach - 1) * SHRINK, LEAST_REACH))
 
 
 def _chosen(item: Item, tolerance: float) -> Item:

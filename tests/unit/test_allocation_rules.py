@@ -8,7 +8,13 @@ import pytest
 from hdopt.allocation import convex, rules
 from hdopt.allocation.convex import Item, rss_rule, solve, worst_case_rule
 from hdopt.allocation.cost import Exponential, Grade, GradeTable, Piecewise, Reciprocal
-from hdopt.allocation.rules import AllocationProblem, allocate_by_equal_scaling, allocate_by_rss, allocate_by_yield
+from hdopt.allocation.rules import (
+    AllocationProblem,
+    allocate_by_equal_scaling,
+    allocate_by_rss,
+    allocate_by_worst_case,
+    allocate_by_yield,
+)
 from hdopt.errors import HdoptError
 from hdopt.tolerance.distributions import Normal, Uniform
 from hdopt.tolerance.space import InputSpace, Tolerance
@@ -65,14 +71,19 @@ class Sum:
         return inputs @ self.slopes
 
 
-def problem(*held, required=0.9, limit=0.4, costs=(Reciprocal(0.0, 0.1), Reciprocal(0.0, 0.2))):
-    """Two normal inputs to be chosen, 4 sigma within the tolerance, and `held` ones of that standard deviation."""
-    tolerances = {name: Tolerance.of_deviation(Normal(mean=0.0, std=0.1, lower=-0.4, upper=0.4)) for name in ("a", "b")}
+def problem(*held, required=0.9, limit=0.4, costs=(Reciprocal(0.0, 0.1), Reciprocal(0.0, 0.2)), present=(0.4, 0.4)):
+    """Two normal inputs to be chosen, 4 sigma within the `present` tolerances, and `held` ones of that standard
+    deviation."""
+    tolerances = {
+        name: Tolerance.of_deviation(Normal(mean=0.0, std=t / 4, lower=-t, upper=t))
+        for name, t in zip("ab", present, strict=True)
+    }
     tolerances |= {
         f"held{i}": Tolerance.of_deviation(Normal(mean=0.0, std=s, lower=-8 * s, upper=8 * s))
         for i, s in enumerate(held)
     }
-    items = tuple(Item(name, cost, 0.4, lower=0.01, upper=40.0) for name, cost in zip("ab", costs, strict=True))
+    chosen = zip("ab", costs, present, strict=True)
+    items = tuple(Item(name, cost, t, lower=1e-3, upper=40.0) for name, cost, t in chosen)
     return AllocationProblem(Sum(1.0, 1.0, *[1.0] * len(held)), InputSpace(tolerances), items, limit, required, "mm")
 
 
@@ -105,6 +116,21 @@ def test_the_price_of_a_root_sum_square_counts_what_stays_as_it_is(quick):
     """By hand: cost C = K/sqrt(L^2 - r^2), r the held spread's part, so dC/dL = C L/(L^2 - r^2)."""
     found = allocate_by_rss(problem(0.15), seed=3)
     assert found.marginal_cost == pytest.approx(found.total_cost * 0.4 / (0.4**2 - (Z_90 * 0.15) ** 2), rel=0.02)
+
+
+@pytest.mark.parametrize("dearer", [2.0, 2e4])
+@pytest.mark.parametrize("rule", [allocate_by_rss, allocate_by_worst_case, allocate_by_yield])
+def test_least_cost_does_not_hang_on_the_present_tolerances(quick, rule, dearer):
+    """What a limit costs at least is a property of prices and limit, not of where a drawing stands today: from a tenth
+    of the present tolerances, thirty times them, and one of them loose while the other is tight. Fault caught: a reach
+    that shrinks at every step, so that nothing moves by more than 3.5 times; it cost five to seventy times as much.
+    """
+    costs = (Reciprocal(0.0, 0.1), Reciprocal(0.0, 0.1 * dearer))
+    starts = [(0.4, 0.4), (0.04, 0.04), (12.0, 12.0), (12.0, 0.012), (0.02, 2.0)]
+    found = [rule(problem(costs=costs, present=start), seed=3) for start in starts]
+    # The yield's quantile is a sample's, and its cost at the optimum flat: 0.5 % are what its corrections leave.
+    assert [one.total_cost for one in found] == pytest.approx([found[0].total_cost] * len(starts), rel=5e-3)
+    assert [one.modelled for one in found] == pytest.approx([0.4] * len(starts), rel=1e-3)
 
 
 def test_the_price_of_a_root_sum_square_counts_directions(quick):
