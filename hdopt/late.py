@@ -42,7 +42,8 @@ class Late(Generic[P, R]):
         """The function compiled, kept on disk; runs beside other threads."""
         from numba import njit
 
-        return njit(cache=True, nogil=True, error_model="numpy")(self.py_func)
+        # Said, not left out: unsaid, it is taken from whatever kernel calls the function first.
+        return njit(cache=True, nogil=True, error_model="numpy", fastmath=False)(self.py_func)
 
     @property
     def _numba_type_(self) -> Any:

@@ -8,7 +8,7 @@ import numpy as np
 from hdopt.bench.arrays import Array
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, fastmath=False)
 def play(position: Array, gap: Array) -> Array:
     """Follower (n,) of a play (backlash) operator on a path `position` (n,), whose full width `gap` (n,), in the unit
     of the path, may change from sample to sample. It starts at the side that the first twenty samples press against."""
@@ -20,7 +20,7 @@ def play(position: Array, gap: Array) -> Array:
     return follower
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, fastmath=False)
 def maxwell_slip(position: Array, slip: Array, weight: Array) -> Array:
     """Force (n,) of Jenkins elements in parallel along a path `position` (n,): element k slips at a deflection of
     `slip`[k], in the unit of the path, with a force `weight`[k]. All start without deflection."""
@@ -38,7 +38,7 @@ def maxwell_slip(position: Array, slip: Array, weight: Array) -> Array:
     return force
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, fastmath=False)
 def bouc_wen(position: Array, length: float, exponent: float, beta: float) -> Array:
     """Bouc-Wen force z (n,) along a path `position` x (n,), +-1 when it slips.
 
@@ -63,7 +63,7 @@ def bouc_wen(position: Array, length: float, exponent: float, beta: float) -> Ar
     return force
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, fastmath=False)
 def first_order_noise(white: Array, keep: float) -> Array:
     """AR(1) noise of unit variance from `white` noise (n,) of unit variance; `keep` (0 to 1) is what a sample keeps of
     the one before."""

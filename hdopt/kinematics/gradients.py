@@ -65,7 +65,7 @@ class ZoneTerms(NamedTuple):
     a_fs: float
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def _branch(terms: ZoneTerms, theta: float, s: float, k: float, out: Array) -> None:
     """Fill `out` (3, 6): tau without FS term, offset o' and depth of zone s and rim k, with all slopes."""
     tip, motion, cs_cos, cs_sin, tan_alpha, _ = terms
@@ -107,7 +107,7 @@ def _branch(terms: ZoneTerms, theta: float, s: float, k: float, out: Array) -> N
     tau[TAN] += depth[VALUE]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def _zones(terms: ZoneTerms, theta: float, side: Array, work: Array) -> tuple[float, float]:
     """Deepest rim of both zones into `work` rows 0 and 1; `side` (2,) forces a rim (+-1) or, 0, lets the depth decide.
 
@@ -131,7 +131,7 @@ def _zones(terms: ZoneTerms, theta: float, side: Array, work: Array) -> tuple[fl
     return gap_0, gap_1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def _lowest(work: Array, a_fs: float, out: Array) -> None:
     """l and its slopes from both zones' rows of `work` into `out` (6,)."""
     first, second = work[0, 0], work[1, 0]
@@ -155,7 +155,7 @@ def _lowest(work: Array, a_fs: float, out: Array) -> None:
         out[j] = (0.5 + lean) * first[j] + (0.5 - lean) * second[j] + over_h * slope_h
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def _maxima(terms: ZoneTerms, work: Array, values: Array, slopes: Array) -> None:
     """Four smooth maxima, one a zone and rim: Newton from the first-order peak. A branch that is not the deeper rim
     at its own peak lies below another branch there, so it never wins and does no harm."""
@@ -187,7 +187,7 @@ def _maxima(terms: ZoneTerms, work: Array, values: Array, slopes: Array) -> None
             index += 1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def _rim_change(terms: ZoneTerms, zone: int, low: float, high: float, work: Array) -> float:
     """Angle between `low` and `high` where the deepest rim of a zone changes, by bisection."""
     free = np.zeros(2)
@@ -205,7 +205,7 @@ def _rim_change(terms: ZoneTerms, zone: int, low: float, high: float, work: Arra
     return (low + high) / 2
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def _value(terms: ZoneTerms, theta: float, side: Array, work: Array, out: Array) -> float:
     """Fill `out` (6,) with l and its slopes at `theta`; l."""
     _zones(terms, theta, side, work)
@@ -214,7 +214,7 @@ def _value(terms: ZoneTerms, theta: float, side: Array, work: Array, out: Array)
     return value
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def _move_with_change(terms: ZoneTerms, theta: float, zone: int, work: Array, out: Array) -> None:
     """Add to the slopes of l at the angle where a zone's rim changes what that angle's own motion does."""
     for rim in range(2):
@@ -225,7 +225,7 @@ def _move_with_change(terms: ZoneTerms, theta: float, zone: int, work: Array, ou
             out[j] -= out[THETA] * apart[j] / apart[THETA]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def _minimum_between(
     terms: ZoneTerms, low: float, high: float, ends: Index, work: Array, out: Array, other: Array
 ) -> None:
@@ -284,7 +284,7 @@ def _minimum_between(
     out[VALUE] = best
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def _scan(terms: ZoneTerms, work: Array, out: Array, marks: Array, level: Array, upper: Mask) -> None:
     """Fill `marks` (SCAN + 1,) with even angles of one turn, `level` with l there, and `upper` (SCAN + 1, 2) with
     whether the upper rim is the deepest one of each zone."""
@@ -298,7 +298,7 @@ def _scan(terms: ZoneTerms, work: Array, out: Array, marks: Array, level: Array,
         level[i] = out[VALUE]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def _minima(terms: ZoneTerms, work: Array, values: Array, slopes: Array) -> None:
     """The lowest local minima of l, at most as many as `values` holds, sorted upward."""
     marks, level, upper = np.empty(SCAN + 1), np.empty(SCAN + 1), np.empty((SCAN + 1, 2), np.bool_)
@@ -350,7 +350,7 @@ def _minima(terms: ZoneTerms, work: Array, values: Array, slopes: Array) -> None
             slopes[i] = slopes[last]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def _insert(values: Array, slopes: Array, found: Array) -> None:
     """Keep `found` among the lowest, sorted."""
     place = len(values)
@@ -364,7 +364,7 @@ def _insert(values: Array, slopes: Array, found: Array) -> None:
         slopes[place] = found[MAJOR:]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def _extremes(tip: TipGeometry, tan_alpha: float, rows: Array, found: Extremes) -> None:
     """Fill the arrays of `found` for each of `rows` (n, 12)."""
     work = np.empty((3, 3, 6))

@@ -23,7 +23,7 @@ FEWEST_ANGLES, ANGLES_PER_TOOTH = 120, 0.75
 """Grid angles of one input turn at least, and for each tooth of the circular spline. More of them are no more right:
 what a cell may hide is computed, and followed."""
 
-compiled = njit(error_model="numpy")
+compiled = njit(error_model="numpy", fastmath=False)
 
 
 class BeatConstants(NamedTuple):
@@ -106,7 +106,7 @@ def _with_sine(table: Array, amplitude: float, phase: float, out: Array) -> None
         cos, sin = cos * cos_turn - sin * sin_turn, sin * cos_turn + cos * sin_turn
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=False)
 def beat_extremes_block(constants: BeatConstants, cs: Array, fs: Array, rows: Array, out: Array) -> None:
     """Fill `out` (n, 2) with the essential infimum and supremum of each row of errors `rows` (n, 12), mm of arc.
 

@@ -8,7 +8,7 @@ from numba import njit
 from hdopt.arrays import Array, Index
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=False)
 def count_in_bins(values: Array, low: float, width: float, counts: Index) -> int:
     """Add to `counts` (b,) how many of `values` (n,) lie in each of b equal bins from `low`, each `width` wide.
 

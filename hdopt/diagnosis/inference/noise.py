@@ -58,7 +58,7 @@ ROUNDING = 1e-9
 """Imaginary part below which a pole is real."""
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def _filtered(columns: Array, ar: Array, root_weight: Array) -> Array:
     """(x_t - sum a_k x_{t-k}) times the weight of row t, for each of the `columns` (q, n), rows of which lie side by
     side."""

@@ -34,7 +34,7 @@ def gains_of_subsets(gram: Array, moment: Array, ends: Index, subsets: Index) ->
     return gains
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def _gains(gram: Array, moment: Array, ends: Index, subsets: Index, ridge: float) -> Array:
     count, most = subsets.shape
     widest = 0
