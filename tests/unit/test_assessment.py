@@ -79,7 +79,7 @@ def test_the_chance_is_that_of_a_whole_search_made_anew(monkeypatch):
     """Under flipped signs shapes are looked for again, in all of the catalogue, each with its own penalty."""
     asked = []
 
-    def chance(probe, score, rng, observed):
+    def chance(probe, score, rng, observed, most):
         other = probe.flipped(np.where(probe.rows.block % 2, 1.0, -1.0))
         asked.append((other, score(other), observed))
         return 0.5

@@ -15,6 +15,7 @@ from hdopt.diagnosis.settings import DEFAULT
 from hdopt.drive.geometry import ARCMIN
 from hdopt.effects import EFFECTS
 from hdopt.effects.declared import Shaft
+from hdopt.effects.met import Spline, met_angles
 from hdopt.effects.term import Term
 from hdopt.effects.tooth_mesh import SIDEBANDS
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
@@ -114,17 +115,18 @@ def test_one_bump_is_unknown_and_no_tooth(study):
 
 
 def test_mesh_inside_the_zones_comes_back(study):
-    """A ripple of both zones, put through the larger-zone rule by the model: the fit in zones explains it to the noise,
-    and better than sines beside the base.
+    """A ripple of both zones, met where their deepest points are and put through the larger-zone rule by the model: the
+    fit in zones explains it to the noise, and better than sines beside the base.
     """
     rng = np.random.default_rng(5)
     base = CartesianModel.of(study.drive)
     theta = np.linspace(0, 8 * TURN, 8 * 500)
     errors = to_cartesian(study.errors, base.half_width)
     mesh = EFFECTS["tooth_mesh"]
-    first = np.sin(162 * theta + 0.3)
-    second = np.sin(162 * theta + 2.0)
-    value, _, _ = base.evaluate(theta, errors, 1.5e-3 * np.stack([first, second]))
+    rotation = base.rotation(theta)
+    on_circular_spline = met_angles(theta, base.advance, base.beyond_at(rotation, errors))[Spline.CIRCULAR]
+    ripple = np.sin(162 * on_circular_spline + np.array([[0.3], [2.0]]))
+    value, _, _ = base.evaluate_at(rotation, errors, 1.5e-3 * ripple)
     recording = record(theta, value + rng.normal(0, 0.01, len(theta)))
     samples = gather([recording])
     problem = FitProblem(samples, base, np.ones((len(samples), 1)), Noise.white(samples, 0.01))

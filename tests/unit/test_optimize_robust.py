@@ -8,7 +8,8 @@ import pytest
 from hdopt.kinematics import peak_to_peak_arcmin
 from hdopt.optimize.constants import constants_of
 from hdopt.optimize.objectives import ROBUST
-from hdopt.report import Figure, Table
+from hdopt.report import Figure, Table, Text
+from hdopt.report.sections.search import NOT_FOLLOWED
 from hdopt.study import load_study
 from hdopt.workflow.search import search, words_on_model
 from hdopt.workflow.search_setup import sample_rows
@@ -111,8 +112,11 @@ def test_the_step_names_the_wave_generator_and_shows_it(study, tmp_path):
     items = {item.key: item for section in done.sections for item in section.items if hasattr(item, "key")}
     assert isinstance(items["trade-chosen-against-baseline"], Table)
     assert {"trade-front-nominal-figure", "trade-front-robust-figure"} & set(items)
-    for key in ("trade-designs-parallel", "trade-map-figure", "trade-profiles-curvature", "trade-confidence-figure"):
+    for key in ("trade-designs-parallel", "trade-map-figure", "trade-profiles-curvature"):
         assert isinstance(items[key], Figure)
+    # The constants are followed where the study asks; this one does not, and the report says how to.
+    (sure,) = (section for section in done.sections if section.key == "trade-confidence")
+    assert "trade-confidence-figure" not in items and Text(NOT_FOLLOWED) in sure.items
 
 
 def test_no_design_is_an_answer_not_an_error(tmp_path):

@@ -151,8 +151,8 @@ def test_key_figures_of_a_stack():
     }
 
 
-@pytest.mark.parametrize(("low", "said"), [(0.9612, "do not keep"), (0.97, "drives keep")])
-def test_drives_keep_the_requirement_where_their_lower_bound_does(low, said):
+@pytest.mark.parametrize(("low", "said"), [(0.9612, "do not keep"), (0.97, "assemblies keep")])
+def test_assemblies_keep_the_requirement_where_their_lower_bound_does(low, said):
     from dataclasses import replace
 
     stack = replace(STACK, conforming=estimate(0.98, low, 0.9934))
