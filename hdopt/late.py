@@ -1,7 +1,8 @@
 """Functions compiled once there is enough for them to do: loading the compiler and one of them costs half a second.
 
 A command that looks at one drive calls them a few times, and runs them as the Python they are. Both give the same
-numbers to the bit: the compiler neither reorders nor contracts here.
+numbers to the bit, since the compiler neither reorders nor contracts here; but `hypot` and powers, which it works out
+in its own way, may differ in the last.
 """
 
 from __future__ import annotations

@@ -45,7 +45,9 @@ LEAST_REACH = 1.005
 AT_THE_END = 0.99
 """Share of a reach from which it counts as used up."""
 SETTLED = 5e-5
-"""Relative change of cost and of the constraint below which successive models agree."""
+"""Relative change of cost below which successive models agree."""
+ARRIVED = 0.005
+"""Largest change of a tolerance, by its logarithm, below which they do."""
 MAX_STEPS = 60
 CORRECTIONS = 8
 CLOSE = 1e-4
@@ -357,7 +359,7 @@ def _successive(
         moved = np.array(list(solution.tolerances.values()))
         went = np.log(moved / at)
         change = float(np.max(np.abs(went)))
-        settled = abs(solution.total_cost - cost) <= SETTLED * abs(solution.total_cost) and change < 0.005
+        settled = abs(solution.total_cost - cost) <= SETTLED * abs(solution.total_cost) and change < ARRIVED
         at, cost = moved, solution.total_cost
         if settled:
             break
