@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from hdopt.allocation.results import AllocateResult as AllocateResult
     from hdopt.diagnosis.settings import DiagnosisSettings as DiagnosisSettings
     from hdopt.diagnosis.verdict.diagnosis import Diagnosis as Diagnosis
+    from hdopt.diagnosis.verdict.many import DiagnosedBatch as DiagnosedBatch
     from hdopt.diagnosis.verdict.named_effect import NamedEffect as NamedEffect
     from hdopt.drive.errors import DriveErrors as DriveErrors
     from hdopt.drive.geometry import Drive as Drive
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from hdopt.workflow.compensate import Compensated as Compensated
     from hdopt.workflow.compensate import compensate as compensate
     from hdopt.workflow.diagnose import diagnose as diagnose
+    from hdopt.workflow.diagnose_many import diagnose_many as diagnose_many
     from hdopt.workflow.explore import ExploreResult as ExploreResult
     from hdopt.workflow.explore import explore as explore
     from hdopt.workflow.export import export as export
@@ -72,6 +74,7 @@ _EXPORTS: dict[str, str] = {
     "AllocateResult": "hdopt.allocation.results",
     "DiagnosisSettings": "hdopt.diagnosis.settings",
     "Diagnosis": "hdopt.diagnosis.verdict.diagnosis",
+    "DiagnosedBatch": "hdopt.diagnosis.verdict.many",
     "NamedEffect": "hdopt.diagnosis.verdict.named_effect",
     "DriveErrors": "hdopt.drive.errors",
     "Drive": "hdopt.drive.geometry",
@@ -103,6 +106,7 @@ _EXPORTS: dict[str, str] = {
     "Compensated": "hdopt.workflow.compensate",
     "compensate": "hdopt.workflow.compensate",
     "diagnose": "hdopt.workflow.diagnose",
+    "diagnose_many": "hdopt.workflow.diagnose_many",
     "ExploreResult": "hdopt.workflow.explore",
     "explore": "hdopt.workflow.explore",
     "export": "hdopt.workflow.export",

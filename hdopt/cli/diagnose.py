@@ -1,4 +1,4 @@
-"""`hdopt diagnose`: what physics a recording holds that the model leaves out."""
+"""`hdopt diagnose`: what physics a recording holds that the model leaves out, or each of many."""
 
 from __future__ import annotations
 
@@ -8,11 +8,21 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import OutputFile, answer_options, emit, engine_option, table_options
+from hdopt.cli.common import (
+    OutputFile,
+    answer_options,
+    emit,
+    engine_option,
+    finished_parts_kept,
+    resume_option,
+    table_options,
+    watched,
+)
 from hdopt.cli.recorded import RecordingOptions, recording_options
 
 if TYPE_CHECKING:
     from hdopt.diagnosis.verdict.diagnosis import Diagnosis
+    from hdopt.diagnosis.verdict.many import DiagnosedBatch
 
 MOST_LISTED = 12
 """Parameters of one effect that the terminal shows."""
@@ -32,6 +42,8 @@ MOST_LISTED = 12
     type=OutputFile(),
     help="Write a study with the drive's fitted errors and the effects found.",
 )
+@click.option("--each", is_flag=True, help="Each file is a drive of its own: one table, --engine takes them.")
+@resume_option
 @engine_option
 @answer_options
 def command(
@@ -39,27 +51,69 @@ def command(
     nuisance: str,
     report_file: Path | None,
     study_file: Path | None,
+    each: bool,
+    resume: bool,
     json_file: Path | None,
     seed: int,
 ) -> None:
     """What physics recordings of one drive hold that the model leaves out.
 
-    REC are files of one drive, of any format that `hdopt inspect` reads, fitted jointly. Exit status 0 whenever a
-    verdict was reached.
+    REC are files of one drive, of any format that `hdopt inspect` reads, fitted jointly; with --each, of one drive
+    each. Exit status 0 whenever a verdict was reached.
     """
-    from hdopt.workflow.diagnose import diagnose, write_diagnosis
-
     asked = tuple(name.strip() for name in nuisance.split(",") if name.strip())
-    source = given.source()
-    read = source.recordings(given.recordings)
-    diagnosis = diagnose(read, source, seed=seed, nuisance=asked)
     wanted = {"report": report_file, "study": study_file}
     files = {kind: path for kind, path in wanted.items() if path is not None}
+    if not each:
+        if resume:
+            raise click.UsageError("--resume goes on with many drives; give it with --each")
+        _one(given, asked, files, json_file, seed)
+        return
+    if study_file is not None:
+        raise click.UsageError("--write-study: said of one drive; leave it out with --each")
+    with finished_parts_kept(given.fingerprint(), resume):
+        _each(given, asked, files, json_file, seed)
+
+
+def _one(
+    given: RecordingOptions, nuisance: tuple[str, ...], files: dict[str, Path], json_file: Path | None, seed: int
+) -> None:
+    """The diagnosis of one drive, said and written."""
+    from hdopt.workflow.diagnose import diagnose, write_diagnosis
+
+    source = given.source()
+    read = source.recordings(given.recordings)
+    diagnosis = diagnose(read, source, seed=seed, nuisance=nuisance)
     try:
         write_diagnosis(diagnosis, files, [recording.name for recording in read], source)
     finally:
         # A file that cannot be written after minutes of work must not take the answer with it.
         emit(diagnosis.to_dict(), json_file, _lines(diagnosis), tables=diagnosis)
+
+
+def _each(
+    given: RecordingOptions, nuisance: tuple[str, ...], files: dict[str, Path], json_file: Path | None, seed: int
+) -> None:
+    """The diagnoses of many drives, said and written."""
+    from hdopt.parallel.engine import engine_in_force
+    from hdopt.workflow.diagnose_many import diagnose_many, write_diagnoses
+
+    with engine_in_force(watched("drives")):
+        batch = diagnose_many(given.recordings, given.source(), seed, nuisance)
+    try:
+        write_diagnoses(batch, files)
+    finally:
+        emit(batch.to_dict(), json_file, _batch_lines(batch), tables=batch)
+
+
+def _batch_lines(batch: DiagnosedBatch) -> Iterator[str]:
+    for drive in batch.drives:
+        if drive.error:
+            yield f"{drive.name}: not diagnosed: {drive.error}"
+        else:
+            found = ", ".join(f"{name} {confidence:.2f}" for name, confidence in drive.effects.items())
+            yield f"{drive.name}: {drive.verdict}" + (f" ({found})" if found else "")
+    yield "verdicts: " + ", ".join(f"{name} {count}" for name, count in batch.verdicts.items())
 
 
 def _lines(diagnosis: Diagnosis) -> Iterator[str]:

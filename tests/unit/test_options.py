@@ -59,6 +59,11 @@ CASES = {
         "one.csv two.csv --nuisance drift,time-warp --seed 7",
         {"recordings": ["one.csv", "two.csv"], "nuisance": ("drift", "time-warp"), "seed": 7},
     ),
+    "diagnose --each": (
+        "hdopt.workflow.diagnose_many.diagnose_many",
+        "one.csv two.csv --each --nuisance drift --seed 7",
+        {"nuisance": ("drift",), "seed": 7},
+    ),
     "inspect": (
         "hdopt.workflow.inspect.inspect",
         "one.csv two.csv --limit rms=60arcsec --mounting A,B --speed-rpm 30 --serial S1 --conditions cold --seed 7",

@@ -24,7 +24,7 @@ CALLS = {
     "allocate": ("allocate",),
     "inspect": ("inspect", "inspect_many"),
     "compensate": ("compensate",),
-    "diagnose": ("diagnose",),
+    "diagnose": ("diagnose", "diagnose_many"),
     "search": ("search",),
     "export": ("export",),
     "compare": ("compare",),
@@ -49,7 +49,9 @@ OTHERWISE = {
     | dict.fromkeys(("report_file", "bench_out"), "files")
     | {"each": "inspect_many", "resume": "engine", "serial": "label", "conditions": "label", "check": "result.missed"},
     "compensate": OF_RECORDINGS | {"output": "files", "form": "files"},
-    "diagnose": OF_RECORDINGS | dict.fromkeys(("report_file", "study_file"), "files"),
+    "diagnose": OF_RECORDINGS
+    | dict.fromkeys(("report_file", "study_file"), "files")
+    | {"each": "diagnose_many", "resume": "engine"},
     "search": OF_A_STUDY | {"study_file": "files"},
     "export": OF_A_STUDY
     | {f"file_{kind}": "files" for kind in FORMATS}
