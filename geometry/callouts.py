@@ -340,7 +340,7 @@ def _reliefs(rounds: Sequence[Prism]) -> list[str]:
         if recess == AT_SHOULDER:
             lines.append("undercut DIN 509-E0.2×0.1 at the shoulder")
         elif isinstance(recess, Undercut):
-            lines.append(f"relief {recess.length:g} × {recess.depth:g} deep, R{recess.radius:g}, 15° out, at each step")
+            lines.append(f"relief {recess.length:g} × {recess.depth:g} deep, R{recess.radius:g}, 15° out, at shoulders")
         else:
             ring = ring_of(rounds[-1].outline.perimeter / math.pi)
             assert ring is not None

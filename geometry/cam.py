@@ -14,7 +14,7 @@ from hdopt.geometry.features import BoltCircle, Bore, PlainBore
 from hdopt.geometry.part import Part, Prism, ProfiledPart
 from hdopt.geometry.slide_features import Slot
 from hdopt.geometry.threads import THREAD_FOR_RADIUS, THREADS
-from hdopt.geometry.undercut import AT_SHOULDER, IN_CORNER, Undercut
+from hdopt.geometry.undercut import AT_SHOULDER, IN_CORNER, SMALL, Undercut
 
 
 class Cam(Carrier):
@@ -80,9 +80,11 @@ class Cam(Carrier):
         return float(math.ceil(bore.reach + self.wall + AT_SHOULDER.depth))
 
     def _undercut(self, seat: float) -> Undercut:
-        """The undercut of a hub's `seat` (radius, mm) at its flange, over which the cam's countersink has to pass."""
+        """The undercut of a hub's `seat` (radius, mm) at its flange, over which the cam's countersink has to pass: no
+        longer than a third of the seat."""
         clear = self.countersink(PlainBore(seat)) >= 1.5 * AT_SHOULDER.rise
-        return AT_SHOULDER if clear else IN_CORNER
+        sizes = (AT_SHOULDER, IN_CORNER) if clear else (IN_CORNER,)
+        return next((size for size in sizes if size.length <= self.width / 3), SMALL)
 
     def _hub_fits(self, seat: float) -> bool:
         """Whether there is room between seat and rim for the usual circle of bolts."""

@@ -54,6 +54,13 @@ class Prism:
         return tuple(recess for recess in (self.foot, self.head, self.groove) if recess is not None)
 
     @property
+    def straight(self) -> float:
+        """Length along z that its undercuts leave of the outline below a groove, mm; negative where they overlap."""
+        low = self.bottom + (self.bottom_edge.axial if self.foot is None else self.foot.length)
+        high = self.top - (self.top_edge.axial if self.head is None else self.head.length)
+        return (high if self.groove is None else min(high, self.groove.bottom)) - low
+
+    @property
     def volume(self) -> float:
         broken = sum(edge.removed_volume(self.outline.perimeter) for edge in (self.bottom_edge, self.top_edge))
         if isinstance(self.outline, Circle):

@@ -169,7 +169,7 @@ def _section(sheet: Sheet, place: Placed, part: Part, solid: cq.Solid) -> None:
 
 
 def _outline(sheet: Sheet, place: Placed, region: Region) -> None:
-    """The edges of a cut face, which are seen whatever lies behind it: Open CASCADE cannot halve every solid."""
+    """The edges of a cut face, which are seen whatever lies behind it."""
     for ring in (region.outer, *region.holes):
         sheet.polyline(place(ring), "visible", closed=True)
 

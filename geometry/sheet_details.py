@@ -20,9 +20,11 @@ LETTERS = "ZYX"
 RING = 2.6
 """Radius of the ring round an undercut in the section, mm."""
 
-SCALE = 20.0
-MARGIN, DEEP = 0.45, 0.5
-"""What is drawn beside an undercut, and below its bottom, mm of the part."""
+SCALES = ((0.5, 20.0), (0.0, 50.0))
+"""From which length of an undercut on, mm, it is enlarged by how much."""
+
+MARGIN, DEEP = 9.0, 10.0
+"""What is drawn beside an undercut, and below its bottom, mm of the sheet."""
 
 
 def undercuts_of(part: Part) -> dict[Undercut, list[tuple[float, float, int]]]:
@@ -76,24 +78,26 @@ def outline(undercut: Undercut) -> Array:
 
 
 def _detail(sheet: Sheet, corner: Point, letter: str, undercut: Undercut) -> None:
-    left, top = corner[0] + 12.0, corner[1] + 11.0 + SCALE * (undercut.rise + MARGIN)
+    scale = next(scale for least, scale in SCALES if undercut.length >= least)
+    margin, deep = MARGIN / scale, DEEP / scale
+    left, top = corner[0] + 12.0, corner[1] + 11.0 + scale * undercut.rise + MARGIN
 
     def placed(points: Array | Sequence[Point]) -> Array:
-        return np.asarray(points, float) * (SCALE, -SCALE) + (left + SCALE * MARGIN, top)
+        return np.asarray(points, float) * (scale, -scale) + (left + MARGIN, top)
 
     name = "DIN 509-E0.2×0.1" if undercut == AT_SHOULDER else "relief"
-    sheet.text((corner[0], corner[1] + 3.0), f"{letter}  {SCALE:g}:1  {name}", TEXT, bold=True)
+    sheet.text((corner[0], corner[1] + 3.0), f"{letter}  {scale:g}:1  {name}", TEXT, bold=True)
     made = outline(undercut)
-    high, length = undercut.rise + MARGIN, undercut.length
-    seen = np.vstack([[(0.0, high)], made, [(length + MARGIN, 0.0)]])
-    low = -undercut.depth - DEEP
+    high, length = undercut.rise + margin, undercut.length
+    seen = np.vstack([[(0.0, high)], made, [(length + margin, 0.0)]])
+    low = -undercut.depth - deep
     fill = sheet.hatch("section", "#30506a", 45, 1.9)
-    sheet.region(placed(np.vstack([seen, [(length + MARGIN, low), (-MARGIN, low), (-MARGIN, high)]])), [], fill)
+    sheet.region(placed(np.vstack([seen, [(length + margin, low), (-margin, low), (-margin, high)]])), [], fill)
     sheet.polyline(placed(seen))
     (x0, y0), (x1, _) = placed([(0.0, 0.0), (length, 0.0)]).tolist()
     bottom = float(placed([(0.0, low)])[0, 1])
     sheet.dimension((x0, y0), (x1, y0), bottom + 6.0, f"{length:g}", False)
-    edge = length + MARGIN
+    edge = length + margin
     (xr, yr), (_, yd) = placed([(edge, 0.0), (edge, -undercut.depth)]).tolist()
     foot = placed(made[-2:-1])[0].tolist()
     sheet.dimension((foot[0], yd), (xr, yr), xr + 5.0, f"{undercut.depth:g}", True, 2.6 if yr < yd else -1.6)

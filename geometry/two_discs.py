@@ -17,7 +17,7 @@ from hdopt.geometry.din471 import ring_of, smallest_ring
 from hdopt.geometry.features import Bore, BrokenEdge
 from hdopt.geometry.part import SHARP, Part, Prism, ProfiledPart
 from hdopt.geometry.slide_features import Slot
-from hdopt.geometry.undercut import AT_SHOULDER, IN_CORNER, RingGroove
+from hdopt.geometry.undercut import AT_SHOULDER, IN_CORNER, SMALL, RingGroove, Undercut
 
 
 class TwoDiscs(Carrier):
@@ -108,16 +108,35 @@ class TwoDiscs(Carrier):
                 f"DIN 471 has no retaining ring for journals of {2 * radius:g} mm: the discs are held along the axis "
                 "by their fit alone; export.journal_radius_mm changes that",
             )
-        foot = AT_SHOULDER if self.gap >= 1.5 * AT_SHOULDER.rise else IN_CORNER
+        foot, corner = self._undercuts()
         return (
-            Prism(Circle(radius, self.offset), step, 0.0, foot=foot, head=IN_CORNER),
-            Prism(Circle(radius, -self.offset), 0.0, top, top_edge=edge, foot=IN_CORNER, groove=groove),
+            Prism(Circle(radius, self.offset), step, 0.0, foot=foot, head=corner),
+            Prism(Circle(radius, -self.offset), 0.0, top, top_edge=edge, foot=corner, groove=groove),
+        )
+
+    def _undercuts(self) -> tuple[Undercut, Undercut]:
+        """The undercuts at the flange and on both sides of the step between the journals: the largest that leave each
+        disc a seat on at least `SEAT_SHARE` of its thickness. They may lie in the gaps beside the discs."""
+        seat = -math.inf
+        for foot, corner in ((AT_SHOULDER, IN_CORNER), (IN_CORNER, IN_CORNER), (SMALL, SMALL)):
+            at_flange, at_step = max(0.0, foot.length - self.gap), max(0.0, corner.length - self.gap / 2)
+            seat = self.disc_height - at_flange - at_step
+            if seat >= SEAT_SHARE * self.disc_height and self.gap >= 1.5 * foot.rise:
+                return foot, corner
+        raise HdoptError(
+            f"the undercuts of the eccentric hub leave {max(seat, 0.0):.4g} mm of the seat of a disc "
+            f"{self.disc_height:.4g} mm thick, less than half; give a greater wave_generator.width_mm or "
+            "export.disc_gap_mm"
         )
 
     def integral_parts(self) -> tuple[Part, ...]:
         bore = self.shaft_bore(MAJOR, self.room, "disc")
         thickness = self.take("hub_flange_thickness_mm", lambda: max(1.0, round(0.8 * self.width) / 2))
         return self.parts(bore, self._journal(bore) + self.offset + self.wall / 2, thickness)
+
+
+SEAT_SHARE = 0.5
+"""Least share of a disc's thickness that the undercuts leave it to sit on."""
 
 
 def arc_departure(profile: TwoDisk) -> float:

@@ -68,6 +68,9 @@ AT_SHOULDER = Undercut(1.0, 0.1, 0.2)
 IN_CORNER = Undercut(0.6, 0.1, 0.1)
 """Where nothing may stand above the surface: the step between two eccentric journals, or a mate without a chamfer."""
 
+SMALL = Undercut(0.3, 0.05, 0.05)
+"""Where a longer one would leave too little of a short seat."""
+
 
 @dataclass(frozen=True)
 class RingGroove:

@@ -72,6 +72,9 @@ def _opening(part: Part) -> str:
 
 def _of_prism(part: Part, piece: Prism) -> Iterator[Wall]:
     yield Wall(part.name, "its axial width", piece.height, _height_keys(part))
+    if piece.recesses:
+        # One recess that runs into the next is no outline that a solid can be made from.
+        yield Wall(part.name, "what its undercuts leave of a seat", piece.straight, _height_keys(part), 0.0)
     rim = piece.outline.least_radius - max((recess.depth for recess in piece.recesses), default=0.0)
     if piece.inner is not None:
         ring = (piece.outline.box[2] - piece.outline.box[0] - piece.inner.box[2] + piece.inner.box[0]) / 2

@@ -14,14 +14,18 @@ from hdopt.drive.geometry import Structure
 from hdopt.errors import HdoptError
 from hdopt.geometry.areas import strip_of_disc
 from hdopt.geometry.check import _is_valid, volume_of
+from hdopt.geometry.contour import Circle
 from hdopt.geometry.din471 import RINGS, ring_of, smallest_ring
 from hdopt.geometry.din6885 import key_for_bore
 from hdopt.geometry.features import KeywayBore, PlainBore
 from hdopt.geometry.iso286 import deviations
 from hdopt.geometry.job import make_job
 from hdopt.geometry.options import ExportOptions
+from hdopt.geometry.part import Part, Prism
 from hdopt.geometry.slide_features import SlideEdges, Slot, Tongue
-from hdopt.geometry.undercut import AT_SHOULDER, IN_CORNER, RingGroove, Undercut
+from hdopt.geometry.undercut import AT_SHOULDER, IN_CORNER, SMALL, RingGroove, Undercut
+from hdopt.geometry.views import half_behind_minor_axis_zero
+from hdopt.geometry.walls import require_walls
 
 # Bore, least and largest r2 of DIN 6885-1; the greatest r1 of its keys in tables of makers is the next step each.
 R2 = [(7, 0.08, 0.16), (11, 0.08, 0.16), (14, 0.16, 0.25), (30, 0.16, 0.25), (44, 0.25, 0.4), (60, 0.25, 0.4)]
@@ -65,7 +69,7 @@ def test_countersink_that_ends_in_the_corners_is_refused():
         KeywayBore(7.0, key_for_bore(14.0)).area_with_disc(9.4)
 
 
-@pytest.mark.parametrize("undercut", [AT_SHOULDER, IN_CORNER, Undercut(2.5, 0.3, 0.6)])
+@pytest.mark.parametrize("undercut", [AT_SHOULDER, IN_CORNER, SMALL, Undercut(2.5, 0.3, 0.6)])
 def test_volume_of_an_undercut_is_that_of_its_outline(undercut):
     """Pappus' rule over the outline's own points against the closed form, whose only common part is the geometry."""
     arc, flat, slope = undercut.stretches(12.0, 3.0, 1)
@@ -115,6 +119,33 @@ def test_discs_stand_between_flange_and_ring(structure, scale):
     limits = {row.name: row for row in job.dimensions if row.part == "eccentric_hub"}
     assert limits["ring groove, diameter"].upper == 0.0
     assert limits["ring groove, width"].lower == 0.0
+
+
+@pytest.mark.parametrize("scale", [0.17, 0.1958, 0.25, 0.4, 1.0])
+def test_undercuts_of_short_journals_do_not_run_into_each_other(scale):
+    """A 12 mm drive had journals whose two undercuts overlapped: solids that pass Open CASCADE's check, have the volume
+    of the closed form, and are cut by nothing."""
+    job = make_job(scaled(drive("two_disk"), scale), ExportOptions(), "x")
+    _, first, second = job.model.part("eccentric_hub").body
+    gap, thick = 0.2, job.model.part("disc_1").top - job.model.part("disc_1").bottom
+    # The disc sits from the gap at the flange to half a gap before the step.
+    seat = min(-first.head.length, -gap / 2) - max(first.bottom + first.foot.length, first.bottom + gap)
+    assert seat >= 0.5 * thick and first.straight > 0
+    assert second.groove.bottom - max(second.foot.length, gap / 2) >= 0.5 * thick
+    for part, solid in job.made:
+        assert volume_of(half_behind_minor_axis_zero(solid)) == pytest.approx(part.volume / 2, rel=1e-7), part.name
+
+
+def test_discs_too_thin_for_their_undercuts_are_refused():
+    with pytest.raises(HdoptError, match=r"undercuts .* leave 0\.1\d* mm of the seat of a disc 0\.4\d* mm thick"):
+        make_job(scaled(drive("two_disk"), 0.13), ExportOptions(), "x")
+
+
+def test_a_recess_that_runs_into_the_next_is_refused():
+    long = Prism(Circle(10.0), 0.0, 1.5, foot=AT_SHOULDER, head=IN_CORNER)
+    with pytest.raises(HdoptError, match=r"what its undercuts leave of a seat is -0\.1 mm"):
+        require_walls([Part("hub", (0, 0, 0, 1), (long,))], 0.5)
+    require_walls([Part("hub", (0, 0, 0, 1), (replace(long, top=1.7),))], 0.5)
 
 
 def test_journals_without_a_ring_are_said_to_have_none():
