@@ -73,9 +73,10 @@ def structure_costs(result: SearchResult) -> str | None:
     words = f"structures cost, as the study says: {', '.join(said)} of the objective" if said else ""
     if not missing:
         return words
+    loses = "loses" if len(missing) == 1 else "lose"
     ask = (
-        f"what {', '.join(missing)} lose in stiffness and efficiency is your number to give, as no published one was "
-        "found: search.trade.structure_cost_percent, for each the share of the objective that you would give to be "
+        f"what {', '.join(missing)} {loses} in stiffness and efficiency is your number to give, as no published one "
+        "was found: search.trade.structure_cost_percent, for each the share of the objective that you would give to be "
         f"without it, such as {{ {missing[0]} = 2.0 }}"
     )
     return f"{words}; {ask}" if words else ask

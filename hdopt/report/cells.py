@@ -28,6 +28,7 @@ UNITS = {
     "s": "s",
     "k": "K",
     "hz": "Hz",
+    "h": "h",
 }
 """The ending that marks a column's unit -> how the unit is written."""
 
@@ -53,6 +54,30 @@ class Column:
     def long(self) -> bool:
         """Whether it holds sentences, which need some width to be read."""
         return max((len(cell) for cell in self.cells), default=0) > 60
+
+
+NARROW_CHARACTERS = 50
+"""What a screen of 390 px shows of a table's line."""
+LEAST_OF_WORDS, WORDS_WRAP_AT, SENTENCES_WRAP_AT = 9, 12, 40
+"""Characters below which a column of short words, of longer ones, and of sentences is not set narrower."""
+MOST_STACKED = 240
+"""Cells of a table that is still read one under the other; more are rather scrolled through sideways."""
+
+
+def stacks(shown: Sequence[Column]) -> bool:
+    """Whether a table of the columns `shown` is better read on a narrow screen with its cells one under the other."""
+    width = sum(2 + _least_width(column) for column in shown)
+    cells = sum(len(column.cells) for column in shown)
+    return width > NARROW_CHARACTERS and cells <= MOST_STACKED
+
+
+def _least_width(column: Column) -> int:
+    if column.align == "word" and column.short:
+        return max(LEAST_OF_WORDS, *map(len, (column.name, *column.cells)))
+    unbroken = max(len(word) for text in (column.name, column.unit, *column.cells) for word in (text.split() or [""]))
+    if column.align == "number":
+        return unbroken
+    return max(unbroken, SENTENCES_WRAP_AT if column.long else WORDS_WRAP_AT)
 
 
 EACH = "each"

@@ -38,7 +38,7 @@ from hdopt.report import (
     Table,
     Text,
 )
-from hdopt.report.cells import columns, index_has_meaning, minus
+from hdopt.report.cells import columns, index_has_meaning, minus, stacks
 from hdopt.report.numbers import figure_frame
 from hdopt.report.theme import HEIGHT, template
 
@@ -53,6 +53,8 @@ CONTENT_SECURITY_POLICY = (
 
 _KEY = re.compile(r"[a-z0-9][a-z0-9_-]*")
 _REFERENCE = re.compile(r"\[\[([^\[\]]+)\]\]")
+_DIGITS = r"\d[\d.,\u202f]*"
+_NUMBER = re.compile(rf"([-+−±<>≈≤≥]?{_DIGITS}%?(?: to {_DIGITS})?)(?: (.*))?")
 _CODE = re.compile(r"`([^`]+)`")
 
 
@@ -180,6 +182,7 @@ class _Preparation:
         return self._numbered(item) | {
             "kind": "table",
             "columns": shown,
+            "stacks": stacks(shown),
             "rows": rows[:ROWS_SHOWN],
             "rows_left_out": max(0, len(rows) - ROWS_SHOWN),
         }
@@ -263,11 +266,10 @@ def _data_url(content: str | bytes) -> str:
 
 
 def _split_unit(value: str) -> tuple[str, str]:
-    """'1.369 arcmin' as ('1.369', 'arcmin'); what is not one number with a unit stays whole."""
-    number, _, unit = value.partition(" ")
-    if re.fullmatch(r"[-+−±<>≈≤≥]?\d[\d.,\u202f]*%?", number):
-        return minus(number), unit
-    return value, ""
+    """'1.369 arcmin' as ('1.369', 'arcmin'), '0.8 to 1.3 arcmin' as ('0.8 to 1.3', 'arcmin'); what is neither a number
+    nor a range, with a unit or without, stays whole."""
+    found = _NUMBER.fullmatch(value)
+    return (minus(found.group(1)), found.group(2) or "") if found else (value, "")
 
 
 def _full_stop(title: str) -> str:

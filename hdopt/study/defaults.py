@@ -78,6 +78,8 @@ def _values(section: Section, path: tuple[str, ...]) -> Iterator[str]:
         here = (*path, field.alias or name)
         if isinstance(value, Section) and name in section.model_fields_set:
             yield from _values(value, here)
+        elif name == "perturbation" and not getattr(section, "regions", True):
+            continue
         elif name not in section.model_fields_set and name not in OF_NO_WEIGHT and _says_something(value):
             yield f"{'.'.join(here)} = {_shown(value)}"
 

@@ -46,9 +46,10 @@ def _of_drive(verdict: Verdict) -> str:
 
 def _of_best_design(verdict: Verdict) -> str:
     by = f"{abs(verdict.margin):.3g} {verdict.unit}"
-    what = verdict.quantity.partition(", ")[0]
+    what, _, share = verdict.quantity.partition(", ")[0].partition(" of ")
+    whose = f"{share} with the chosen wave generator stay" if share else "The chosen design stays"
     return (
-        f"The chosen wave generator has a {what} of {verdict.value:.4g} {verdict.unit}, {verdict.limit:.4g} "
+        f"{whose} within {verdict.value:.4g} {verdict.unit} {what}, {verdict.limit:.4g} "
         f"{verdict.unit} is allowed: {by} {'to spare' if verdict.met else 'too much'}."
     )
 
@@ -122,9 +123,14 @@ def _of_search(found: Found) -> list[str]:
         return []
     if "stack" in found or "waveform" in found:
         return ["Another wave generator was searched for: [[trade-chosen-combinations]]."]
+    from hdopt.optimize.objectives import QUANTITIES
+
     objective = search["objective"]
     best, before = search["best"]["quantities"][objective], search["baseline"]["quantities"][objective]
-    pair = f"{before:.4g} where the chosen one has {best:.4g}"
-    says = [f"The study's own drive has {pair}: [[trade-chosen-against-baseline]]."]
+    unit = QUANTITIES[objective].unit
+    says = [
+        f"With the study's own wave generator it is {before:.4g} {unit} instead of {best:.4g} {unit}: "
+        "[[trade-chosen-against-baseline]]."
+    ]
     held = [in_sentence(price["title"]) for price in search["active"]]
     return [*says, f"What holds it is {listed(held)}: [[trade-chosen-prices]]."] if held else says

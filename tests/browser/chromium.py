@@ -39,7 +39,7 @@ WIDE = (1280, 900)
 NARROW = (390, 844)
 
 LOOK_JS = Path(__file__).with_name("look.js").read_text(encoding="utf-8")
-"""Defines `look` in a page: figures(), probes(i), label(i), overflow()."""
+"""Defines `look` in a page: figures(), probes(i), label(i), overflow(), sideways()."""
 
 
 class ChromiumError(RuntimeError):
@@ -246,7 +246,8 @@ def check_report(
     """Open `html` at both widths and on paper; the PDF, and screenshots if `pictures`, go to `folder`.
 
     Looked for: messages in the console, requests of any kind, figures without marks, traces without points, figures
-    whose hover shows no label (but `no_hover`, by key), anything wider than the screen, a PDF that is not one.
+    whose hover shows no label (but `no_hover`, by key), anything wider than the screen (on the narrow one also tables
+    of no more than 240 cells), a PDF that is not one.
     """
     folder.mkdir(parents=True, exist_ok=True)
     problems: list[str] = []
@@ -273,7 +274,8 @@ def check_report(
         problems += page.errors + [f"requested {url}" for url in page.requests]
     with browser.open(html, NARROW) as page:
         problems += _figure_problems(page.figures(), "narrow")
-        problems += [f"at {NARROW[0]} px: {overflow}" for overflow in page.evaluate("look.overflow()")]
+        wide = page.evaluate("[...look.overflow(), ...look.sideways()]")
+        problems += [f"at {NARROW[0]} px: {overflow}" for overflow in wide]
         if pictures:
             files.append(page.screenshot(folder / "narrow.png"))
         problems += page.errors + [f"requested {url}" for url in page.requests]

@@ -60,5 +60,11 @@ globalThis.look = (() => {
     return `${name} reaches ${Math.round(node.getBoundingClientRect().right)} px`;
   });
 
-  return { figures, probes, label, overflow };
+  // Tables of a size that is read one cell under the other, but that go on beyond the screen.
+  const sideways = () => [...document.querySelectorAll(".scroll")].filter((box) => {
+    const cells = box.querySelectorAll("tbody > tr > *").length;
+    return cells <= 240 && box.scrollWidth > box.clientWidth + 1;
+  }).map((box) => `${box.parentElement.id} goes on for ${box.scrollWidth - box.clientWidth} px beyond the screen`);
+
+  return { figures, probes, label, overflow, sideways };
 })();

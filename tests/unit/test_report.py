@@ -14,7 +14,7 @@ import pytest
 
 from hdopt.errors import HdoptError
 from hdopt.report import Download, Figure, KeyFigures, Points, Report, Ruling, Section, Table, Text, theme
-from hdopt.report.cells import EACH, columns, heading
+from hdopt.report.cells import EACH, columns, heading, stacks
 from hdopt.report.html import ROWS_SHOWN, render, write_report
 from hdopt.report.numbers import figure_frame
 
@@ -224,3 +224,29 @@ def test_every_palette_colour_stands_out_on_paper():
     assert min(contrast[:4]) > 3
     lightness = [luminance(colour) for _, colour in theme.SEQUENTIAL]
     assert lightness == sorted(lightness, reverse=True)
+
+
+@pytest.mark.parametrize(
+    ("columns_and_rows", "expected"),
+    [
+        (({"profile": "Ellipse", "safety": 1.5}, 3), False),  # fits
+        (({"what": "Axis eccentricity", "value": "0.01", "unit": "mm", "key": "axis_eccentricity_mm"}, 12), True),
+        (({f"angle_{k}_deg": 123.456 for k in range(9)}, 12), True),
+        (({f"angle_{k}_deg": 123.456 for k in range(9)}, 40), False),  # 360 cells: too long to be read downward
+    ],
+)  # fmt: skip
+def test_a_table_too_wide_for_a_narrow_screen_stacks_its_cells(columns_and_rows, expected):
+    row, count = columns_and_rows
+    some = table(pd.DataFrame([row] * count))
+    assert stacks(columns(some.frame)) == expected
+    assert bool(re.search('class="table[^"]* stacks"', render(report_of(some)))) == expected
+
+
+@pytest.mark.parametrize(
+    ("value", "number", "unit"),
+    [("1.369 arcmin", "1.369", "arcmin"), ("0.81 to 1.31 arcmin", "0.81 to 1.31", "arcmin"), ("7", "7", ""),
+     ("two-disk, integral", "two-disk, integral", "")],
+)  # fmt: skip
+def test_a_range_among_the_key_figures_stays_together(value, number, unit):
+    shown = f'{number} <span class="unit">{unit}</span>' if unit else number
+    assert f"<dd>{shown}</dd>" in render(report_of(KeyFigures({"What": value})))

@@ -245,7 +245,9 @@ def test_structures_are_said_in_words_on_the_page_of_a_trade():
     from hdopt.report.sections.search import _in_words
 
     says = _in_words("0.0015 arcmin beside one_way_major, 0.056 arcmin beside integral")
-    assert says == "0.0015 arcmin beside one-way, major axis, 0.056 arcmin beside integral"
+    assert says == "0.0015 arcmin beside one-way on the major axis, 0.056 arcmin beside integral"
+    asked = _in_words("what one_way_minor loses: search.trade.structure_cost_percent, such as { one_way_minor = 2.0 }")
+    assert asked.startswith("what one-way on the minor axis loses: `search.") and "`{ one_way_minor = 2.0 }`" in asked
 
 
 def test_lines_of_designs_are_thinned_evenly_with_both_ends():

@@ -87,7 +87,7 @@ def test_the_page_begins_with_the_verdict_and_ends_with_the_inputs(tmp_path):
     assert load_study(tmp_path / "again.toml").data == study.data
     # what the study file says of its numbers, and what ships says of the others
     assert b"width_mm = 9.0 # by caliper\n" in inside["mine.toml"] and b"# assumed" in inside["mine.toml"]
-    assert "by caliper</td>" in page and "The base case of Table 2." in page
+    assert "by caliper</td>" in page and "The base case of Jia 2021, Table 2." in page
     assert "See [ [mine]]." in page, "a comment is no reference to a figure of the page"
     assert inside["explorer.html"] == (tmp_path / "out" / "explorer.html").read_bytes()
     assert not any(str(tmp_path).encode() in content for content in inside.values())
@@ -235,11 +235,12 @@ def test_a_trade_page_begins_with_a_verdict_too():
     section = section_of_run(of_run(study, {"search": search}), {"search": search})
     ruling, points = section.items
     assert ruling.met and ruling.text == (
-        "The chosen wave generator has a peak-to-peak of 99.73 % of drives of 0.72 arcmin, 1 arcmin is allowed: "
+        "99.73 % of drives with the chosen wave generator stay within 0.72 arcmin peak-to-peak, 1 arcmin is allowed: "
         "0.28 arcmin to spare."
     )
     assert points.sentences == (
-        "The study's own drive has 1.094 where the chosen one has 0.72: [[trade-chosen-against-baseline]].",
+        "With the study's own wave generator it is 1.094 arcmin instead of 0.72 arcmin: "
+        "[[trade-chosen-against-baseline]].",
         "What holds it is mean flank pressure and pressure angle: [[trade-chosen-prices]].",
     )
     other = study.with_({"requirement.yield": 0.99})

@@ -30,6 +30,15 @@ SPREAD = {"tolerances": "Tolerances", "contributors": "Callouts"}
 """Sections with a distribution a key."""
 
 
+ENDS = ("lower", "upper")
+LIMITS = {
+    "min": "at least {}",
+    "max": "at most {}",
+    "min_of_baseline": "at least {} times the baseline's",
+    "max_of_baseline": "at most {} times the baseline's",
+}
+"""Keys of a limit of a search -> how it reads."""
+
 Comments = Mapping[tuple[str, ...], Iterable[str]]
 
 
@@ -78,15 +87,22 @@ def _remarked(frame: pd.DataFrame, remarks: Sequence[str]) -> pd.DataFrame:
 
 
 def _leaves(content: object, path: tuple[str, ...] = ()) -> Any:  # rows of text, a leaf each
-    """Each value of a section in words: its name, itself, its unit, and its key."""
-    if isinstance(content, Mapping):
+    """Each value of a section in words: its name, itself, its unit, and its key; a range or a limit is one row."""
+    if isinstance(content, Mapping) and content and content.keys() <= LIMITS.keys():
+        yield _row(path, "; ".join(LIMITS[key].format(_shown(value)) for key, value in content.items()))
+    elif isinstance(content, Mapping) and content.keys() == set(ENDS):
+        yield _row(path, f"{_shown(content['lower'])} to {_shown(content['upper'])}")
+    elif isinstance(content, Mapping):
         for name, inner in content.items():
             yield from _leaves(inner, (*path, str(name)))
     elif path and content is not None:
-        title, unit = heading(path[-1])
-        inside = [heading(part)[0] for part in path[:-1]]
-        words = _words(": ".join([*inside, title]))
-        yield words, _shown(content), unit, ".".join(path)
+        yield _row(path, _shown(content))
+
+
+def _row(path: tuple[str, ...], value: str) -> tuple[str, str, str, str]:
+    title, unit = heading(path[-1])
+    inside = [heading(part)[0] for part in path[:-1]]
+    return _words(": ".join([*inside, title])), value, unit, ".".join(path)
 
 
 def _words(text: str) -> str:
@@ -102,10 +118,8 @@ def _shown(value: object) -> str:
         return minus(f"{value:.6g}")
     if isinstance(value, list | tuple):
         return ", ".join(_shown(one) for one in value)
-    return str(value).replace("_", " ")
-
-
-ENDS = ("lower", "upper")
+    text = str(value)
+    return heading(text)[0] if "_" in text else text
 
 
 def _spread(name: str, row: Mapping[str, Any]) -> dict[str, str | None]:

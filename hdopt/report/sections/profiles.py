@@ -98,7 +98,8 @@ def _rings(phi: Array, deflection_mm: Curves, change: Curves, radius: float, tim
     reach = max(float(np.abs(values).max()) for values in change.values())
     extent = radius * (1 + EXAGGERATED) * 1.08
     count = len(deflection_mm)
-    made = figure("", "", height=360, showlegend=False, margin={"l": 8, "r": 8, "t": 28, "b": 8})
+    margin = {"l": 8, "r": 8, "t": 28, "b": 8}
+    made = figure("", "", height=360, showlegend=False, margin=margin, meta={"narrow_height": 290})
     circle = np.linspace(0, 2 * np.pi, 181)
     for i, (name, w) in enumerate(deflection_mm.items()):
         tag = str(i + 1) if i else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
@@ -20,7 +21,8 @@ from hdopt.optimize.summary import (
     weighed,
 )
 from hdopt.optimize.views import DesignMap, Rings, TradeViews
-from hdopt.report import Figure, KeyFigures, Section, Table, Text
+from hdopt.report import Figure, Item, KeyFigures, Points, Section, Table, Text
+from hdopt.report.cells import UNITS, significant
 from hdopt.report.sections.design_map import Design, design_map, words_on_limits
 from hdopt.report.sections.design_map import Limit as MapLimit
 from hdopt.report.sections.profiles import profiles_section
@@ -130,33 +132,36 @@ def chosen_section(result: SearchResult, file: str, key: str = "trade-chosen") -
                 "From the multipliers at the optimum: the fall of the objective for one unit more room.",
             ),
             Table(f"{key}-combinations", "Every profile and structure at its own best", _combinations(result)),
-            Text(_not_modelled(result)),
+            *_not_modelled(result),
         ),
         f"{name_of(best)}: {number(after, objective.unit)} instead of {number(before, objective.unit)}. "
         f"Its study file is {file}.",
     )
 
 
-def _not_modelled(result: SearchResult) -> str:
+def _not_modelled(result: SearchResult) -> tuple[Item, ...]:
     """What no formula knows, and how much of it would change the structure that `result` chose."""
-    words = f"Not modelled: {'; '.join(NOT_MODELLED)}. Weigh these beside the table."
-    if share := ring_share(result.baseline):
-        words += f" Of the drive as it is: {share}."
+    words = []
     if gaps := break_evens(result):
         structure = in_sentence(label(result.best.structure))
         more = "a further" if result.setup.trade.structure_costs else "worth"
-        worth = _in_words(", ".join(gaps))
-        words += f" The structure ({structure}) stays the choice until what it costs is {more} {worth}."
+        worth = _in_words("; ".join(gaps))
+        words.append(f"The structure ({structure}) stays the choice until what it costs is {more} {worth}.")
     if costs := structure_costs(result):
-        words += f" {costs[:1].upper()}{costs[1:]}."
-    return words
+        words.append(f"{_in_words(costs[:1].upper() + costs[1:])}.")
+    if share := ring_share(result.baseline):
+        words.append(f"Of the drive as it is: {share}.")
+    unknown = [f"{what[:1].upper()}{what[1:]}." for what in NOT_MODELLED]
+    return Text("Not modelled, and to be weighed beside the tables:"), Points((*unknown, *words))
 
 
 def _in_words(says: str) -> str:
-    """What is said of structures by their keys, in words."""
+    """What is said of structures by their keys, in words; an example of the study file stays as it is written."""
+    prose, brace, example = says.partition("{")
     for structure in DASHES:
-        says = says.replace(f"beside {structure}", f"beside {in_sentence(label(structure))}")
-    return says
+        prose = re.sub(rf"\b{structure}\b", in_sentence(label(structure)).replace(", ", " on the "), prose)
+    prose = prose.replace("search.trade.structure_cost_percent", "`search.trade.structure_cost_percent`")
+    return f"{prose}`{brace}{example}`" if brace else prose
 
 
 def _against_baseline(result: SearchResult) -> pd.DataFrame:
@@ -181,7 +186,8 @@ def _against_baseline(result: SearchResult) -> pd.DataFrame:
         else:
             verdict = "improved" if (share < 0) == quantity.small_is_good else "paid"
         change = "" if verdict == "unchanged" else f"{100 * share:+.1f} %".replace("-", "−")
-        rows.append((quantity.title, number(before, quantity.unit), number(value, quantity.unit), change, verdict))
+        unit = UNITS.get(quantity.unit, quantity.unit)
+        rows.append((quantity.title, number(before, unit), number(value, unit), change, verdict))
     return pd.DataFrame(rows, columns=["what", "baseline", "chosen", "change", "verdict"])
 
 
@@ -323,7 +329,7 @@ def designs_section(result: SearchResult, key: str = "trade-designs") -> Section
         for k in PARALLEL
         if all(k in d.quantities for d in every)
     ]
-    axes = [axis for axis in axes if len({axis[-1](design) for design in every}) > 1]
+    axes = [axis for axis in axes if _varies([axis[-1](design) for design in every])]
     drawn = _thinned(shown, result.objective)
     made = _parallel(axes, drawn, result)
     fewer = (
@@ -348,6 +354,12 @@ def designs_section(result: SearchResult, key: str = "trade-designs") -> Section
     )
 
 
+def _varies(values: Sequence[float | None]) -> bool:
+    """Whether `values` differ by more than their four digits show."""
+    known = [value for value in values if value is not None]
+    return bool(known) and max(known) - min(known) > CHANGED * max(map(abs, known))
+
+
 def _thinned(designs: list[DesignRecord], objective: str) -> list[DesignRecord]:
     """At most `LINES` of the `designs`, evenly over their rank by the `objective`, both ends among them."""
     ranked = sorted(designs, key=lambda design: design.quantities.get(objective, design.quantities[NOMINAL]))
@@ -370,7 +382,7 @@ def _parallel(axes: Sequence[Axis], shown: list[DesignRecord], result: SearchRes
             found.append(-0.08 if value is None else (value - low) / (high - low) if high > low else 0.5)
         return found
 
-    made = figure("", "", height=460, hovermode="closest")
+    made = figure("", "", height=460, hovermode="closest", meta={"narrow_height": 620})
     positions = list(range(len(axes)))
     profiles = list(dict.fromkeys(d.profile for d in shown))
     named: set[str] = set()
@@ -404,7 +416,7 @@ def _parallel(axes: Sequence[Axis], shown: list[DesignRecord], result: SearchRes
     made.update_xaxes(
         tickvals=positions,
         ticktext=[
-            f"{title}<br>{low:.4g}–{high:.4g} {unit}"
+            f"{title}<br>{significant(low)}–{significant(high)} {UNITS.get(unit, unit)}".rstrip()
             for (_, title, unit, _), (low, high) in zip(axes, ranges, strict=True)
         ],
         tickangle=-35,
@@ -439,11 +451,24 @@ def map_section(result: SearchResult, seen: DesignMap, key: str = "trade-map") -
                 f"{seen.title} over pressure angle and width, all else as chosen",
                 made,
                 "The error falls toward the lower left; the lines are where a limit is just kept. The baseline stands "
-                f"at its own pressure angle and width, but the map is of the chosen design. {words_on_limits(limits)}",
+                "at its own pressure angle and width, but the map is of the chosen design. "
+                f"{words_on_limits(limits)}{_off_the_map(result, seen)}",
             ),
         ),
         "Fewer degrees and less width always lower the error; the lines show what stops them.",
     )
+
+
+def _off_the_map(result: SearchResult, seen: DesignMap) -> str:
+    """Which limits that hold the design of a `result` have no line on the map as `seen`: they do not depend on it."""
+    drawn = {limit.quantity for limit, _ in seen.limits}
+    held = {price["title"] for price in result.active if "bound" not in price["kind"]}
+    titles = [find_quantity(limit.quantity).title for limit in result.setup.limits() if limit.quantity not in drawn]
+    names = [in_sentence(title) for title in titles if title in held]
+    if not names:
+        return ""
+    said = listed(names)
+    return f" {said[:1].upper()}{said[1:]} hold{'s' if len(names) == 1 else ''} the design too, everywhere here alike."
 
 
 def rings_section(result: SearchResult, rings: Rings) -> Section:
@@ -476,6 +501,13 @@ NOT_FOLLOWED = (
 )
 
 
+FRESH_DRIVES = (
+    "The search judges every design by the same drives, so that designs compare; fresh drives, which it never saw, say "
+    "how large the quantile is. The interval is that of the fresh ones: the search's own, of fewer drives, may lie "
+    "outside it."
+)
+
+
 def confidence_section(result: SearchResult, checked: Verification, key: str = "trade-confidence") -> Section:
     """The choice of a `result` as `checked` by other means, and the regions of the trade's constants in which it holds,
     or how to ask for them; `key` names the section."""
@@ -486,6 +518,7 @@ def confidence_section(result: SearchResult, checked: Verification, key: str = "
         "How sure the choice is",
         (
             KeyFigures(_checked_figures(checked)),
+            *([Text(FRESH_DRIVES)] if checked.fresh is not None else []),
             *(region_items(result.best, regions, key) if regions else (Text(NOT_FOLLOWED),)),
             Text(
                 f"First-order optimality holds to {result.optimality_residual:.1e} of the objective's slope. "
@@ -507,8 +540,8 @@ def _checked_figures(checked: Verification) -> dict[str, str]:
         return values
     values |= {
         f"{100 * fresh.quantile:g} % quantile, fresh drives": f"{fresh.quantile_arcmin:.4f} arcmin",
-        "its 95 % interval": f"{fresh.low:.4f} to {fresh.high:.4f}",
+        "Its 95 % interval": f"{fresh.low:.4f} to {fresh.high:.4f} arcmin",
     }
     if fresh.searched_arcmin is not None:
-        values["in the search"] = f"{fresh.searched_arcmin:.4f} arcmin"
+        values["The same, drives of the search"] = f"{fresh.searched_arcmin:.4f} arcmin"
     return values

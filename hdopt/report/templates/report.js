@@ -5,6 +5,7 @@
   const PRINT_TYPE = 0.8; // size of a table's type in print against that on the screen, a little above the style's
   const LEGEND_LINE = 17; // px
   const NARROW = 520; // px: below it a figure takes smaller type and leaves dragging to the page
+  const UPRIGHT = 700; // px: below it labels that slant stand upright
   const json = (id) => JSON.parse(document.getElementById(id).textContent);
   const plots = [...document.querySelectorAll(".plot")];
   const template = plots.length ? json("template") : null;
@@ -25,26 +26,31 @@
     // On a narrow screen each entry of the legend takes a line of its own, which the plot is not to pay for.
     const legend = narrow ? LEGEND_LINE * Math.max(0, plot.legendEntries - 2) : 0;
     const size = (own.font && own.font.size) || 13;
+    const height = narrow && own.narrowHeight && !printing ? own.narrowHeight : printing ? printHeight(plot.ownHeight) : plot.ownHeight;
     return {
       width,
-      height: (printing ? printHeight(plot.ownHeight) : plot.ownHeight) + legend,
+      height: height + legend,
       "font.size": narrow ? Math.min(size, 11) : size,
       dragmode: narrow ? false : own.dragmode || "zoom",
-      // Slanted labels of many ticks run into each other where there is little room.
-      ...(own.tickangle ? { "xaxis.tickangle": narrow ? -90 : own.tickangle } : {}),
+      // Slanted labels of many ticks run into each other where there is little room, two lines of one sooner than one.
+      ...(own.tickangle ? { "xaxis.tickangle": width < UPRIGHT ? -90 : own.tickangle } : {}),
+      ...(own.tickangle && own.ticktext ? { "xaxis.ticktext": narrow ? own.ticktext.map((text) => text.replace("<br>", ", ")) : own.ticktext } : {}),
     };
   };
 
   const draw = (plot) => {
     const { data, layout } = json("figure-data-" + plot.dataset.figure);
-    plot.ownLayout = { font: layout.font, dragmode: layout.dragmode, tickangle: (layout.xaxis || {}).tickangle };
+    const { tickangle, ticktext } = layout.xaxis || {};
+    const narrowHeight = (layout.meta || {}).narrow_height;
+    plot.ownLayout = { font: layout.font, dragmode: layout.dragmode, tickangle, ticktext, narrowHeight };
     plot.ownHeight = layout.height || plot.clientHeight;
     plot.legendEntries = data.filter((trace) => trace.showlegend !== false && trace.name && !(trace.type === "heatmap")).length;
     const size = sizes(plot, plot.clientWidth);
     const font = { ...layout.font, size: size["font.size"] };
     const { width, height, dragmode } = size;
     plot.style.height = height + "px";
-    const xaxis = size["xaxis.tickangle"] ? { xaxis: { ...layout.xaxis, tickangle: size["xaxis.tickangle"] } } : {};
+    const upright = { tickangle: size["xaxis.tickangle"], ...(size["xaxis.ticktext"] ? { ticktext: size["xaxis.ticktext"] } : {}) };
+    const xaxis = tickangle ? { xaxis: { ...layout.xaxis, ...upright } } : {};
     return Plotly.newPlot(plot, data, { ...layout, ...xaxis, template, width, height, font, dragmode }, {
       ...config, toImageButtonOptions: { format: "svg", filename: plot.dataset.figure },
     });
