@@ -67,6 +67,19 @@ ANY_NAME = "*"
 
 
 def _paths(model: type[Section], path: Keys, content: Any) -> set[Keys]:
+    """The paths of the keys of `model` at `path`, whose table holds `content`."""
+    if content is None:
+        return {(*path, *tail) for tail in _tails(model)}
+    return _written(model, path, content)
+
+
+@cache
+def _tails(model: type[Section]) -> frozenset[Keys]:
+    """The paths below a `model` of which a study writes nothing: always the same."""
+    return frozenset(_written(model, (), None))
+
+
+def _written(model: type[Section], path: Keys, content: Any) -> set[Keys]:
     found: set[Keys] = set()
     for name, named, held_in in _keys(model):
         here = (*path, name)

@@ -7,6 +7,7 @@ import platform
 import time
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from functools import cache
 from importlib import metadata
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
@@ -36,7 +37,7 @@ def provenance(study: Study | None = None, seed: int | None = None, command: str
     known["inputs"] = {} if work is None else {path.name: digest for path, digest in sorted(work.inputs.items())}
     if seed is not None:
         known["seed"] = seed
-    known["libraries"] = _versions()
+    known["libraries"] = dict(_versions())
     known["machine"] = {
         "python": platform.python_version(),
         "system": f"{platform.system()} {platform.machine()}",
@@ -48,7 +49,9 @@ def provenance(study: Study | None = None, seed: int | None = None, command: str
     return known
 
 
+@cache
 def _versions() -> Mapping[str, str]:
+    """By library; read from its files once a process."""
     found = {}
     for name in LIBRARIES:
         try:
