@@ -9,14 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hdopt.arrays import Array, Index
 
 INPUT_CELLS, OUTPUT_CELLS = 192, 96
 """Grid of a surface: 1.9 deg of the input, 3.75 deg of the output; straight lines in between are off by half a per cent
 of an amplitude of order 4."""
+
+
+Spectrum: TypeAlias = tuple[Index, Index, NDArray[np.complex128]]
+"""Orders k and j, and amplitudes, (m,) each."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +51,11 @@ class Harmonics:
         return np.asarray(value, float)
 
 
+def nothing(back: float = 0.0) -> Harmonics:
+    """No harmonics; `back` is half the return error, arcmin."""
+    return Harmonics(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0), back)
+
+
 @dataclass(frozen=True)
 class Surface:
     """The error on an even grid, `values` (n_input, n_output) arcmin, mean zero; `back` and `crossing_deg` as in
@@ -69,17 +80,21 @@ class Surface:
 
     def harmonics(self, terms: int) -> Harmonics:
         """The `terms` largest harmonics of this surface, by its Fourier transform."""
-        rows, columns = self.values.shape
-        spectrum = np.fft.fft2(self.values) / self.values.size
-        k = np.fft.fftfreq(rows, 1 / rows).astype(np.int64)[:, None] * np.ones(columns, np.int64)
-        j = np.ones((rows, 1), np.int64) * np.fft.fftfreq(columns, 1 / columns).astype(np.int64)
-        upper = ((k > 0) | ((k == 0) & (j > 0))) & (np.abs(k) < rows // 2) & (np.abs(j) < columns // 2)
-        found = spectrum[upper]
+        k, j, found = spectrum_of(self.values)
         keep = np.argsort(-np.abs(found), kind="stable")[:terms]
         chosen = found[keep]
-        return Harmonics(
-            k[upper][keep], j[upper][keep], 2 * chosen.real, -2 * chosen.imag, self.back, self.crossing_deg
-        )
+        return Harmonics(k[keep], j[keep], 2 * chosen.real, -2 * chosen.imag, self.back, self.crossing_deg)
+
+
+def spectrum_of(values: Array) -> Spectrum:
+    """Orders k, j and complex amplitudes (m,) of the harmonics of `values` (n_input, n_output) on the grid, without its
+    mean: c = 2 Re, s = -2 Im of an amplitude are those of `Harmonics`."""
+    rows, columns = values.shape
+    spectrum = np.fft.fft2(values) / values.size
+    k = np.fft.fftfreq(rows, 1 / rows).astype(np.int64)[:, None] * np.ones(columns, np.int64)
+    j = np.ones((rows, 1), np.int64) * np.fft.fftfreq(columns, 1 / columns).astype(np.int64)
+    upper = ((k > 0) | ((k == 0) & (j > 0))) & (np.abs(k) < rows // 2) & (np.abs(j) < columns // 2)
+    return k[upper], j[upper], spectrum[upper]
 
 
 def grid_angles() -> tuple[Array, Array]:

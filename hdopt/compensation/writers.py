@@ -8,43 +8,64 @@ from collections.abc import Mapping, Sequence
 from typing import Any  # Any: values of JSON
 
 from hdopt.compensation.surface import Harmonics, Surface
+from hdopt.compensation.zones import Zones
+
+Found = Harmonics | Zones | Surface
 
 FORMATS = ("csv", "json", "c")
 
 
-def written(found: Harmonics | Surface, form: str, facts: Mapping[str, Any]) -> str:
+def written(found: Found, form: str, facts: Mapping[str, Any]) -> str:
     """The text of `found` in a `form` of `FORMATS`; `facts` (plain values) say what it is and what it needs."""
     return {"csv": _csv, "json": _json, "c": _c}[form](found, facts)
 
 
-def _csv(found: Harmonics | Surface, facts: Mapping[str, Any]) -> str:
+def _csv(found: Found, facts: Mapping[str, Any]) -> str:
     head = [f"# {key}: {str(value).replace(chr(10), ' ')}" for key, value in facts.items()]
     head.append(f"# half_return_arcmin: {found.back!r}")
     head.append(f"# return_crossing_output_deg: {found.crossing_deg!r}")
+    if isinstance(found, Zones):
+        head.append(f"# error_arcmin: sum 0, with the half return, + the {_which(found)} of sums 1 and 2")
+        rows = ["k_input,j_output,cos_arcmin,sin_arcmin,sum"]
+        rows += [f"{k},{j},{c!r},{s!r},{number}" for k, j, c, s, number in _terms(found)]
+        return "\n".join([*head, *rows]) + "\n"
     if isinstance(found, Harmonics):
         rows = ["k_input,j_output,cos_arcmin,sin_arcmin"]
-        rows += [f"{k},{j},{c!r},{s!r}" for k, j, c, s in _terms(found)]
+        rows += [f"{k},{j},{c!r},{s!r}" for k, j, c, s, _ in _terms(found)]
         return "\n".join([*head, *rows]) + "\n"
     inputs, outputs = found.values.shape
     rows = ["input_deg\\output_deg," + ",".join(f"{360 * j / outputs:g}" for j in range(outputs))]
     rows += [
-        f"{360 * i / inputs:g}," + ",".join(f"{value:.6g}" for value in row)
+        f"{360 * i / inputs:g}," + ",".join(f"{value:.8f}" for value in row)
         for i, row in enumerate(found.values.tolist())
     ]
     return "\n".join([*head, *rows]) + "\n"
 
 
-def _terms(found: Harmonics) -> list[tuple[int, int, float, float]]:
-    return list(zip(found.k.tolist(), found.j.tolist(), found.cos.tolist(), found.sin.tolist(), strict=True))
+def _which(found: Zones) -> str:
+    return "larger" if found.sense > 0 else "smaller"
 
 
-def _json(found: Harmonics | Surface, facts: Mapping[str, Any]) -> str:
+def _terms(found: Harmonics | Zones) -> list[tuple[int, int, float, float, int]]:
+    """k, j, cosine, sine of every term, and the sum that it belongs to: 0, or 1 and 2 for the zones."""
+    sums = (found.rest, found.first, found.second) if isinstance(found, Zones) else (found,)
+    return [
+        (*term, number)
+        for number, part in enumerate(sums)
+        for term in zip(part.k.tolist(), part.j.tolist(), part.cos.tolist(), part.sin.tolist(), strict=True)
+    ]
+
+
+def _json(found: Found, facts: Mapping[str, Any]) -> str:
     content: dict[str, Any] = {"schema": 1, **facts, "half_return_arcmin": found.back}
     content["return_crossing_output_deg"] = found.crossing_deg
-    if isinstance(found, Harmonics):
-        content["terms"] = [{"k": k, "j": j, "cos_arcmin": c, "sin_arcmin": s} for k, j, c, s in _terms(found)]
-    else:
+    if isinstance(found, Surface):
         content["table_arcmin"] = found.values.tolist()
+        return json.dumps(content, indent=1, allow_nan=False) + "\n"
+    if isinstance(found, Zones):
+        content["error"] = f"sum 0 + the {_which(found)} of sums 1 and 2"
+    names = ("k", "j", "cos_arcmin", "sin_arcmin", "sum")[: 5 if isinstance(found, Zones) else 4]
+    content["terms"] = [dict(zip(names, term, strict=False)) for term in _terms(found)]
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
@@ -72,15 +93,16 @@ static const int hdopt_k[] = {{{k}}};
 static const int hdopt_j[] = {{{j}}};
 static const double hdopt_cos[] = {{{cos}}};
 static const double hdopt_sin[] = {{{sin}}};
+static const int hdopt_sum[] = {{{sum}}};
 
 double hdopt_error_arcmin(double input_rad, double output_rad, double path)
 {{
-    double error = path * ({back});
+    double error[] = {{path * ({back}), 0, 0}};
     for (int i = 0; i < HDOPT_TERMS; i++) {{
         double phase = hdopt_k[i] * input_rad + hdopt_j[i] * output_rad;
-        error += hdopt_cos[i] * cos(phase) + hdopt_sin[i] * sin(phase);
+        error[hdopt_sum[i]] += hdopt_cos[i] * cos(phase) + hdopt_sin[i] * sin(phase);
     }}
-    return error;
+    return error[0] + {larger}(error[1], error[2]);
 }}
 """
 
@@ -107,15 +129,17 @@ double hdopt_error_arcmin(double input_rad, double output_rad, double path)
 """
 
 
-def _c(found: Harmonics | Surface, facts: Mapping[str, Any]) -> str:
+def _c(found: Found, facts: Mapping[str, Any]) -> str:
     said = "\n".join(f"   {key}: {value}" for key, value in facts.items()).replace("*/", "* /")
     # Crossing at once leaves nothing of the old side, however small the move.
     turn = math.radians(found.crossing_deg)
     remains = f"exp(-fabs(output_moved_rad) / {turn!r})" if turn > 0 else "0"
     head = _HEAD.format(facts=said, crossing=found.crossing_deg, remains=remains)
-    if isinstance(found, Harmonics):
-        numbers = {name: _list(getattr(found, name).tolist()) for name in ("cos", "sin", "k", "j")}
-        return head + _C_TERMS.format(count=len(found), back=repr(found.back), **numbers)
+    if not isinstance(found, Surface):
+        columns = list(zip(*_terms(found), strict=True)) or [()] * 5
+        numbers = {name: _list(column) for name, column in zip(("k", "j", "cos", "sin", "sum"), columns, strict=True)}
+        larger = "fmin" if isinstance(found, Zones) and found.sense < 0 else "fmax"
+        return head + _C_TERMS.format(count=len(found), back=repr(found.back), larger=larger, **numbers)
     rows = ",\n".join("{" + _list(row) + "}" for row in found.values.tolist())
     inputs, outputs = found.values.shape
     return head + _C_TABLE.format(inputs=inputs, outputs=outputs, rows=rows, back=repr(found.back))
@@ -125,7 +149,7 @@ def _list(values: Sequence[float]) -> str:
     return ", ".join(repr(value) for value in values) or "0"
 
 
-def homing_arcmin(found: Harmonics | Surface, ratio: float, off_deg: float = 1.0) -> tuple[float, float]:
+def homing_arcmin(found: Found, ratio: float, off_deg: float = 1.0) -> tuple[float, float]:
     """Rms (arcmin) that `found` adds wrongly where the input's, or the output's, zero is off by `off_deg` of its shaft;
     `ratio` is N."""
     import numpy as np

@@ -13,8 +13,9 @@ import numpy as np
 from hdopt.arrays import Array, Index, Mask
 from hdopt.compensation.path import AT_ONCE, crossing_of, half_return, path_of, paths_of, some_of
 from hdopt.compensation.pursuit import dictionary, independent_share, pursue
-from hdopt.compensation.surface import Harmonics, Surface, grid_angles, surface_of
+from hdopt.compensation.surface import Harmonics, Surface, nothing, surface_of
 from hdopt.compensation.writers import FORMATS, homing_arcmin, written
+from hdopt.compensation.zones import Zones, driving, in_terms, zone_values
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
 from hdopt.figures import drawn
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
     from matplotlib.figure import Figure as MatplotlibFigure
 
-Found = Harmonics | Surface
+Found = Harmonics | Zones | Surface
 
 MOST_TERMS = 64
 FOLDS = 4
@@ -98,7 +99,7 @@ class Compensated(ShownAsTable):
             "file": file,
             "worth": self.worth,
             "method": self.method,
-            "terms": len(self.found) if isinstance(self.found, Harmonics) else self.found.values.size,
+            "terms": self.found.values.size if isinstance(self.found, Surface) else len(self.found),
             "heldout_peak_to_peak_arcmin": {
                 "before": self.before,
                 "after": self.after,
@@ -288,14 +289,14 @@ def _candidates(rows: Rows, fit: WaveformFit | None, terms: int, paths: Mapping[
     made: dict[str, Found] = {"harmonics": alone if terms else surface_of([alone], None, alone.back, crossing)}
     if fit is None:
         return made
-    base = _model_surface(fit)
-    left = rows.error - base.at(*angles)
+    left = rows.error - fit.predict(rows.theta)
     rest = pursue(angles, left, zeros, path, pairs, most // 2)
-    both = surface_of([rest], base.values, rest.back, crossing)
     back = 0.0 if path is None else half_return(left, zeros, path)
-    model = replace(base, back=back, crossing_deg=crossing)
-    made["model"] = model.harmonics(terms) if terms else model
-    made["model and harmonics"] = both.harmonics(terms) if terms else both
+    values = zone_values(fit.model, fit.errors, fit.sign)
+    for name, part in {"model": nothing(back), "model and harmonics": rest}.items():
+        part = replace(part, crossing_deg=crossing)
+        base = driving(values, fit.sign)
+        made[name] = in_terms(values, part, fit.sign, terms) if terms else surface_of([part], base, part.back, crossing)
     return made
 
 
@@ -306,15 +307,6 @@ def _crossing(left: Array, zeros: Array, paths: Mapping[float, Array]) -> float:
     columns = np.column_stack([zeros, paths[AT_ONCE]])
     rest = left - columns @ np.linalg.lstsq(columns, left, rcond=1e-8)[0]
     return crossing_of(left, zeros, paths, independent_share(rest))
-
-
-def _model_surface(fit: WaveformFit) -> Surface:
-    """The fitted model's waveform over input and output angle."""
-    inputs, outputs = grid_angles()
-    a, b = inputs.ravel(), (inputs + outputs).ravel()
-    rotation = np.stack([np.cos(a), np.sin(a), np.cos(b), np.sin(b)])
-    values = fit.sign * fit.model.evaluate_at(rotation, fit.errors)[0].reshape(inputs.shape)
-    return Surface(values - values.mean())
 
 
 def _at(found: Found, rows: Rows) -> Array:
