@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -48,13 +49,13 @@ class _LinearAlgebra:
         self.lock = threading.Lock()
         self.holders = 0
         self.limit: Any = None  # threadpoolctl ships no types
+        self.libraries: Any = None
+        self.modules = 0
 
     def hold(self) -> None:
         with self.lock:
             if not self.holders:
-                from threadpoolctl import threadpool_limits
-
-                self.limit = threadpool_limits(1, user_api="blas")
+                self.limit = self._found().limit(limits=1, user_api="blas")
             self.holders += 1
 
     def let_go(self) -> None:
@@ -63,6 +64,16 @@ class _LinearAlgebra:
             if not self.holders and self.limit is not None:
                 self.limit.restore_original_limits()
                 self.limit = None
+
+    def _found(self) -> Any:  # Any: as above
+        """The libraries of linear algebra, looked for again only where a module was imported since: a look reads the
+        process' whole memory map, milliseconds that a short stack would spend sixteen times."""
+        if self.modules != len(sys.modules):
+            from threadpoolctl import ThreadpoolController
+
+            self.libraries = ThreadpoolController()
+            self.modules = len(sys.modules)
+        return self.libraries
 
 
 _linear_algebra = _LinearAlgebra()

@@ -1,5 +1,7 @@
 """The one executor: order kept, memory bounded, the same bytes on every engine, a cluster's faults told in time."""
 
+import json
+import os
 import socket
 import subprocess
 import sys
@@ -104,6 +106,25 @@ def test_blocks_and_parts_cover_every_row_once(engine, rows):
         in_blocks(rows, 8, fill(0))
         in_parts(rows, fill(1))
     assert (counts == 1).all()
+
+
+LATER = """
+from hdopt.parallel.workers import one_linear_algebra_thread
+with one_linear_algebra_thread():
+    pass
+import sys
+import numpy, scipy.linalg
+from threadpoolctl import threadpool_info
+with one_linear_algebra_thread():
+    print([library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"])
+"""
+
+
+def test_a_library_that_comes_later_has_one_thread_too():
+    """Would catch libraries found once and kept: SciPy brings its own, after the first pool has run."""
+    many = {**os.environ, "OPENBLAS_NUM_THREADS": "2"}
+    done = subprocess.run([sys.executable, "-c", LATER], capture_output=True, text=True, check=True, env=many)
+    assert set(json.loads(done.stdout)) == {1}, done.stdout
 
 
 def test_linear_algebra_has_one_thread_where_pools_run():
