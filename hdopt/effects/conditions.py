@@ -60,7 +60,7 @@ class Conditions:
         """Terms made for these rows at shapes that every search looks at."""
         return {}
 
-    @property
+    @cached_property
     def pieces(self) -> Index:
         """First row of each contiguous piece, and the row after its last, (q, 2)."""
         bounds = np.r_[0, np.flatnonzero(np.diff(self.piece)) + 1, len(self)]
@@ -80,7 +80,7 @@ class Conditions:
             beyond[start:end] = self.theta[start:end] - self.theta[start] - speed[start] * time
         return speed, beyond
 
-    @property
+    @cached_property
     def records(self) -> int:
         """Number of recordings."""
         return int(self.record[-1]) + 1
@@ -105,18 +105,18 @@ class Conditions:
         """The temperature (n,) of conditions that have one. Raises `ValueError` for others."""
         return _known("temperature", self.temperature)
 
-    @property
+    @cached_property
     def reverses(self) -> bool:
         """Whether both directions are there, one row in fifty each at least."""
         forward, backward = (self.direction > 0).mean(), (self.direction < 0).mean()
         return bool(min(forward, backward) > 0.02)
 
-    @property
+    @cached_property
     def span_turns(self) -> float:
         """Input turns between the lowest and the highest angle of any one recording."""
         return max(float(np.ptp(self.theta[self.record == r])) for r in range(self.records)) / TURN
 
-    @property
+    @cached_property
     def rows_per_turn(self) -> float:
         """Usual number of rows in an input turn."""
         step = np.abs(np.diff(self.theta))

@@ -8,7 +8,7 @@ but tooth mesh and encoder interpolation live. Those two are looked for on the r
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any  # Any: indices and masks alike; columns of several kinds
 
 import numpy as np
@@ -53,7 +53,8 @@ class Rows(Conditions):
 
     def rows(self, mask: NDArray[Any]) -> Rows:
         """Only the rows in `mask`."""
-        changes = {name: value[mask] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        arrays = {one.name: getattr(self, one.name) for one in fields(self)}
+        changes = {name: value[mask] for name, value in arrays.items() if isinstance(value, np.ndarray)}
         return replace(self, **changes)
 
 
