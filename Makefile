@@ -15,10 +15,10 @@ test:
 	$(MAKE) $(TEST_VENV)/ready-to-test VENV=$(TEST_VENV)
 	$(TEST_VENV)/bin/ruff check .
 	$(MAKE) types VENV=$(TEST_VENV)
-	$(TEST_VENV)/bin/python -m pytest -n 2 --benchmark-disable $(PYTEST_ARGS)
+	$(TEST_VENV)/bin/python -m pytest -n 2 --dist worksteal -m "not measurement" --benchmark-disable $(PYTEST_ARGS)
 
 check: lint types
-	$(VENV)/bin/python -m pytest -q -m "not slow and not timed and not browser" --benchmark-disable -x -n 2 $(PYTEST_ARGS)
+	$(VENV)/bin/python -m pytest -q -m "not slow and not timed and not browser and not measurement" --benchmark-disable -x -n 2 $(PYTEST_ARGS)
 
 lint: $(VENV)/ready-to-test
 	$(VENV)/bin/ruff check .

@@ -14,6 +14,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from hdopt.parallel.engine import engine_in_force
 from tests.slow import slow_tests  # the path comes first
 
 ALLOWED_SKIPS = ("no recordings", "this machine has OSMesa", "asammdf is an extra of its own")
@@ -23,6 +24,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 """Before numpy is first imported: workers side by side, each with a thread a core for every small product, take a
 hundred times as long.
 """
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # Workers side by side have the cores already: threads in each would only wait for Python's lock (a tenth of a
+    # diagnosis). Tests that are about an engine name it.
+    engine_in_force("process").__enter__()
 
 _skipped: list[tuple[str, str]] = []
 

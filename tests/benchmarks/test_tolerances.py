@@ -27,10 +27,14 @@ def seconds(code: str) -> float:
 
 
 def test_stack_of_a_million_drives_as_a_process():
-    """Within 4 times the import of numpy, scipy.stats and numba. Best of three each: other load only ever adds time."""
+    """Within 4 times the import of numpy, scipy.stats and numba, in one of three pairs: other load only adds time."""
     seconds(STACK)  # compile once, as an installation does
-    stack, yardstick = (min(seconds(code) for _ in range(3)) for code in (STACK, YARDSTICK))
-    assert stack < 4 * yardstick, f"{stack:.2f} s against {yardstick:.2f} s"
+    stack = yardstick = 0.0
+    for _ in range(3):
+        stack, yardstick = seconds(STACK), seconds(YARDSTICK)
+        if stack < 4 * yardstick:
+            return
+    raise AssertionError(f"{stack:.2f} s against {yardstick:.2f} s")
 
 
 def test_sobol_against_salib_with_its_bootstrap():
@@ -52,7 +56,7 @@ def test_sobol_against_salib_with_its_bootstrap():
     salib.analyze({"num_vars": len(names), "names": names, "bounds": [[0, 1]] * len(names)}, y, num_resamples=100)
     theirs = time.perf_counter() - start
     analysis, whole = (
-        min(_seconds_of(lambda r=response: run_sobol(r, space, n=n)) for _ in range(3))
+        min(_seconds_of(lambda r=response: run_sobol(r, space, n=n)) for _ in range(2))
         for response in (ready_made, problem.response)
     )
     assert theirs > 20 * analysis, f"SALib {theirs:.1f} s, hdopt {analysis:.2f} s"

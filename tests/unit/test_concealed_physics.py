@@ -10,10 +10,10 @@ from hdopt.workflow.steps import Context, find_step
 
 @pytest.mark.slow
 def test_small_part_of_the_blind_proof(tmp_path):
-    size = ("concealed.share=0.007", 'concealed.families=["nothing", "single"]', "concealed.seed=2001")
+    size = ("concealed.share=0.003", 'concealed.families=["nothing", "single"]', "concealed.seed=2001")
     study = load_study("concealed-physics", size)
     result = find_step("concealed_physics")(study, Context(tmp_path))
-    assert result.results["cases"] == 3
+    assert result.results["cases"] == 2
     said = "\n".join(result.says)
     assert "schema" not in said and "no answer" not in said
     alarms = next(row for row in result.results["gate"] if row["name"].startswith("false-alarm"))
