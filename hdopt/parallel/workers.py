@@ -49,7 +49,7 @@ class _LinearAlgebra:
         self.lock = threading.Lock()
         self.holders = 0
         self.limit: Any = None  # threadpoolctl ships no types
-        self.libraries: Any = None
+        self.libraries: Any = None  # the same
         self.modules = 0
 
     def hold(self) -> None:
@@ -65,7 +65,7 @@ class _LinearAlgebra:
                 self.limit.restore_original_limits()
                 self.limit = None
 
-    def _found(self) -> Any:  # Any: as above
+    def _found(self) -> Any:  # Any: the same
         """The libraries of linear algebra, looked for again only where a module was imported since: a look reads the
         process' whole memory map, milliseconds that a short stack would spend sixteen times."""
         if self.modules != len(sys.modules):
