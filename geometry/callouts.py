@@ -17,7 +17,8 @@ from hdopt.geometry.features import BoltCircle, DBore, KeywayBore, polar
 from hdopt.geometry.iso286 import deviations
 from hdopt.geometry.model import WaveGeneratorModel
 from hdopt.geometry.part import Part, Prism
-from hdopt.geometry.slide_features import SlideEdges, Tongue
+from hdopt.geometry.slide_features import SlideEdges
+from hdopt.geometry.slides import Slide, slides_of
 from hdopt.geometry.threads import THREADS
 from hdopt.geometry.undercut import AT_SHOULDER, Undercut
 
@@ -99,7 +100,7 @@ def callouts_of(part: Part, model: WaveGeneratorModel) -> tuple[Callout, ...]:
         _bore(part, model),
         _keyway(part),
         _bolts(part, model),
-        _slot(part),
+        _slot(part, model),
         _block(part, model),
     ]
     found += [_seat(part, model), _face(part, model), _edges(part)]
@@ -223,6 +224,8 @@ def _countersunk(part: Part) -> tuple[str, ...]:
 
 def _limits(limits: tuple[float, float]) -> str:
     low, high = limits
+    if not high:
+        return f"0/{low:.4g}"
     return f"{high:+.4g}/{low:+.4g}" if low else f"+{high:.4g}/0"
 
 
@@ -279,36 +282,56 @@ def hole_note(part: Part, model: WaveGeneratorModel) -> str:
     return f"{bolts.count} × Ø{bolts.hole:g} H13 through"
 
 
-def _slot(part: Part) -> Callout | None:
+def _slot(part: Part, model: WaveGeneratorModel) -> Callout | None:
     slot = part.slot
-    if slot is None:
+    slide = next((slide for slide in slides_of(model.parts) if slide.above is part), None)
+    if slot is None or slide is None:
         return None
     ends = f"ends R{slot.width / 2:g}, {2 * slot.reach:.4g} long" if slot.closed else "open at both ends"
     lines = (
-        f"slot {slot.width:g}, {slot.depth:g} deep, from the back",
-        f"{ends}; Ra 0.8",
+        f"slot {slot.width:g} {_limits((0.0, slide.zone))}, {slot.depth:g} {_limits(slide.depth_limits)} deep",
+        f"from the back, {ends}; Ra 0.8",
         f"bottom corners {_cornered(slot.edges)}",
         f"mouth {slot.edges.chamfer:g} × 45°",
     )
     sides = (Flank(slot.width / 2, slot.direction + math.pi / 2),)
     letter = "B" if secondary(part) == "slot" else ""
-    return Callout(polar(0.8 * slot.half_length, slot.direction), lines, datum=letter, faces=sides)
+    frames = (Frame("perpendicularity", slide.zone, False, "A"),)
+    at, size = polar(0.93 * slot.half_length, slot.direction), (slot.width, 0.0, slide.zone)
+    return Callout(at, lines, frames, datum=letter, faces=sides, size=size)
 
 
 def _cornered(edges: SlideEdges) -> str:
-    return f"R or × 45° up to {edges.corner:g}"
+    return f"R{edges.corner:g} max or {edges.corner:g} × 45° max"
 
 
 def _block(part: Part, model: WaveGeneratorModel) -> Callout | None:
-    block = part.body[-1]
-    if not isinstance(block, Tongue):
+    slide = next((slide for slide in slides_of(model.parts) if slide.below is part), None)
+    if slide is None:
         return None
-    zone = model.plan.zone(part.name, "wg_eccentricity")
-    frames = (Frame("symmetry", zone, False, "A"),) if zone else ()
-    edges = f"foot {_cornered(block.edges)}; upper edges {block.edges.chamfer:g} × 45°"
-    lines = (f"block {block.width:g}, {block.height:g} high; Ra 0.8", edges)
+    block = slide.block
+    lines = (
+        f"block {block.width:g} {_limits((-slide.zone, 0.0))}, {block.height:g} {_limits(slide.height_limits)} high; "
+        "Ra 0.8",
+        f"foot {_cornered(block.edges)}; upper edges {block.edges.chamfer:g} × 45°",
+    )
     sides = (Flank(block.width / 2, block.direction + math.pi / 2),)
-    return Callout(polar(0.8 * block.radius, block.direction), lines, frames, faces=sides)
+    frames, size = _upright(part, model, slide), (block.width, -slide.zone, 0.0)
+    return Callout(polar(0.8 * block.radius, block.direction), lines, frames, faces=sides, size=size)
+
+
+def _upright(part: Part, model: WaveGeneratorModel, slide: Slide) -> tuple[Frame, ...]:
+    """What keeps the block of a `slide` on its `part` upright and square: to the slot in the same part, or, without
+    one, to what the shaft holds."""
+    if part.slot is not None:
+        return Frame("perpendicularity", slide.zone, False, "A"), Frame(
+            "perpendicularity", slide.squareness, False, "B"
+        )
+    centred = model.plan.zone(part.name, "wg_eccentricity")
+    first = Frame("symmetry", centred, False, "A") if centred else Frame("parallelism", slide.zone, False, "A")
+    # A keyway lies across the block, and so its flat along it. They only say how the block stands on the shaft.
+    turned = {"keyway": "perpendicularity", "flat": "parallelism"}.get(secondary(part) or "")
+    return (first, Frame(turned, GENERAL_POSITION, False, "B")) if turned else (first,)
 
 
 def _seat(part: Part, model: WaveGeneratorModel) -> Callout | None:
@@ -323,8 +346,7 @@ def _seat(part: Part, model: WaveGeneratorModel) -> Callout | None:
     at = polar(circle.radius, math.radians(60))
     limits = (2 * circle.radius, *fit.shaft_limits)
     if circle.offset:
-        # Without a bound of the eccentricity, the journals share the discs' zone, as their offset's limits do.
-        frames: tuple[Frame, ...] = (Frame("position", zone or model.profile_zone / 2, True, _datums(part)),)
+        frames: tuple[Frame, ...] = (Frame("position", model.journal_zone, True, _datums(part)),)
         boxed = (f"±{circle.offset:.4f} off the axis",)
         faces = tuple(Cylinder(circle.radius, (0.0, sign * circle.offset)) for sign in (1, -1))
         tip = (at[0], at[1] + circle.offset)

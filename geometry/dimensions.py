@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -11,14 +10,14 @@ from typing import Any  # Any: the tables of a study file
 from hdopt.drive.errors import AMPLITUDE_NAMES, STUDY_KEYS
 from hdopt.drive.geometry import Structure
 from hdopt.files import JsonReady
-from hdopt.geometry.budget import CalloutTables, Plan
+from hdopt.geometry.budget import CalloutTables
 from hdopt.geometry.contour import Circle
 from hdopt.geometry.din471 import ring_of
 from hdopt.geometry.features import DBore, KeywayBore
 from hdopt.geometry.iso286 import deviations
 from hdopt.geometry.model import WaveGeneratorModel
 from hdopt.geometry.part import Part, Prism
-from hdopt.geometry.slide_features import Tongue
+from hdopt.geometry.slides import slides_of
 
 ECCENTRICITY, TILTS = "wg_eccentricity_mm", ("wg_tilt_major_deg", "wg_tilt_minor_deg")
 """The errors that a wave generator's own parts make; all others come from housing, shaft and splines."""
@@ -103,9 +102,6 @@ def _sizes(part: Part, model: WaveGeneratorModel) -> list[Dimension]:
     if isinstance(part.contour, Circle):
         # Radius and offset share the zone: each may use half of it to either side.
         rows.limits("disc diameter", 2 * part.contour.radius, (-zone / 2, zone / 2), "", "profile tolerance")
-        rows.limits(
-            "offset of the disc's axis", abs(part.contour.offset), (-zone / 4, zone / 4), "", "profile tolerance"
-        )
     elif part.contour is not None:
         box = part.contour.box
         rows.add("major axis", box[3] - box[1], f"profile {zone:g}", "export")
@@ -114,8 +110,11 @@ def _sizes(part: Part, model: WaveGeneratorModel) -> list[Dimension]:
         rows.limits("perimeter", part.contour.perimeter, (-math.pi * zone, math.pi * zone), "", "profile tolerance")
     if isinstance(first, Prism):
         heights = sum(piece.height for piece in part.body if isinstance(piece, Prism))
-        rows.limits("width", heights, general_limits(heights), "", "ISO 2768-m")
-    _fitted(rows, part, model.plan)
+        if isinstance(part.contour, Circle):
+            rows.limits("width", heights, (-_thinner(heights), 0.0), "", "held by the ring")
+        else:
+            rows.limits("width", heights, general_limits(heights), "", "ISO 2768-m")
+    _fitted(rows, part, model)
     key = part.bore.key if isinstance(part.bore, KeywayBore) else None
     if key is not None and part.bore is not None:
         rows.limits("keyway, width", key.width, deviations("JS9", key.width), "JS9", "DIN 6885-1")
@@ -129,8 +128,15 @@ def _sizes(part: Part, model: WaveGeneratorModel) -> list[Dimension]:
     return rows.rows
 
 
-def _fitted(rows: _Rows, part: Part, plan: Plan) -> None:
+def _thinner(thickness: float) -> float:
+    """Tolerance, mm, of a disc's `thickness` (mm) and of the length that holds the discs: into the material, so that
+    the ring goes into its groove."""
+    return round(min(0.1, 0.05 * thickness), 2)
+
+
+def _fitted(rows: _Rows, part: Part, model: WaveGeneratorModel) -> None:
     """Bores, seats and journals with the limits of their fits."""
+    plan = model.plan
     hole, shaft = plan.hole_of(part.name), plan.shaft_of(part.name)
     first = part.body[0]
     if isinstance(first, Prism) and isinstance(first.inner, Circle) and hole is not None:
@@ -139,8 +145,13 @@ def _fitted(rows: _Rows, part: Part, plan: Plan) -> None:
         if isinstance(piece, Prism) and isinstance(piece.outline, Circle) and shaft is not None:
             name = "seat" if not piece.outline.offset else "journals"
             rows.limits(name, 2 * piece.outline.radius, shaft.shaft_limits, shaft.shaft, "budget")
+            if offset := abs(piece.outline.offset):
+                rows.add("offset of the journals' axes", offset, f"position Ø{model.journal_zone:g}", "budget")
             if piece.groove is not None and (ring := ring_of(2 * piece.outline.radius)) is not None:
                 cut, wide = ring.groove_class, ring.groove_width
+                held = piece.groove.bottom - first.top
+                longer = _thinner(model.profiled[0].size[2])
+                rows.limits("flange to ring groove", held, (0.0, longer), "", "held by the ring")
                 rows.limits("ring groove, diameter", ring.groove, deviations(cut, ring.groove), cut, "DIN 471")
                 rows.limits("ring groove, width", wide, deviations("H13", wide), "H13", "DIN 471")
     if part.bore is None:
@@ -165,22 +176,16 @@ def general_limits(nominal: float) -> tuple[float, float]:
 
 def _slides(parts: tuple[Part, ...]) -> list[Dimension]:
     """Each slot with the block that runs in it; their difference is the cross-slide's clearance."""
-    rows = []
-    for below, above in itertools.pairwise(parts):
-        block = below.body[-1]
-        if isinstance(block, Tongue) and above.slot:
-            clearance = above.slot.width - block.width
-            # The study's clearance is the middle one: slot and block share a quarter of it as their tolerance.
-            part_of = math.floor(clearance / 4 / 1e-4) * 1e-4
-            share = f"{{}}, clearance {clearance:g} with its mate"
-            slot, tongue = above.slot.width, block.width
-            rows.append(
-                Dimension(above.name, "slot", slot, share.format(f"+{part_of:.4g}/0"), "clearances", 0.0, part_of)
-            )
-            rows.append(
-                Dimension(below.name, "block", tongue, share.format(f"0/-{part_of:.4g}"), "clearances", -part_of, 0.0)
-            )
-    return rows
+    found = []
+    for slide in slides_of(parts):
+        slot, block = _Rows(slide.above.name), _Rows(slide.below.name)
+        source = f"clearance {slide.clearance:g} with its mate"
+        slot.limits("slot", slide.slot.width, (0.0, slide.zone), "", source)
+        slot.limits("slot, depth", slide.slot.depth, slide.depth_limits, "", "clear of the block")
+        block.limits("block", slide.block.width, (-slide.zone, 0.0), "", source)
+        block.limits("block, height", slide.block.height, slide.height_limits, "", "clear of the slot")
+        found += slot.rows + block.rows
+    return found
 
 
 def _location(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from hdopt.files import JsonReady
 from hdopt.geometry.check import CheckFailed
+from hdopt.geometry.slides import slides_of
 
 if TYPE_CHECKING:
     from hdopt.geometry.job import Job
@@ -87,6 +88,11 @@ def inspection_plan(job: Job) -> tuple[Check, ...]:
         for share in budget.shares:
             if share.zone is not None:
                 add(share.part, share.feature, None, share.zone, budget.of)
+    for slide in slides_of(job.model.parts):
+        add(slide.above.name, "slot square to the back", None, slide.zone, "clearances")
+        add(slide.below.name, "block upright", None, slide.zone, "clearances")
+        if slide.below.slot is not None:
+            add(slide.below.name, "block square to the slot", None, slide.squareness, "clearances")
     return tuple(found)
 
 

@@ -17,6 +17,7 @@ from hdopt.geometry.budget import CalloutTables
 from hdopt.geometry.features import KeywayBore
 from hdopt.geometry.iso286 import deviations
 from hdopt.geometry.model import WaveGeneratorModel
+from hdopt.geometry.slides import slides_of
 from hdopt.tolerance.contributors import CALLOUTS
 
 RIM_FACTOR = 1.15
@@ -53,6 +54,7 @@ def mating_rows(
     """
     return (
         *_shaft(model),
+        *_slides(model),
         *_eccentricity(bounds, contributors),
         *_tilt(drive, bounds, contributors),
     )
@@ -72,6 +74,18 @@ def _shaft(model: WaveGeneratorModel) -> list[MatingRow]:
         width = deviations("h9", key.width)
         text = f"key {key.name}, groove {key.width:g} N9, t1 = {key.shaft_depth:g}; key {width[0] * 1e3:.3g} um to 0"
         rows.append(MatingRow("shaft", "key", text, key.width, None, "", None, ""))
+    return rows
+
+
+def _slides(model: WaveGeneratorModel) -> list[MatingRow]:
+    """The axial play of each slide, which no part has of its own: whoever mounts the wave generator sets it."""
+    rows = []
+    for slide in slides_of(model.parts):
+        names = f"{slide.below.name} and {slide.above.name}".replace("_", " ")
+        wide = 2 * slide.block.radius
+        takes = math.degrees(math.atan(slide.play / wide))
+        text = "largest axial play, set with shims"
+        rows.append(MatingRow("assembly", f"slide between {names}", text, slide.play, wide, "wg_tilt", takes, "deg"))
     return rows
 
 

@@ -18,6 +18,7 @@ ERRORS = {
     "axis_eccentricity": "e1, eccentricity of the input axis",
     "axis_tilt": "β2, β3, tilt of the input axis",
     "wg_eccentricity": "e2, eccentricity of the wave generator",
+    "wg_tilt": "α2, α3, tilt of the wave generator",
 }
 """Error of the model -> how the theory writes it."""
 

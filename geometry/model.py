@@ -53,6 +53,12 @@ class WaveGeneratorModel:
         return next(part for part in self.parts if part.name == name)
 
     @property
+    def journal_zone(self) -> float:
+        """Diameter of the position zone of eccentric journals, mm: without a bound of the eccentricity, they share the
+        discs' zone."""
+        return self.plan.zone("eccentric_hub", "wg_eccentricity") or self.profile_zone / 2
+
+    @property
     def profiled(self) -> tuple[ProfiledPart, ...]:
         """The parts that carry the flexible bearing: the cam, or the two discs."""
         return tuple(part for part in self.parts if isinstance(part, ProfiledPart))

@@ -19,8 +19,8 @@ def axial_spans(part: Part) -> list[Span]:
     spans = [(piece.bottom, piece.top) for piece in part.body] if len(part.body) > 1 else []
     for piece in part.body:
         if isinstance(piece, Prism) and piece.groove is not None:
-            # Where the ring stands, from the step below it.
-            spans.append((piece.bottom, piece.groove.bottom))
+            # Where the ring stands, from the flange: what it holds stands between them.
+            spans.append((part.body[0].top, piece.groove.bottom))
     if part.slot:
         spans.append((part.bottom, part.bottom + part.slot.depth))
     spans.append((part.bottom, part.top))

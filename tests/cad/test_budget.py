@@ -90,9 +90,11 @@ def test_drawing_gives_the_limits_of_the_fits():
 
 def test_disc_and_its_offset_share_the_profile_zone():
     job = make_job(drive("two_disk"), ExportOptions(profile_tolerance_mm=0.01), "x")
-    rows = {row.name: row for row in job.dimensions if row.part == "disc_1"}
-    radius, offset = rows["disc diameter"].upper / 2, rows["offset of the disc's axis"].upper
-    assert radius + offset == pytest.approx(0.01 / 2)
+    rows = {row.name: row for row in job.dimensions}
+    radius, offset = rows["disc diameter"].upper / 2, rows["offset of the journals' axes"].tolerance
+    assert offset.startswith("position Ø") and radius + float(offset[10:]) / 2 == pytest.approx(0.01 / 2)
+    # A disc of its own is round: the offset is the hub's.
+    assert rows["offset of the journals' axes"].part == "eccentric_hub"
 
 
 @given(
