@@ -153,7 +153,8 @@ def motion_at(motion: RigidMotion[V], cos: V, sin: V) -> tuple[V, V, V, V]:
 
     Two tilts after each other turn the wave generator a little about its axis, by half the area that they span. An
     eccentricity along the ground's major axis then has a part across the turned one. It is of third order, but where
-    the structure removes E_l it is all that tells at which angle each zone's deepest rim changes.
+    automatic alignment removes E_l and T_l it is all that tells at which angle each zone's deepest rim changes. Under
+    one-way minor alignment other parts of third order, which the closed form leaves out, are some 60 times as large.
     """
     e_a = motion.ea_cos * cos + motion.ea_sin * sin + motion.ea_0
     twist = motion.twist_cos * cos + motion.twist_sin * sin + motion.twist_0
