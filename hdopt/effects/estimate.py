@@ -25,6 +25,12 @@ class Parameter:
     high: float
     unit: str
 
+    @property
+    def undefined(self) -> bool:
+        """Whether it is an angle of which nothing is known, as the direction of an error that is nil: its interval
+        takes in the whole turn."""
+        return self.unit == "deg" and self.high - self.low >= 360
+
     def to_dict(self) -> dict[str, object]:
         """As JSON: value, low, high, unit."""
         return {"value": self.value, "low": self.low, "high": self.high, "unit": self.unit}

@@ -9,7 +9,14 @@ from hdopt.diagnosis.checks.confounding import Confounding
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.effects.estimate import FitEstimate, Parameter
 from hdopt.report.sections.diagnosis import LISTED_WAVES, confounded_items, parameter_row, waves_figure, waves_of
-from hdopt.report.sections.diagnosis_residual import FEWEST, POINTS, continued, means_along
+from hdopt.report.sections.diagnosis_residual import (
+    FEWEST,
+    POINTS,
+    continued,
+    means_along,
+    output_turn_figure,
+    turn_figure,
+)
 
 
 def test_recordings_follow_one_another_in_time():
@@ -77,3 +84,24 @@ def test_intervals_end_where_amplitudes_and_phases_do():
     open_ = FitEstimate(np.array([0.3, 0.4]), np.diag([100.0, 100.0]))
     assert open_.amplitude(0, 1).low == 0.0
     assert open_.phase_deg(0, 1).high - open_.phase_deg(0, 1).low == 360.0
+
+
+def test_the_direction_of_a_nil_error_has_no_numbers():
+    """Would catch a direction said with an interval of thousands of turns."""
+    known, nil = Parameter(20.0, -100.0, 140.0, "deg"), Parameter(0.0, -1.1e7, 1.1e7, "deg")
+    assert parameter_row("error", "x", known)["low"] == -100.0
+    assert [parameter_row("error", "x", nil)[key] for key in ("value", "low", "high")] == [None] * 3
+    assert not Parameter(9e3, -1e7, 1e7, "mm").undefined
+
+
+@pytest.mark.parametrize("per_turn", [40, 90, 91, 180, 720])
+def test_means_over_a_turn_have_no_gaps(per_turn):
+    """Would catch 90 means of 90 rows a turn, of which those beside a row's place are empty."""
+    theta = np.arange(0.3, 20 * per_turn) * 2 * np.pi / per_turn
+    rows = SimpleNamespace(theta=theta, rows_per_turn=float(per_turn), ratio=80.0)
+    fit = SimpleNamespace(problem=SimpleNamespace(rows=rows), residual=np.cos(theta))
+    for made in (turn_figure([("before", fit, "red")]), output_turn_figure([("before", fit, "red")])):
+        values = np.asarray(made.figure.data[0].y, float)
+        assert len(values) >= 12
+        if made.key == "diagnosis-turn":
+            assert np.all(np.isfinite(values))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypedDict
@@ -111,15 +112,16 @@ class Diagnosis(ShownAsTable):
         return drawn(go.Figure(bars, layout).add_hline(**floor), backend)
 
     def to_frame(self) -> pd.DataFrame:
-        """One row a parameter, of the effects that were named and of the base model, with its interval."""
+        """One row a parameter, of the effects that were named and of the base model, with its interval; an angle that
+        is undefined, as the direction of an error that is nil, has no numbers."""
         import pandas as pd
 
-        rows: list[tuple[str, float | None, str, float, float, float, str]] = [
-            (effect.id, effect.confidence, name, p.value, p.low, p.high, p.unit)
-            for effect in self.effects
-            for name, p in effect.parameters.items()
+        found = [(effect.id, effect.confidence, effect.parameters) for effect in self.effects]
+        rows = [
+            (of, sure, name, *((math.nan,) * 3 if p.undefined else (p.value, p.low, p.high)), p.unit)
+            for of, sure, parameters in [*found, ("base model", None, self.base.parameters)]
+            for name, p in parameters.items()
         ]
-        rows += [("base model", None, name, p.value, p.low, p.high, p.unit) for name, p in self.base.parameters.items()]
         return pd.DataFrame(rows, columns=["of", "confidence", "parameter", "value", "low", "high", "unit"])
 
     def tables(self) -> dict[str, pd.DataFrame]:

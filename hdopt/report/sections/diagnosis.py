@@ -107,9 +107,11 @@ def waves_figure(effect: str, waves: Mapping[int, Parameter]) -> Figure:
 
 def parameter_row(heading: str, name: str, parameter: Parameter) -> dict[str, object]:
     """One row of a table of parameters: `name` in the column `heading`, then value, interval and unit of the
-    `parameter`; a pure number has no unit to show."""
+    `parameter`; a pure number has no unit to show, an angle of which nothing is known no numbers."""
     unit = "" if parameter.unit == "1" else parameter.unit
-    return {heading: name, "value": parameter.value, "low": parameter.low, "high": parameter.high, "unit": unit}
+    p = parameter
+    value, low, high = (None, None, None) if p.undefined else (p.value, p.low, p.high)
+    return {heading: name, "value": value, "low": low, "high": high, "unit": unit}
 
 
 def confounded_items(diagnosis: Diagnosis) -> list[Table | Text]:
@@ -220,6 +222,8 @@ def limits_section(diagnosis: Diagnosis) -> Section:
     base = [parameter_row("error", name, parameter) for name, parameter in diagnosis.base.parameters.items()]
     if base:
         caption = "With 95 % intervals."
+        if any(parameter.undefined for parameter in diagnosis.base.parameters.values()):
+            caption += " A direction without a number is undefined: its error is nil, or as good as nil."
         if diagnosis.base.open_combinations:
             caption += f" The recording leaves open: {'; '.join(diagnosis.base.open_combinations)}."
         items.append(Table("diagnosis-base", "The drive's errors as fitted", pd.DataFrame(base), caption, NUMBERS))

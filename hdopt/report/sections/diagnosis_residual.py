@@ -32,6 +32,8 @@ SIGNIFICANT = 0.01
 """A domain is shown where noise alone would look like it less often than this."""
 POINTS = 60
 """Means along an axis."""
+MEANS_PER_TURN = 90
+"""Means over a turn, where it has the rows for them."""
 FEWEST = 5
 """Rows that a mean is made of at least."""
 LINES = 400
@@ -177,8 +179,10 @@ def _synchronous_figure(key: str, title: str, axis: str, period: float, scale: f
     import plotly.graph_objects as go
 
     chart = figure(axis, "mean residual [arcmin]")
+    rows_per_period = fits[0][1].problem.rows.rows_per_turn * period / TURN
+    bins = int(np.clip(rows_per_period / 2, 12, MEANS_PER_TURN))  # two rows of a turn in each, so that none is empty
     for name, fit, colour in fits:
-        angle, mean, error = synchronous_average(fit.problem.rows.theta, fit.residual, period, bins=90)
+        angle, mean, error = synchronous_average(fit.problem.rows.theta, fit.residual, period, bins)
         chart.add_trace(go.Scatter(x=angle * scale, y=mean, name=name, line={"color": colour}))
     noise = float(np.nanmedian(error))
     caption = f"Means over all turns; noise alone moves a point of the last curve by about {noise:.2g} arcmin."
