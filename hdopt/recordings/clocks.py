@@ -45,11 +45,11 @@ def _text_seconds(text: Any, name: str) -> tuple[Array, str]:
 
     iso = pd.to_datetime(text, format="ISO8601", utc=True, errors="coerce")
     if iso.notna().mean() > 0.5:
-        return _from_first(iso), f"the {name}'s times are read as ISO 8601, in seconds from the first"
+        return _from_first(iso), f"the {name} is read as ISO 8601, in seconds from the first"
     for form in ("%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S"):
         german = pd.to_datetime(text, format=form, utc=True, errors="coerce")
         if german.notna().mean() > 0.5:
-            return _from_first(german), f"the {name}'s times are read as day.month.year, in seconds from the first"
+            return _from_first(german), f"the {name} is read as day.month.year, in seconds from the first"
     day = pd.to_timedelta(text, errors="coerce")
     if day.notna().mean() > 0.5:
         seconds = np.asarray(day.dt.total_seconds(), float)

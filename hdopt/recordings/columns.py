@@ -7,7 +7,7 @@ message with the option to give.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from hdopt.errors import HdoptError, unknown_name
@@ -223,7 +223,7 @@ def with_units(
     if open_units:
         given = ",".join(open_units)
         given = given if re.fullmatch(r"[\w.,:=/-]+", given) else f'"{given}"'  # a shell would cut it at a blank
-        choices = "deg, rad, arcmin, arcsec, turn, counts/COUNTS_PER_TURN" if _asks_angle(open_units) else "s, ms, us"
+        choices = "; ".join(_choices(open_units))
         raise HdoptError(
             f"{name}: no unit is stated for {', '.join(entry.split('=')[0] for entry in open_units)}; give it with "
             f"--columns {given} ({choices})"
@@ -231,5 +231,11 @@ def with_units(
     return complete, said, doubts
 
 
-def _asks_angle(entries: list[str]) -> bool:
-    return any(CHANNEL_UNITS[entry.split("=")[0]] is ANGLE_UNITS for entry in entries)
+def _choices(entries: list[str]) -> Iterator[str]:
+    """The units that may be given for each kind of channel of `entries`, CHANNEL=NAME:UNIT."""
+    channels = [entry.split("=")[0] for entry in entries]
+    if any(CHANNEL_UNITS[channel] is ANGLE_UNITS for channel in channels):
+        yield "angles: deg, rad, arcmin, arcsec, turn, counts/COUNTS_PER_TURN"
+    for channel in ("time", "torque", "temperature"):
+        if channel in channels:
+            yield f"{channel}: {', '.join(CHANNEL_UNITS[channel])}"

@@ -6,12 +6,14 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from hdopt.errors import HdoptError, unknown_name
+from hdopt.errors import HdoptError, shown, unknown_name
 
 GUARD = 1.645
 """Guard band in standard uncertainties: conformity with a probability of 95 %, the default of ISO 14253-1, 5.3."""
 
-LIMIT_UNITS = {"arcmin": 1.0, "arcsec": 1 / 60, "deg": 60.0, "": 1.0, "arcmin/deg": 1.0}
+LIMIT_UNITS = {"arcmin": 1.0, "arcsec": 1 / 60, "deg": 60.0, "": 1.0}
+SLOPE_UNITS = {"arcmin/deg": 1.0, "arcsec/deg": 1 / 60, "": 1.0}
+"""Of the slope, which is an error per degree of input."""
 LIMIT_NAMES = (
     "peak_to_peak",
     "one_turn",
@@ -56,8 +58,13 @@ def decide(name: str, value: float | None, uncertainty: float, limit: float, not
     return Decision(name, value, uncertainty, limit, verdict, note)
 
 
+def unit_of(name: str) -> str:
+    """The unit of the figure `name` of `LIMIT_NAMES`, as a limit is kept."""
+    return "arcmin/deg" if name == "slope" else "arcmin"
+
+
 def parse_limits(text: str | None) -> dict[str, float]:
-    """`peak_to_peak=1.0arcmin,return_error=30arcsec` as name -> arcmin; `text` None gives none."""
+    """`peak_to_peak=1.0arcmin,return_error=30arcsec` by name, in `unit_of` each; `text` None gives none."""
     found: dict[str, float] = {}
     for item in (text or "").split(","):
         if not item.strip():
@@ -70,14 +77,16 @@ def parse_limits(text: str | None) -> dict[str, float]:
             raise HdoptError(f"--limit holds {item.strip()!r}; write NAME=NUMBERarcmin, such as peak_to_peak=1.0arcmin")
         if name not in LIMIT_NAMES:
             raise HdoptError(unknown_name("figure in --limit", name, LIMIT_NAMES))
-        if match.group(2) not in LIMIT_UNITS:
-            raise HdoptError(unknown_name(f"unit of {name} in --limit", match.group(2), LIMIT_UNITS))
+        units = SLOPE_UNITS if name == "slope" else LIMIT_UNITS
+        if match.group(2) not in units:
+            known = ", ".join(filter(None, units))
+            raise HdoptError(f"--limit gives {name} in {shown(match.group(2))}; its unit is one of {known}")
         try:
-            value = float(match.group(1)) * LIMIT_UNITS[match.group(2)]
+            value = float(match.group(1)) * units[match.group(2)]
         except ValueError as error:
             raise HdoptError(f"--limit gives {name} {match.group(1)!r}, which is no number") from error
         if not 0 < value < LARGEST_LIMIT_ARCMIN:
-            raise HdoptError(f"--limit gives {name} {value:g} arcmin; give a number above 0")
+            raise HdoptError(f"--limit gives {name} {value:g} {unit_of(name)}; give a number above 0")
         found[name] = value
     return found
 

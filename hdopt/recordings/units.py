@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from hdopt.drive.geometry import ARCMIN
-from hdopt.errors import HdoptError, unknown_name
+from hdopt.errors import HdoptError, shown, unknown_name
 
 DEGREE = math.pi / 180
 TURN = 2 * math.pi
@@ -25,6 +25,8 @@ ANGLE_UNITS: dict[str, float] = {
     "gon": TURN / 400,
 }
 TIME_UNITS: dict[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+DATES = ("iso", "iso8601", "date", "datetime", "timestamp", "hms")
+"""What people write as the unit of times that are dates or times of day, which have none."""
 TORQUE_UNITS: dict[str, float] = {"Nm": 1.0, "Nmm": 1e-3, "Ncm": 1e-2, "kNm": 1e3}
 TEMPERATURE_UNITS: dict[str, tuple[float, float]] = {"C": (1.0, 0.0), "K": (1.0, -273.15), "F": (5 / 9, -160 / 9)}
 
@@ -131,6 +133,11 @@ def parse_unit(channel: str, text: str) -> Unit:
         scale = CHANNEL_UNITS[channel][word]
         factor, offset = scale if isinstance(scale, tuple) else (scale, 0.0)
     else:
+        if channel == "time" and re.sub(r"[^a-z0-9]", "", word.lower()) in DATES:
+            raise HdoptError(
+                f"--columns gives time the unit {shown(word)}; dates and times of day have none: write time=NAME, and "
+                "they are recognised (ISO 8601, day.month.year with a time, hh:mm:ss)"
+            )
         known = [*CHANNEL_UNITS[channel], *(["counts/COUNTS_PER_TURN"] if angle else [])]
         raise HdoptError(unknown_name(f"unit of {channel} in --columns", word, known))
     for part in parts:

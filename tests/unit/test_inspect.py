@@ -170,7 +170,7 @@ def test_the_sheet_begins_with_its_verdicts():
     assert [ruling.met for ruling in rulings] == [None, True, False]
     assert rulings[0].text == "Peak-to-peak, at most 1.5 arcmin: the model does not explain the record."
     assert rulings[1].text == "Return error (median) 0.4 arcmin, at most 0.5 arcmin: 0.1 to spare, guard band 0.033."
-    assert rulings[2].text == "Slope 0.4 arcmin per deg, at most 0.25 arcmin per deg: 0.15 too much, guard band 0.016."
+    assert rulings[2].text == "Slope 0.4 arcmin/deg, at most 0.25 arcmin/deg: 0.15 too much, guard band 0.016."
     html = render(page)
     assert "Not decidable." in html and html.index("Missed.") < html.index("Standard uncertainty")
     assert "slipped counts" in html and "<td>peak_to_peak" not in html

@@ -188,6 +188,9 @@ def test_counts_gear_and_turns(truth, tmp_path):
         ("input=a:deg/gearx,output=b:deg", "gear 'x'"),
         ("input=a b,output=b:deg", r'--columns "input=a b:UNIT" '),
         ("input=a,output=b:deg", r"no unit is stated for input; give it with --columns input=a:UNIT"),
+        ("input=a,output=b:deg,time=t:iso", r"dates and times of day have none: write time=NAME"),
+        ("input=a,output=b:deg,time=t:ISO-8601", r"dates and times of day have none: write time=NAME"),
+        ("input=a:deg,output=b:deg,torque=a", r"torque=a:UNIT \(torque: Nm, Nmm, Ncm, kNm\)"),
     ],
 )
 def test_units_that_do_not_do(tmp_path, columns, message):

@@ -224,6 +224,14 @@ def test_limits_in_their_units():
     assert parse_limits("rms=30arcsec,slope=2,one_turn=0.01deg") == pytest.approx(
         {"rms": 0.5, "slope": 2.0, "one_turn": 0.6}
     )
+    assert parse_limits("slope=30arcsec/deg") == pytest.approx({"slope": 0.5})
+
+
+@pytest.mark.parametrize("words", ["slope=1arcmin", "slope=1deg", "rms=1arcmin/deg", "return_error=2furlong"])
+def test_a_limit_in_the_unit_of_another_quantity_is_refused(words):
+    """Would catch a slope taken in arcmin, which is no slope, and a peak-to-peak in arcmin per degree."""
+    with pytest.raises(HdoptError, match="its unit is one of arcmin"):
+        parse_limits(words)
 
 
 NOISE = np.random.default_rng(3).normal(0, 0.02, 8 * RATE)

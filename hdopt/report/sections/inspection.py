@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any  # Any: Plotly's dictionaries and traces, 
 
 import numpy as np
 
-from hdopt.recordings.decision import GUARD
+from hdopt.recordings.decision import GUARD, unit_of
 from hdopt.report import Figure, Item, KeyFigures, Report, Ruling, Section, Table, Text
+from hdopt.report.cells import EACH
 from hdopt.report.theme import BLUE, DIVERGING, GREY, INK, VERMILLION, figure
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 TURN = 2 * math.pi
 LISTED_ORDERS = 12
+DECIDED = "Decided with a guard band of 95 % conformity (ISO 14253-1)."
 
 
 def inspection_report(found: Inspection) -> Report:
@@ -58,18 +60,17 @@ def _summary(found: Inspection) -> Section:
             [
                 {
                     "figure": _name(d.name),
-                    "value_arcmin": d.value,
-                    "limit_arcmin": d.limit,
-                    "guard_band_arcmin": GUARD * d.uncertainty,
+                    "value": d.value,
+                    "limit": d.limit,
+                    "guard_band": GUARD * d.uncertainty if d.value is not None else None,
+                    "unit": unit_of(d.name),
                     "decision": d.verdict,
                     "what": d.note,
                 }
                 for d in found.limits
             ]
         )
-        items.append(
-            Table("limits", "Limits", frame, "Decided with a guard band of 95 % conformity (ISO 14253-1).", {})
-        )
+        items.append(Table("limits", "Limits", frame, DECIDED, {"value": EACH, "limit": EACH, "guard_band": ".2g"}))
     items.append(Text(f"{found.turns:.4g} input turns of a drive of ratio {found.ratio:g} were recorded."))
     return Section(
         "sheet",
@@ -86,7 +87,7 @@ def _name(key: str) -> str:
 
 def _ruling(decision: Decision) -> Ruling:
     """A limit's verdict in words, with the figure that was held against it."""
-    unit = "arcmin per deg" if decision.name == "slope" else "arcmin"
+    unit = unit_of(decision.name)
     name, allowed = _name(decision.name).capitalize(), f"{decision.limit:.4g} {unit}"
     if decision.value is None:
         return Ruling(None, f"{name}, at most {allowed}: {decision.note or 'not measured'}.")
