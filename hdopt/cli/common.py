@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar  # Any: values of JSON; what the 
 import click
 from click.shell_completion import CompletionItem
 
+from hdopt.cli.log import logged
 from hdopt.files import HasTables, claim_output, to_csv, to_json, write_tables, write_text
 
 if TYPE_CHECKING:
@@ -224,10 +225,12 @@ def _provenance() -> dict[str, Any]:
 
 
 def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterable[T]:
-    """`items`, with a progress bar on standard error where that is a terminal."""
+    """`items`, with a progress bar on standard error where that is a terminal, else with a line now and then."""
+    if not sys.stderr.isatty():
+        return logged(items, label, total)
     from tqdm import tqdm
 
-    return tqdm(items, desc=label, total=total, file=sys.stderr, disable=not sys.stderr.isatty(), leave=False)
+    return tqdm(items, desc=label, total=total, file=sys.stderr, leave=False)
 
 
 def _put_in_force(ctx: click.Context, parameter: click.Parameter, name: str | None) -> None:
@@ -275,11 +278,10 @@ resume_option = click.option("--resume", is_flag=True, help="Go on where the sam
 
 
 def watched(label: str) -> Engine:
-    """The engine in force, with a progress bar over what it maps where standard error is a terminal."""
+    """The engine in force, with the progress of what it maps on standard error."""
     from hdopt.parallel.engine import engine_from
 
-    chosen = engine_from(None)
-    return Watched(chosen, label) if sys.stderr.isatty() else chosen
+    return Watched(engine_from(None), label)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from hdopt.cli.common import (
     table_options,
     watched,
 )
+from hdopt.cli.log import lines_in_a_log
 from hdopt.cli.recorded import RecordingOptions, recording_options
 
 if TYPE_CHECKING:
@@ -83,7 +84,8 @@ def _one(
 
     source = given.source()
     read = source.recordings(given.recordings)
-    diagnosis = diagnose(read, source, seed=seed, nuisance=nuisance)
+    with lines_in_a_log(f"diagnosis of {len(read)} recording{'s' if len(read) > 1 else ''}"):
+        diagnosis = diagnose(read, source, seed=seed, nuisance=nuisance)
     try:
         write_diagnosis(diagnosis, files, [recording.name for recording in read], source)
     finally:

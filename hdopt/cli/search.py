@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from hdopt.cli.common import OutputFile, StudyOptions, emit, status, study_options, table_options, work_options
+from hdopt.cli.log import lines_in_a_log
 
 if TYPE_CHECKING:
     from hdopt.optimize.records import SearchResult
@@ -40,7 +42,8 @@ def command(
     from hdopt.workflow.search import search, write_search
 
     loaded = asked.load()
-    result = search(loaded, seed, _stages() if sys.stderr.isatty() else lambda stage: None, fronts, regions=regions)
+    with _stages(loaded.name) as tell:
+        result = search(loaded, seed, tell, fronts, regions=regions)
     verdict = of_search(loaded, result)
     try:
         write_search(result, {"study": study_file} if study_file else {}, loaded)
@@ -61,13 +64,19 @@ def _lines(result: SearchResult, study_file: Path | None) -> Iterator[str]:
         )
 
 
-def _stages() -> Callable[[str], None]:
+@contextmanager
+def _stages(label: str) -> Iterator[Callable[[str], None]]:
+    """A function to tell the stages of a search to: a bar on a terminal, else a line now and then."""
+    if not sys.stderr.isatty():
+        with lines_in_a_log(label) as log:
+            yield log.begin
+        return
     from tqdm import tqdm
 
-    bar = tqdm(desc="hdopt search", file=sys.stderr, leave=False)
+    with tqdm(desc="hdopt search", file=sys.stderr, leave=False) as bar:
 
-    def tell(stage: str) -> None:
-        bar.set_postfix_str(stage)
-        bar.update(1)
+        def tell(stage: str) -> None:
+            bar.set_postfix_str(stage)
+            bar.update(1)
 
-    return tell
+        yield tell
