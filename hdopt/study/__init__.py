@@ -12,7 +12,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar  # Any: what a study file holds, of TOML's several kinds
 
-from hdopt.errors import HdoptError, MissingSection, MissingValue, NoResult, numbers_of, unknown_name
+from hdopt.errors import HdoptError, MissingSection, MissingValue, NoResult, numbers_of, shown, unknown_name
 from hdopt.files import files_of_work
 from hdopt.study.document import (
     SET_ON_COMMAND_LINE,
@@ -341,10 +341,15 @@ def with_values(document: Document, values: Iterable[tuple[str, Any]], place: st
 
 def _resolve(key: str, data: Mapping[str, Any], place: str) -> tuple[str, ...]:
     """The dotted path that a key's last name or path means; an unknown or ambiguous one is an error."""
-    from hdopt.study.nearest import unknown_key
-    from hdopt.study.schema import ANY_NAME, known_paths
+    from hdopt.study.nearest import near_keys, unknown_key
+    from hdopt.study.schema import ANY_NAME, SECTIONS, known_paths, section_model
 
     parts = tuple(key.split("."))
+    if parts[0] == "study" and len(parts) == 2:
+        known = sorted(section_model("study").model_fields)
+        if parts[1] in known:
+            return parts
+        raise HdoptError(f"{place} [study]: {unknown_key(parts[1], known)}")
     if parts[0] != "effects":
         # The effects compile: they are asked only about what no other section has.
         found = _match(key, parts, data, known_paths(data, without=("effects",)), place)
@@ -356,6 +361,10 @@ def _resolve(key: str, data: Mapping[str, Any], place: str) -> tuple[str, ...]:
         return found
     possible = {path for path in possible if ANY_NAME not in path}
     names = {path[-1] for path in possible} if len(parts) == 1 else {".".join(path) for path in possible}
+    if len(parts) > 1 and not near_keys(key, names):
+        names = {name for name in names if name.startswith(f"{parts[0]}.")}
+        if not names:
+            raise HdoptError(f"{place} unknown key {shown(key)}; it may begin with {', '.join(SECTIONS)}")
     raise HdoptError(f"{place} {unknown_key(key, sorted(names))}")
 
 

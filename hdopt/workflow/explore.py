@@ -109,7 +109,6 @@ def explore(
     return ExploreResult(study.name, file, len(page.cloud), page.notes, page.cloud)
 
 
-@numbers_named
 def explorer_page(study: Study, n: int = CLOUD_N, seed: int = 1) -> ExplorerPage:
     """The explorer of `study`; `n` and `seed` as in `explore`."""
     if not 1 <= n <= MOST_CLOUD:

@@ -17,6 +17,7 @@ from hdopt.study.write import with_moved_paths
 from hdopt.workflow.study_reference import KeyReference, TableReference, section_reference
 
 WIDTH = 118
+"""Of a comment that has lines of its own; a longer one beside its key stands above it."""
 NAMED_KEYS = ("effects", "contributors", "linear_stack")
 """Sections whose keys the study makes up, or that have too many: their tables are written as they are."""
 
@@ -83,7 +84,8 @@ def _section(name: str, content: Mapping[str, Any] | None) -> Iterator[str]:
         yield f"# {line}"
     if content is None:
         yield f"# [{name}]"
-        yield from (_left_out(key) for key in table.keys)
+        for key in table.keys:
+            yield from _left_out(key)
         return
     if name in NAMED_KEYS:
         yield from _as_it_is(name, content)
@@ -98,18 +100,18 @@ def _keys(name: str, table: TableReference, content: Mapping[str, Any]) -> Itera
     for key in table.keys:
         value = content.get(key.key)
         if value is None:
-            yield _left_out(key)
+            yield from _left_out(key)
         elif isinstance(value, Mapping) and name == "search":
             inner.append(key.key)
         else:
-            yield _line(f"{key.key} = {_toml(value)}", _explained(key))
+            yield from _lines(f"{key.key} = {_toml(value)}", _explained(key))
     for key_name in inner:
         yield from ("", *_as_it_is(f"{name}.{key_name}", content[key_name]))
 
 
-def _left_out(key: KeyReference) -> str:
+def _left_out(key: KeyReference) -> Iterator[str]:
     value = key.default if key.default not in ("", "none") else "..."
-    return _line(f"# {key.key} = {value}", _explained(key, with_allowed=True))
+    yield from _lines(f"# {key.key} = {value}", _explained(key, with_allowed=True))
 
 
 def _explained(key: KeyReference, with_allowed: bool = False) -> str:
@@ -120,8 +122,15 @@ def _explained(key: KeyReference, with_allowed: bool = False) -> str:
     return "; ".join(part for part in parts if part)
 
 
-def _line(text: str, comment: str) -> str:
-    return f"{text:<40s} # {comment}" if comment else text
+def _lines(text: str, comment: str) -> Iterator[str]:
+    """`text` with its `comment` beside it, or above it where that would be a long line."""
+    line = f"{text:<40s} # {comment}" if comment else text
+    if len(line) <= WIDTH + 2:
+        yield line
+        return
+    for part in _wrapped(comment):
+        yield f"# {part}"
+    yield text
 
 
 def _effects(content: Mapping[str, Any] | None) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
@@ -39,13 +40,14 @@ class Verdict:
     @property
     def line(self) -> str:
         """'requirement met: peak-to-peak 0.9 arcmin, at most 1 arcmin allowed, 0.1 arcmin to spare'."""
+        says = f"requirement {'met' if self.met else 'missed'}: {self.quantity}"
+        by = "to spare" if self.met else "short" if self.at_least else "too much"
+        if self.at_least:
+            margin = f"{100 * abs(self.margin):.2g} % {by}"
+            return f"{says} {_percent(self.value)}, at least {_percent(self.limit)} needed, {margin}"
         unit = f" {self.unit}" if self.unit else ""
-        allowed = (
-            f"at least {self.limit:.6g}{unit} needed" if self.at_least else f"at most {self.limit:.6g}{unit} allowed"
-        )
-        missing = "short" if self.at_least else "too much"
-        by = f"{abs(self.margin):.4g}{unit} {'to spare' if self.met else missing}"
-        return f"requirement {'met' if self.met else 'missed'}: {self.quantity} {self.value:.6g}{unit}, {allowed}, {by}"
+        margin = f"{abs(self.margin):.3g}{unit} {by}"
+        return f"{says} {self.value:.4g}{unit}, at most {self.limit:.4g}{unit} allowed, {margin}"
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready: quantity, value, limit, unit, met, margin."""
@@ -57,6 +59,13 @@ class Verdict:
             "met": self.met,
             "margin": self.margin,
         }
+
+
+def _percent(share: float) -> str:
+    """A `share` with enough digits to tell it from a whole: '99.07 %', '99.9987 %'."""
+    left = 100 * (1 - share)
+    digits = 2 if left >= 0.01 or left <= 0 else math.ceil(-math.log10(left)) + 1
+    return f"{100 * share:.{digits}f} %"
 
 
 def _requirement(study: Study) -> RequirementSection | None:

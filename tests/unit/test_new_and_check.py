@@ -57,7 +57,10 @@ def test_every_key_of_the_schema_stands_in_a_new_study_and_is_explained(tmp_path
             continue
         assert re.search(rf"^(# )?\[{name}\]$", text, re.M), name
         for key in section_reference(name)[0].keys:
-            assert re.search(rf"^(# )?{key.key} = .+# \S", text, re.M), f"{name}.{key.key}"
+            beside, above = rf"^(# )?{key.key} = .+# \S", rf"^# \S.*\n(# )?{key.key} = "
+            assert re.search(beside, text, re.M) or re.search(above, text, re.M), f"{name}.{key.key}"
+    wide = [line for line in text.splitlines() if len(line) > 120]
+    assert wide == [], "lines that an editor has to scroll for"
 
 
 def test_a_default_behind_a_comment_sign_is_the_one_that_holds(tmp_path):
@@ -88,6 +91,26 @@ def test_every_key_has_a_meaning():
         if not key.meaning or not table.says
     ]
     assert without == []
+
+
+@pytest.mark.parametrize(
+    ("setting", "said_of_it"),
+    [
+        ("study.step=1", "unknown key 'step'; did you mean 'steps'?"),
+        ("search.foo=1", "known: search.front_points"),
+        ("wavegen.x=1", "unknown key 'wavegen.x'; it may begin with study, drive, wave_generator"),
+    ],
+)
+def test_a_key_that_is_none_is_answered_with_those_of_its_section(setting, said_of_it):
+    """Would catch a list of 794 keys from the top of the alphabet."""
+    with pytest.raises(HdoptError) as error:
+        hdopt.load_study("csf-25-80", [setting])
+    assert said_of_it in str(error.value)
+
+
+def test_steps_and_title_are_set_by_their_whole_name():
+    study = hdopt.load_study("csf-25-80", ['study.steps=["waveform"]', "study.title=Mine"])
+    assert study.data["study"]["steps"] == ["waveform"] and study.data["study"]["title"] == "Mine"
 
 
 def test_new_does_not_write_over_a_file(tmp_path, capsys):
