@@ -203,6 +203,7 @@ def plan(
     `given` has the fits that the options set, `gap` is the axial play of each slide, mm.
     """
     joints = joints_of(parts, given)
+    carrier = next((part.name for part in reversed(parts) if part.slot is not None), "cam")
     centred = structure.passes_major or structure.passes_minor
     eccentricity = bounds.eccentricity if centred else None
     leans = sum(joint.leans for joint in joints) + len(structure.slots)
@@ -212,7 +213,7 @@ def plan(
         shares = [_eccentricity_of(joint, fit) for joint, fit in zip(joints, fits, strict=True)]
         if structure.slots and clearances.cross_slide:
             text = f"clearance {clearances.cross_slide:g} across the slot"
-            shares.append(Share("cam", "slot and block", text, clearances.cross_slide / 2))
+            shares.append(Share(carrier, "slot and block", text, clearances.cross_slide / 2))
         zones = [(part.name, text) for part in parts for text in _located(part)]
         budgets.append(_filled("wg_eccentricity", "mm", eccentricity, shares, [(*zone, 0.5) for zone in zones]))
     if bounds.tilt is not None:
@@ -220,7 +221,7 @@ def plan(
         shares = [_tilt_of(joint, fit) for joint, fit in leaning]
         if structure.slots and clearances.disc_radius:
             lean = math.atan(gap / (2 * clearances.disc_radius))
-            shares += [Share("cam", f"slide {n}", f"axial play {gap:g}", lean) for n in structure.slots]
+            shares += [Share(carrier, f"slide {n}", f"axial play {gap:g}", lean) for n in structure.slots]
         zones_over = [zone for part in parts for zone in _oriented(part)]
         budgets.append(_filled("wg_tilt", "deg", bounds.tilt, shares, zones_over))
     return Plan(joints, fits, tuple(budgets))

@@ -91,6 +91,8 @@ class Callout:
     faces: tuple[Face, ...] = ()
     size: tuple[float, float, float] | None = None
     datum_faces: tuple[Face, ...] = ()
+    on_face: bool = False
+    """Whether the leader ends within a face, in a dot, and not at an outline."""
 
 
 def callouts_of(part: Part, model: WaveGeneratorModel) -> tuple[Callout, ...]:
@@ -255,7 +257,7 @@ def _bolts(part: Part, model: WaveGeneratorModel) -> Callout | None:
     bolts = part.bolts
     if bolts is None:
         return None
-    lines = (hole_note(part, model), f"on Ø{2 * bolts.radius:g}")
+    lines = (hole_note(part, model),)
     datum = "B" if secondary(part) == "bolts" else ""
     frame = Frame("position", GENERAL_POSITION, True, "A" if datum else _datums(part))
     at = outer_point(bolts)
@@ -298,7 +300,7 @@ def _slot(part: Part, model: WaveGeneratorModel) -> Callout | None:
     letter = "B" if secondary(part) == "slot" else ""
     frames = (Frame("perpendicularity", slide.zone, False, "A"),)
     at, size = polar(0.93 * slot.half_length, slot.direction), (slot.width, 0.0, slide.zone)
-    return Callout(at, lines, frames, datum=letter, faces=sides, size=size)
+    return Callout(at, lines, frames, datum=letter, faces=sides, size=size, on_face=True)
 
 
 def _cornered(edges: SlideEdges) -> str:
@@ -317,7 +319,7 @@ def _block(part: Part, model: WaveGeneratorModel) -> Callout | None:
     )
     sides = (Flank(block.width / 2, block.direction + math.pi / 2),)
     frames, size = _upright(part, model, slide), (block.width, -slide.zone, 0.0)
-    return Callout(polar(0.8 * block.radius, block.direction), lines, frames, faces=sides, size=size)
+    return Callout(polar(0.8 * block.radius, block.direction), lines, frames, faces=sides, size=size, on_face=True)
 
 
 def _upright(part: Part, model: WaveGeneratorModel, slide: Slide) -> tuple[Frame, ...]:
@@ -381,17 +383,17 @@ def _face(part: Part, model: WaveGeneratorModel) -> Callout | None:
         letter = "A" if primary(part) == "back" else "C"
         frames = (Frame("perpendicularity", zone, False, letter),) if zone else ()
         lines = ("profile to the back face; back: Ra 0.8",)
-        return Callout(at, lines, frames, datum=letter, faces=(Profile(),), datum_faces=back)
+        return Callout(at, lines, frames, datum=letter, faces=(Profile(),), datum_faces=back, on_face=True)
     first = part.body[0]
     front = (Level(first.top if len(part.body) > 1 else part.bottom),)
     if primary(part) == "back":
         frames = (Frame("parallelism", zone, False, "A"),) if zone else ()
         lines = ("front face to the back; Ra 0.8",)
-        return Callout(at, lines, frames, datum="A", faces=front, datum_faces=back)
+        return Callout(at, lines, frames, datum="A", faces=front, datum_faces=back, on_face=True)
     if zone is None:
         return None
     frame = Frame("perpendicularity", zone, False, "A")
-    return Callout(at, ("face that carries the next part; Ra 0.8",), (frame,), faces=front)
+    return Callout(at, ("face that carries the next part; Ra 0.8",), (frame,), faces=front, on_face=True)
 
 
 def _edges(part: Part) -> Callout | None:

@@ -42,7 +42,8 @@ def dxf_of(sheet: Sheet) -> str:
             centre = (mark.centre[0], up - mark.centre[1])
             space.add_circle(centre, mark.radius, dxfattribs={"layer": mark.kind.upper()})
         elif isinstance(mark, Solid):
-            space.add_solid([(x, up - y) for x, y in mark.points.tolist()], dxfattribs={"layer": "ARROWS"})
+            filled = space.add_hatch(dxfattribs={"layer": "ARROWS"})
+            filled.paths.add_polyline_path([(x, up - y) for x, y in mark.points.tolist()], is_closed=True)
         elif isinstance(mark, Area):
             hatch = space.add_hatch(dxfattribs={"layer": "HATCH"})
             style = sheet.hatches[mark.hatch]

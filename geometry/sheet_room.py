@@ -18,7 +18,11 @@ Box = tuple[float, float, float, float]
 def is_free(sheet: Sheet, label: Label) -> bool:
     """Whether a `label` would stand on the `sheet` clear of all that is drawn so far, hatches apart."""
     left, top, right, low = label_box(label)
-    box = left - GAP, top - GAP, right + GAP, low + GAP
+    return is_clear(sheet, (left - GAP, top - GAP, right + GAP, low + GAP))
+
+
+def is_clear(sheet: Sheet, box: Box) -> bool:
+    """Whether nothing is drawn on the `sheet` so far within a `box` (left, top, right, bottom, mm), hatches apart."""
     for mark in sheet.marks:
         if isinstance(mark, Label):
             left, top, right, low = label_box(mark)

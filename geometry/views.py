@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Vector = tuple[float, float, float]
 
-SAGITTA = 0.01
+SAGITTA = 0.002
 """Largest distance of a drawn polyline from its curve, mm."""
 
 

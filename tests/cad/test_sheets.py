@@ -8,17 +8,22 @@ import re
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from wave_generators import drive, scaled
 
 from hdopt.drive.geometry import Structure
+from hdopt.geometry.assembly_sheet import uncrossed
+from hdopt.geometry.balloons import RADIUS
 from hdopt.geometry.callouts import callouts_of
 from hdopt.geometry.export import export_drive
 from hdopt.geometry.job import make_job
 from hdopt.geometry.mating_drawing import fill_mating_sheet
 from hdopt.geometry.options import ExportOptions
-from hdopt.geometry.part_sheets import HEIGHT, WIDTH, sheets
-from hdopt.geometry.sheet import Area, Line, Ring, Sheet, label_box, text_width
+from hdopt.geometry.part_sheets import sheets
+from hdopt.geometry.sheet import Area, Line, Ring, Sheet, Solid, label_box, text_width
 from hdopt.geometry.sheet_details import outline
+from hdopt.geometry.sheet_title import HEIGHT, WIDTH
 from hdopt.geometry.undercut import AT_SHOULDER, IN_CORNER, Undercut
 
 pytestmark = pytest.mark.slow
@@ -35,10 +40,13 @@ CASES = [
     ("two_disk", Structure.AUTOMATIC, 4.0),
     ("two_disk", Structure.ONE_WAY_MAJOR, 0.4),
     ("two_disk", Structure.ONE_WAY_MINOR, 0.2),
-    ("ellipse", Structure.INTEGRAL, 0.2),
-    ("two_disk", Structure.INTEGRAL, 0.2),
+    ("ellipse", Structure.INTEGRAL, 0.1958),
+    ("two_disk", Structure.INTEGRAL, 0.1958),
+    ("two_disk", Structure.INTEGRAL, 1.9576),
+    ("ellipse", Structure.AUTOMATIC, 1.9576),
+    ("measured", Structure.INTEGRAL, 1.0),
 ]
-"""Every structure with a cam and with discs; drives of 12 mm to 250 mm."""
+"""Every structure with a cam and with discs; drives of 12 mm and 120 mm within, and others up to 250 mm."""
 
 
 def job_of(profile, structure, scale):
@@ -208,3 +216,70 @@ def test_mating_sheet_says_every_row_and_spends_the_bound():
     assert said.count("0.0075") == 4 and said.count("0.00375 mm") == 4 and said.count("0.1 deg") == 2
     assert any(line.startswith("e1") and line.endswith(": 0.015 mm") for line in said)
     assert any(line.endswith(": 0.2 deg") for line in said)
+
+
+@pytest.mark.parametrize(
+    ("profile", "structure", "scale"),
+    [
+        ("ellipse", Structure.INTEGRAL, 1.0),
+        ("two_disk", Structure.INTEGRAL, 0.1958),
+        ("two_disk", Structure.AUTOMATIC, 1.9576),
+    ],
+)
+def test_numbers_in_the_assembly_are_those_of_the_parts_list(profile, structure, scale):
+    """Screws and rings too, each joined to what it is."""
+    job = job_of(profile, structure, scale)
+    sheet = sheet_of(job, "assembly")
+    rings = [mark.centre for mark in sheet.marks if isinstance(mark, Ring) and mark.radius == RADIUS]
+    numbers = [label.content for label in sheet.labels if any(math.dist(label.at, at) < 1.01 for at in rings)]
+    said = [label.content for label in sheet.labels]
+    listed = said[said.index("mass, g") + 1 :]
+    rows = [row for row in listed if row in {str(number) for number in range(1, 10)}]
+    expected = len(job.made) + 1
+    assert sorted(numbers) == sorted(rows) == [str(number) for number in range(1, expected + 1)]
+    # The last is what is bought; its line ends in a filled cut of the ring or at the axis of a screw.
+    end = rings[numbers.index(str(expected))]
+    lines = [mark.points for mark in sheet.marks if isinstance(mark, Line) and len(mark.points) == 2]
+    tip = next(line[0] for line in lines if abs(math.dist(line[1], end) - RADIUS) < 1e-6)
+    if profile == "ellipse":
+        axes = [mark.points for mark in sheet.marks if isinstance(mark, Line) and mark.kind == "axis"]
+        assert any(abs(axis[0, 1] - tip[1]) < 1e-9 and axis[:, 0].min() < tip[0] < axis[:, 0].max() for axis in axes)
+        # 9 mm of cam and 3.5 mm of flange: M3 x 12 holds in three of them.
+        assert "ISO 4762 - M3 × 12" in said
+    else:
+        cuts = [mark.points for mark in sheet.marks if isinstance(mark, Solid) and len(mark.points) == 4]
+        assert len(cuts) == 2
+        assert any((cut.min(0) - 1e-9 <= tip).all() and (tip <= cut.max(0) + 1e-9).all() for cut in cuts)
+        ring = job.model.part("eccentric_hub").body[2].outline
+        assert f"DIN 471 - {2 * ring.radius:g} x" in " ".join(said)
+
+
+@given(st.lists(st.tuples(st.floats(0, 50), st.floats(0, 60)), min_size=1, max_size=8, unique=True))
+@settings(max_examples=60, deadline=None)
+def test_lines_to_numbers_do_not_cross(points):
+    """By the angles at which the lines are seen: each pair lies wholly on one side of the other."""
+    ends = [(70.0, 7.5 * row) for row in range(len(points))]
+    order = uncrossed(list(zip(points, range(len(points)), strict=True)), ends)
+    assert sorted(number for _, number in order) == list(range(len(points)))
+    share = np.linspace(0, 1, 201)[:, None]
+    for i, j in itertools.combinations(range(len(points)), 2):
+        one, other = (np.array(order[k][0]) * (1 - share) + np.array(ends[k]) * share for k in (i, j))
+        low, high = max(one[0, 0], other[0, 0]), 70.0
+        x = np.linspace(low, high, 50)
+        apart = np.interp(x, other[:, 0], other[:, 1]) - np.interp(x, one[:, 0], one[:, 1])
+        assert apart.min() > -1e-6 or apart.max() < 1e-6
+
+
+@pytest.mark.parametrize("name", ["disc 1", "disc 2"])
+def test_discs_are_drawn_about_their_own_axis(name):
+    sheet = sheet_of(job_of("two_disk", Structure.INTEGRAL, 0.1958), name)
+    seen = np.concatenate([m.points for m in sheet.marks if isinstance(m, Line) and m.kind == "visible"])
+    front = seen[seen[:, 0] < 170]
+    middle = (front.min(0) + front.max(0)) / 2
+    across = [m.points for m in sheet.marks if isinstance(m, Line) and m.kind == "axis"]
+    assert any(line[:, 1] == pytest.approx([middle[1]] * 2, abs=0.02) for line in across)
+    # As round on the sheet as its lines are wide: the points of circles lie on them, and their chords close by.
+    rim = front[np.hypot(*(front - middle).T) > 0.9 * np.ptp(front[:, 0]) / 2]
+    angles = np.sort(np.arctan2(*(rim - middle).T))
+    sagitta = np.ptp(front[:, 0]) / 2 * (1 - np.cos(np.diff(angles).max() / 2))
+    assert sagitta < 0.05
