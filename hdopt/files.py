@@ -69,6 +69,9 @@ class FilesOfWork:
     place: Callable[[], str] | None = None
     """Says where to look when numbers lead to no result; None for work without a study."""
 
+    values: Callable[[str], tuple[str, ...]] | None = None
+    """Says where the values stand that a message shows; None for work without a study."""
+
     def place_of_numbers(self) -> str:
         """Where the numbers of this work stand: in its study, else in its inputs."""
         if self.place is not None:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache, wraps
 from importlib import import_module
+from typing import TypeVar
 
 import click
+
+R = TypeVar("R")
 
 COMMANDS: dict[str, str] = {
     "new": "A commented study to begin with.",
@@ -34,10 +39,7 @@ class LazyGroup(click.Group):
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
-        if name not in COMMANDS:
-            return None
-        command: click.Command = import_module(f"hdopt.cli.{name}").command
-        return command
+        return _command(name) if name in COMMANDS else None
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -51,6 +53,35 @@ class LazyGroup(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
+
+
+@cache
+def _command(name: str) -> click.Command:
+    command: click.Command = import_module(f"hdopt.cli.{name}").command
+    if command.callback is not None:
+        command.callback = _placing(command.callback)
+    return command
+
+
+def _placing(work: Callable[..., R]) -> Callable[..., R]:
+    """`work` of a command, whose refusals name the options or the files that they speak of."""
+
+    @wraps(work)
+    def placing(*arguments: object, **options: object) -> R:
+        from hdopt.errors import HdoptError, MissingLibrary, NoResult
+
+        try:
+            return work(*arguments, **options)
+        except HdoptError as error:
+            if not isinstance(error, NoResult | MissingLibrary):
+                from hdopt.cli.place import placed
+                from hdopt.files import FilesOfWork, files_of_work
+
+                context = click.get_current_context()
+                error.args = (placed(str(error), context, files_of_work() or FilesOfWork()), *error.args[1:])
+            raise
+
+    return placing
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})

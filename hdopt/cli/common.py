@@ -234,10 +234,15 @@ def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterab
 
 
 def _put_in_force(ctx: click.Context, parameter: click.Parameter, name: str | None) -> None:
+    from hdopt.errors import HdoptError
     from hdopt.parallel.engine import engine_in_force
 
-    if name is not None:
+    if name is None:
+        return
+    try:
         ctx.with_resource(engine_in_force(name))
+    except HdoptError as error:
+        raise HdoptError(f"--engine: {error}") from error
 
 
 engine_option = click.option(

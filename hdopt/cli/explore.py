@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 @study_options
 @click.option("-o", "--output", "file", metavar="FILE", default="explorer.html", show_default=True,
               help="The page to write.")  # fmt: skip
-@click.option("-n", "n", type=click.IntRange(min=1), default=2048, show_default=True, help="Drives of the cloud.")
+@click.option("-n", "n", type=click.IntRange(1, 100_000), default=2048, show_default=True, help="Drives of the cloud.")
 @table_options
 @answer_options
 def command(asked: StudyOptions, file: str, n: int, json_file: Path | None, seed: int) -> None:

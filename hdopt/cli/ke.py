@@ -23,7 +23,12 @@ if TYPE_CHECKING:
 @check_option
 @click.option("--method", default="exact", help="exact (the default) or 'closed form', to second order in the errors.")
 @json_option
-@click.option("--seed", type=int, expose_value=False, help="Taken as in every command; nothing here is random.")
+@click.option(
+    "--seed",
+    type=click.IntRange(0, 2**63 - 1),
+    expose_value=False,
+    help="Taken as in every command; nothing here is random.",
+)
 def command(
     asked: StudyOptions,
     structure: str | None,

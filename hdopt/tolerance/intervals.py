@@ -85,7 +85,12 @@ def order_statistic_ranks(q: float, n: int, confidence: float = CONFIDENCE) -> t
     return low, high
 
 
+NO_SAMPLE = 10**18
+"""Larger than any sample."""
+
+
 def smallest_n(q: float, confidence: float = CONFIDENCE) -> int:
-    """The smallest sample whose order statistics enclose the quantile `q` on both sides at this confidence."""
+    """The smallest sample whose order statistics enclose the quantile `q` on both sides at this confidence; `NO_SAMPLE`
+    where it would be larger still."""
     tail = (1 - confidence) / 2
-    return math.ceil(math.log(tail) / math.log(max(q, 1 - q)))
+    return math.ceil(min(math.log(tail) / math.log1p(-min(q, 1 - q)), NO_SAMPLE))

@@ -321,9 +321,9 @@ def _check_size(n: int, sampling: Sampling, quantiles: Sequence[float]) -> None:
     for q in quantiles:
         if not 0 < q < 1:
             raise HdoptError(f"the quantile {q!r} is asked for; it must lie between 0 and 1")
-        if n < smallest_n(q):
+        if n < (least := smallest_n(q)):
             raise HdoptError(
-                f"n is {n}, too small for the quantile {q:g} with its 95 % interval; the smallest n is {smallest_n(q)}"
+                f"n is {n}, too small for the quantile {q:.12g} with its 95 % interval; the smallest n is {least}"
             )
 
 

@@ -65,6 +65,8 @@ def acceptance_sheet(
     """
     if not recordings:
         raise HdoptError("no recordings were given; give at least one file")
+    if speed_rpm is not None and not 0 < speed_rpm < math.inf:
+        raise HdoptError(f"the input speed is {speed_rpm:g} rpm; it must be a finite number above 0")
     if mountings and len(mountings) != len(recordings):
         raise HdoptError(f"{len(mountings)} mountings are named for {len(recordings)} recordings; name one for each")
     moving = [r for r in recordings if not r.input_locked]

@@ -14,6 +14,7 @@ from hdopt.errors import HdoptError, numbers_of
 from hdopt.recordings.recording import Recording
 from hdopt.study import Study, as_study, place_of_numbers
 from hdopt.study.document import Document
+from hdopt.study.named import values_named
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -44,15 +45,24 @@ _SECTION = re.compile(r"\[(\w+)\]:? ?(\w*)")
 
 @contextmanager
 def _sections_placed(document: Document) -> Iterator[None]:
-    """Messages that begin with a section of the study, '[tolerances] axis_tilt_y_deg: ...', get file and line."""
+    """Messages that begin with a section of the study, '[tolerances] axis_tilt_y_deg: ...', or show a value of it, get
+    file and line."""
     try:
         yield
     except HdoptError as error:
-        if found := _SECTION.match(str(error)):
-            path = tuple(part for part in found.groups() if part)
-            place = document.where(path).removesuffix(f", {'.'.join(path)}")
+        if place := _place(str(error), document):
             error.args = (f"{place}: {error}", *error.args[1:])
         raise
+
+
+def _place(message: str, document: Document) -> str:
+    """Where in `document` to look for what `message` says; "" where it says that itself, or speaks of nothing in it."""
+    if found := _SECTION.match(message):
+        path = tuple(part for part in found.groups() if part)
+        return document.where(path).removesuffix(f", {'.'.join(path)}")
+    if document.source in message or "--set " in message:
+        return ""
+    return "; ".join(values_named(document, message)[:MOST_NAMED])
 
 
 def recordings_named(work: F) -> F:

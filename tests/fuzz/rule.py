@@ -41,10 +41,10 @@ def study(content: bytes, folder: Path) -> None:
 
 
 def number(content: tuple[str, list[str]], folder: Path) -> None:
-    """One number far off: whatever fails over it says in which file, and at which line or key, to look."""
+    """One number far off: whatever fails over it says in which file, and at which line, to look."""
     text, command = content
     (folder / "s.toml").write_text(text)
-    held([command[0], str(folder / "s.toml"), *command[1:], "--json", "-"], place="s.toml")
+    held([command[0], str(folder / "s.toml"), *command[1:], "--json", "-"], place="s.toml, line ")
 
 
 def recording(content: bytes, folder: Path) -> None:

@@ -1,0 +1,61 @@
+"""Which values of a study a message speaks of: those that it shows, with file and line."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Any  # Any: what a study file holds, of TOML's several kinds
+
+from hdopt.study.document import Document, Keys, leaves
+
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+COMMON = 100
+"""Whole numbers up to this stand in many a message and many a study: they are taken only beside their key's name."""
+
+
+def numbers_in(message: str) -> set[float]:
+    """The numbers that stand in `message`; a comma or a full stop that follows is none of them."""
+    return {float(found) for found in NUMBER.findall(message)}
+
+
+def shows(message: str, value: Any, name: str) -> bool:
+    """Whether `message` speaks of the number `value` of the key `name`: it holds the number, and a part of the name or
+    a number that is not common."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    if not math.isfinite(value):
+        return _speaks_of(name, message) and re.search(rf"(?<!\w){value}\b", message) is not None
+    short = float(f"{value:g}")
+    written = {float(value)} if short.is_integer() else {float(value), short}
+    if not written & numbers_in(message):
+        return False
+    common = float(value).is_integer() and abs(value) <= COMMON
+    return not common or _speaks_of(name, message)
+
+
+def _speaks_of(name: str, message: str) -> bool:
+    """Whether `message` has a part of the `name`, with any end where it has three letters or more."""
+    parts = [part for part in re.split(r"[_\-]", name) if part]
+    return any(re.search(rf"\b{part}" + ("" if len(part) > 2 else r"\b"), message) for part in parts)
+
+
+def values_named(document: Document, message: str) -> tuple[str, ...]:
+    """Where in `document` the values stand that `message` shows, 'FILE, line N, a.b' each; a value that stands there
+    more than once is left out."""
+    shown: dict[float, list[Keys]] = {}
+    for path in leaves(document.data):
+        value = _at(document.data, path)
+        if _stands(document, path) and shows(message, value, path[-1]):
+            shown.setdefault(float(value), []).append(path)
+    return tuple(document.where(paths[0]) for paths in shown.values() if len(paths) == 1)
+
+
+def _stands(document: Document, path: Keys) -> bool:
+    return any(path[:depth] in document.lines for depth in range(len(path), 0, -1))
+
+
+def _at(data: Mapping[str, Any], path: Keys) -> Any:
+    for part in path:
+        data = data[part]
+    return data
