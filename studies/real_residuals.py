@@ -13,7 +13,8 @@ import pandas as pd
 from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
-from hdopt.report import Section, Table, Text
+from hdopt.report import Points, Section, Table, Text
+from hdopt.report.sections.words import label
 from hdopt.studies.sections import ResidualsSection
 from hdopt.study import Study
 from hdopt.workflow.steps import Context, StepResult
@@ -61,21 +62,7 @@ def real_residuals(study: Study, context: Context) -> StepResult:
         .reset_index()
     )
     missed = cases[~cases.exact]
-    section = Section(
-        "real-residuals",
-        "Known physics in real noise",
-        (
-            Table(
-                "residuals-summary",
-                "Answered exactly, among the explanations offered, unknown, or named wrongly",
-                table,
-            ),
-            *((Table("residuals-missed", "Every case not answered exactly", missed),) if len(missed) else ()),
-            Text(
-                "Severity is the hidden rms in units of the real residual's (real motion) or of the drive's own error."
-            ),
-        ),
-    )
+    section = residuals_section(cases, table)
     says = [*table.to_string(index=False).splitlines(), "not answered exactly:"]
     says += (
         missed[["noise", "hidden", "severity", "verdict", "said"]].to_string(index=False).splitlines()
@@ -84,6 +71,42 @@ def real_residuals(study: Study, context: Context) -> StepResult:
     )
     results = {"summary": table.to_dict("records"), "cases": cases.to_dict("records")}
     return StepResult((section,), results, says=tuple(says))
+
+
+def residuals_section(cases: pd.DataFrame, table: pd.DataFrame) -> Section:
+    """The page of all `cases` (as `judged` puts them) and the `table` of how they came out by noise and severity."""
+    hidden, empty = cases[cases.hidden != "nothing"], cases[cases.hidden == "nothing"]
+    says = [
+        f"With nothing put there, a name was given in {int(empty.wrong.sum())} of {len(empty)} records, and "
+        f"{int(empty.unknown.sum())} were called unknown.",
+        f"With physics put there, {int(hidden.exact.sum())} of {len(hidden)} were named exactly, "
+        f"{int(hidden.among.sum())} were among the explanations offered, and {int(hidden.wrong.sum())} got a wrong "
+        "name.",
+    ]
+    rows = cases.assign(hidden=cases.hidden.map(label), said=cases.said.map(_in_words))
+    rows = (
+        rows[~cases.exact].drop(columns="exact").rename(columns={"among": "among the offered", "wrong": "wrong name"})
+    )
+    return Section(
+        "real-residuals",
+        "Known physics in real noise",
+        (
+            Points(tuple(says)),
+            Table(
+                "residuals-summary",
+                "Answered exactly, among the explanations offered, unknown, or named wrongly",
+                table,
+            ),
+            *((Table("residuals-missed", "Every case not answered exactly", rows),) if len(rows) else ()),
+            Text(
+                "Severity is the hidden rms in units of the real residual's (real motion) or of the drive's own error."
+            ),
+        ),
+    )
+
+
+def _in_words(effects: str) -> str:
+    return ", ".join(label(effect) for effect in effects.split(", ")) if effects else ""
 
 
 def answered_cases(

@@ -97,7 +97,9 @@ def columns(frame: pd.DataFrame, formats: Mapping[str, str] | None = None) -> li
 
 def in_words(name: str) -> str:
     """The study key or callout `name` in words: 'wg_tilt_major_deg' reads 'WG tilt major'."""
-    words = name.removesuffix("_mm").removesuffix("_deg").split("_")
+    for unit in ("mm", "deg", "um", "arcmin"):  # not every unit: a callout may end in _h or _s
+        name = name.removesuffix(f"_{unit}")
+    words = name.split("_")
     words = [word.upper() if word in ("wg", "cs", "fs") else word for word in words]
     text = " ".join(words)
     return text[:1].upper() + text[1:]

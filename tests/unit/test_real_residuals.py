@@ -4,10 +4,11 @@ import os
 from pathlib import Path
 from types import SimpleNamespace
 
+import pandas as pd
 import pytest
 
 from hdopt.errors import HdoptError
-from hdopt.studies.real_residuals import judged, recordings_folder
+from hdopt.studies.real_residuals import judged, recordings_folder, residuals_section
 from hdopt.study import load_study
 from hdopt.workflow.steps import Context, find_step
 
@@ -65,3 +66,20 @@ def test_without_recordings_it_says_where_they_should_be(tmp_path, monkeypatch):
     monkeypatch.delenv("HDOPT_RECORDINGS", raising=False)
     with pytest.raises(HdoptError, match="set HDOPT_RECORDINGS to their folder"):
         recordings_folder()
+
+
+def test_its_page_says_what_came_out_and_names_effects_in_words():
+    answers = [
+        judged("trails", "", 0.0, diagnosis("adequate")),
+        judged("trails", "", 0.0, diagnosis("named", ["hysteresis"])),
+        judged("trails", "cs_tooth_harmonics", 0.5, diagnosis("named", ["cs_tooth_harmonics"])),
+        judged("trails", "hysteresis", 0.5, diagnosis("unknown", ["torsional_windup"])),
+    ]
+    points, _, missed, _ = residuals_section(pd.DataFrame(answers), pd.DataFrame({"cases": [4]})).items
+    assert points.sentences == (
+        "With nothing put there, a name was given in 1 of 2 records, and 0 were called unknown.",
+        "With physics put there, 1 of 2 were named exactly, 1 were among the explanations offered, and 1 got a wrong "
+        "name.",
+    )
+    assert missed.frame["said"].tolist() == ["Hysteresis", "Torsional windup"]
+    assert missed.frame["hidden"].tolist() == ["Nothing", "Hysteresis"]

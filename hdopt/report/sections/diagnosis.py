@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from hdopt.report import Figure, Item, KeyFigures, Report, Section, Table, Text
+from hdopt.report.cells import NAMES, UNITS
 from hdopt.report.sections.diagnosis_residual import extended_name, plain_numbers, residual_section
 from hdopt.report.sections.words import in_sentence, label, listed, short
 from hdopt.report.theme import BLUE, GREEN, GREY, figure
@@ -19,7 +20,7 @@ WAVE = re.compile(r"(amplitude|phase)_(\d+)_(?:um|deg|arcmin)$")
 LISTED_WAVES = 6
 """Waves up to which an effect's amplitudes and phases stand in the table; more are drawn."""
 
-NUMBERS = {"value": ".4g", "low": ".4g", "high": ".4g"}
+NUMBERS = {"value": ".4g", "low": ".4g", "high": ".4g", "error": NAMES, "parameter": NAMES, "nuisance": NAMES}
 
 
 def diagnosis_report(diagnosis: Diagnosis, names: Sequence[str]) -> Report:
@@ -108,7 +109,7 @@ def waves_figure(effect: str, waves: Mapping[int, Parameter]) -> Figure:
 def parameter_row(heading: str, name: str, parameter: Parameter) -> dict[str, object]:
     """One row of a table of parameters: `name` in the column `heading`, then value, interval and unit of the
     `parameter`; a pure number has no unit to show, an angle of which nothing is known no numbers."""
-    unit = "" if parameter.unit == "1" else parameter.unit
+    unit = "" if parameter.unit == "1" else UNITS.get(parameter.unit, parameter.unit)
     p = parameter
     value, low, high = (None, None, None) if p.undefined else (p.value, p.low, p.high)
     return {heading: name, "value": value, "low": low, "high": high, "unit": unit}
