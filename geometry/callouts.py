@@ -289,7 +289,7 @@ def _slot(part: Part, model: WaveGeneratorModel) -> Callout | None:
     slide = next((slide for slide in slides_of(model.parts) if slide.above is part), None)
     if slot is None or slide is None:
         return None
-    ends = f"ends R{slot.width / 2:g}, {2 * slot.reach:.4g} long" if slot.closed else "open at both ends"
+    ends = f"ends R{slot.width / 2:.5g}, {2 * slot.reach:.4g} long" if slot.closed else "open at both ends"
     lines = (
         f"slot {slot.width:g} {_limits((0.0, slide.zone))}, {slot.depth:g} {_limits(slide.depth_limits)} deep",
         f"from the back, {ends}; Ra 0.8",

@@ -1,7 +1,7 @@
 """The drawing of a wave generator: front view with dimensions, section A-A, exploded view, key dimensions, title block.
 
 Views and the section are taken from the solids, dimensions from the closed-form model. First-angle projection: the view
-from the left stands on the right. A3, lines of ISO 128, tolerance frames of ISO 1101.
+from the left stands on the right. A3, lines of ISO 128. Tolerance frames stand on the sheets of the parts.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from hdopt.files import JsonReady
 from hdopt.geometry.arcs import outline_of_slot, sample
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.contour import Circle
-from hdopt.geometry.dimensions import TILTS
 from hdopt.geometry.features import DBore, KeywayBore, polar
 from hdopt.geometry.part import Part, Prism, ProfiledPart
 from hdopt.geometry.sheet import SMALL, TEXT, Point, Sheet
@@ -50,6 +49,9 @@ VIEWS = (10.0, 14.0, 400.0, 168.0)
 
 PAPERWORK = "paperwork"
 """Name of the group that holds border, tables and title block."""
+
+CLEARANCE_CLASS = "H11"
+"""Of holes that pass the shaft."""
 
 FRONT: tuple[Vector, Vector] = ((0, 0, 1), (1, 0, 0))
 """Eye on +z, x to the right, y up."""
@@ -160,8 +162,7 @@ def _front_view(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], 
     sheet.dimension(place.point(0, low_y), place.point(0, high_y), left - 15, f"{tall}  (major axis)", True)
     wide = f"{high_x - low_x:.3f}"
     sheet.dimension(place.point(low_x, 0), place.point(high_x, 0), bottom + 27, f"{wide}  (minor axis)", False)
-    _profile_callout(sheet, place, carrier, job, high_x)
-    _bore_callout(sheet, place, parts, high_x, low_y)
+    _bore_callout(sheet, place, job, high_x, low_y)
     _bolt_callout(sheet, place, parts, low_x, high_y)
     if isinstance(carrier.contour, Circle):
         _disc_callout(sheet, place, carrier.contour)
@@ -183,39 +184,20 @@ def _cutting_plane(sheet: Sheet, place: Placed, low: float, high: float) -> None
         sheet.text((x - 8.5, end + 1.3), "A", 4.5, "end", bold=True)
 
 
-def _profile_callout(sheet: Sheet, place: Placed, carrier: ProfiledPart, job: Job, right: float) -> None:
-    """Tolerance frames of the profile: its form, and where its errors allow it to lie about the bore."""
-    angle = math.radians(52)
-    tip = _on_contour(carrier, angle)
-    x, y = place.point(*tip)
-    corner = (place.point(right, 0)[0] + 4, y - 17)
-    sheet.line((x, y), (corner[0] - 2, corner[1] + 2.8))
-    sheet.arrow((x, y), math.atan2(y - corner[1] - 2.8, x - corner[0] + 2))
-    sheet.line((corner[0] - 2, corner[1] + 2.8), (corner[0], corner[1] + 2.8))
-    zone = f"{job.model.profile_zone:g}"
-    sheet.frame(corner, "profile", zone, "B")
-    rows = {dimension.source: dimension.tolerance for dimension in job.dimensions}
-    if TILTS[0] in rows:
-        value = rows[TILTS[0]].removeprefix("parallelism ").replace(" over ", "/")
-        sheet.frame((corner[0], corner[1] + 5.6), "parallelism", value, "B")
+def _fit_of(job: Job, part: Part) -> str:
+    """Tolerance class of the bore of a `part`, as the limits on its own sheet have it."""
+    fit = job.model.plan.hole_of(part.name)
+    return CLEARANCE_CLASS if part.clearance_hole else fit.hole if fit is not None else ""
 
 
-def _on_contour(part: ProfiledPart, angle: float) -> Point:
-    """A point of a part's outline in the direction `angle`, clockwise from the major axis."""
-    contour = part.contour
-    if isinstance(contour, Circle):
-        return contour.radius * math.sin(angle), contour.offset + contour.radius * math.cos(angle)
-    x, y = contour.points(angle)[0].tolist()
-    return x, y
-
-
-def _bore_callout(sheet: Sheet, place: Placed, parts: Sequence[Part], right: float, bottom: float) -> None:
+def _bore_callout(sheet: Sheet, place: Placed, job: Job, right: float, bottom: float) -> None:
     """The bore that holds the shaft, where it is seen from the front; else the hole that clears it."""
-    sliding = next((part.bore for part in reversed(parts) if part.clearance_hole), None)
-    bore = sliding or parts[0].bore
+    parts = [part for part, _ in job.made]
+    seen = next((part for part in reversed(parts) if part.clearance_hole), parts[0])
+    bore = seen.bore
     if bore is None:
         return
-    lines = [f"⌀{2 * bore.radius:g} {'H13' if sliding else 'H7'}"]
+    lines = [f"⌀{2 * bore.radius:g} {_fit_of(job, seen)}"]
     if isinstance(bore, KeywayBore):
         depth = 2 * bore.radius + bore.key.hub_depth
         lines += [f"keyway {bore.key.width:g} JS9", f"{depth:g} +{bore.key.hub_depth_tolerance:g}/0 (d + t2)"]
@@ -267,8 +249,8 @@ def _section(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], job
     if high - low > 2 * half + 1e-6:
         sheet.dimension(place.point(low, bottom), place.point(high, bottom), line + 18, f"{high - low:g}", False)
     _edge_callouts(sheet, place, made, top)
-    _seat_dimension(sheet, place, [part for part, _ in made], high)
-    _holding_bore(sheet, place, [part for part, _ in made], low)
+    _seat_dimension(sheet, place, job, high)
+    _holding_bore(sheet, place, job, low)
 
 
 def _edge_callouts(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], top: float) -> None:
@@ -282,28 +264,28 @@ def _edge_callouts(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]
         sheet.leader(tip, (tip[0] + 8, tip[1] - 8), [f"{edge.axial:g} × {slope:.3g}°"])
 
 
-def _seat_dimension(sheet: Sheet, place: Placed, parts: Sequence[Part], right: float) -> None:
+def _seat_dimension(sheet: Sheet, place: Placed, job: Job, right: float) -> None:
     """Diameter of the hub's seat or of the hole for the shaft, on the right of the section."""
+    parts = [part for part, _ in job.made]
     top, bore = next(((part, part.bore) for part in reversed(parts) if part.bore), (parts[0], None))
     if bore is None or top is parts[0]:
         return
     radius = bore.radius
-    fit = "H13" if top.clearance_hole else "H7"
-    label = f"⌀{2 * radius:g} {fit}" + ("/h6" if parts[0].name == "hub" else "")
+    seat = job.model.plan.shaft_of("hub")
+    label = f"⌀{2 * radius:g} {_fit_of(job, top)}" + (f"/{seat.shaft}" if seat is not None else "")
     x = place.point(right, 0)[0] + 12
     sheet.dimension(place.point(top.top, -radius), place.point(top.top, radius), x, label, True)
 
 
-def _holding_bore(sheet: Sheet, place: Placed, parts: Sequence[Part], left: float) -> None:
-    """Diameter of the bore that holds the shaft, on the left of the section; it is datum B."""
-    held = next(((part.bottom, part.bore) for part in parts if part.bore and not part.clearance_hole), None)
-    if held is None:
+def _holding_bore(sheet: Sheet, place: Placed, job: Job, left: float) -> None:
+    """Diameter of the bore that holds the shaft, on the left of the section."""
+    held = next((part for part, _ in job.made if part.bore and not part.clearance_hole), None)
+    if held is None or held.bore is None:
         return
-    foot, bore = held
-    radius = bore.radius
+    foot, radius = held.bottom, held.bore.radius
     x = place.point(left, 0)[0] - 14
-    sheet.dimension(place.point(foot, -radius), place.point(foot, radius), x, f"⌀{2 * radius:g} H7", True)
-    sheet.datum((x, place.point(0, -radius)[1]), "B")
+    label = f"⌀{2 * radius:g} {_fit_of(job, held)}"
+    sheet.dimension(place.point(foot, -radius), place.point(foot, radius), x, label, True)
 
 
 def draw_exploded(
@@ -394,7 +376,7 @@ def _title_block(sheet: Sheet, job: Job, scale: float) -> None:
         if not isinstance(job.model.profiled[0].contour, Circle)
         else f"discs: {drive.wave_generator.bearing_thickness:g} mm inside the flexspline's inner wall at its tips",
         f"hdopt {job.identity.version}, study {job.identity.study}, fingerprint {job.identity.fingerprint}",
-        f"dimensions in mm; scale {ratio}; first-angle projection; ISO 8015; general tolerances ISO 2768-mK",
+        f"dimensions in mm; scale {ratio}; first-angle projection; ISO 8015; ISO 2768-1 m; ISO 22081",
     )
     for row, line in enumerate(lines):
         sheet.text((x + 4, y + 16 + 5.6 * row), line, SMALL + 0.2)

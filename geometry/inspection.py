@@ -9,11 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hdopt.files import JsonReady
+from hdopt.geometry.callouts import callouts_of
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.slides import slides_of
 
 if TYPE_CHECKING:
     from hdopt.geometry.job import Job
+
+SCANNED = 0.004
+"""Zones and outlines are scanned: where a wider instrument would do, this class of `INSTRUMENTS` measures them."""
 
 UNCERTAINTY_SHARE = 0.1
 """Expanded uncertainty of the instrument over the tolerance's width (the usual rule of one to ten; ISO 14253-1 decides
@@ -61,7 +65,8 @@ def inspection_plan(job: Job) -> tuple[Check, ...]:
     def add(part: str, feature: str, size: tuple[float, float, float] | None, zone: float | None, source: str) -> None:
         width = zone if zone is not None else (size[2] - size[1] if size else 0.0)
         uncertainty = float(f"{UNCERTAINTY_SHARE * width:.6g}")  # an instrument's, without the noise of the arithmetic
-        instrument = next(name for limit, name in INSTRUMENTS if uncertainty <= limit)
+        needed = uncertainty if zone is None and feature != "perimeter" else min(uncertainty, SCANNED)
+        instrument = next(name for limit, name in INSTRUMENTS if needed <= limit)
         nominal, low, high = size if size else (None, None, None)
         found.append(
             Check(
@@ -79,8 +84,8 @@ def inspection_plan(job: Job) -> tuple[Check, ...]:
             )
         )
 
-    for part in job.model.profiled:
-        add(part.name, "profile of the rim, all round at three heights", None, job.model.profile_zone, "ISO 1101")
+    for carrier in job.model.profiled:
+        add(carrier.name, "profile of the rim, all round at three heights", None, job.model.profile_zone, "ISO 1101")
     for row in job.dimensions:
         if row.nominal is not None and row.lower is not None and row.upper is not None:
             add(row.part, row.name, (row.nominal, row.nominal + row.lower, row.nominal + row.upper), None, row.source)
@@ -93,6 +98,12 @@ def inspection_plan(job: Job) -> tuple[Check, ...]:
         add(slide.below.name, "block upright", None, slide.zone, "clearances")
         if slide.below.slot is not None:
             add(slide.below.name, "block square to the slot", None, slide.squareness, "clearances")
+    for part in job.model.parts:
+        for callout in callouts_of(part, job.model) if not part.context else ():
+            for frame in callout.frames:
+                # Holes and keyways: what no budget and no slide has brought in.
+                if not any(row.part == part.name and row.zone_mm == frame.zone for row in found):
+                    add(part.name, f"{frame.symbol} of {callout.lines[0]}", None, frame.zone, "ISO 1101")
     return tuple(found)
 
 

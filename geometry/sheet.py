@@ -250,16 +250,6 @@ class Sheet:
             for shift in (-0.7, 0.7):
                 self.line((x + shift - 0.8, y + 1.7), (x + shift + 0.8, y - 1.7))
 
-    def datum(self, at: Point, letter: str, down: bool = True) -> None:
-        """A datum triangle at a point of an outline, with its letter in a box below or above."""
-        sign = 1 if down else -1
-        x, y = at
-        self.marks.append(Solid(np.array([(x - 1.5, y), (x + 1.5, y), (x, y + sign * 2.6)])))
-        self.line((x, y + sign * 2.6), (x, y + sign * 6))
-        low = y + sign * 6 if down else y - 11
-        self.polyline([(x - 2.5, low), (x + 2.5, low), (x + 2.5, low + 5), (x - 2.5, low + 5)], "thin", closed=True)
-        self.text((x, low + 3.7), letter, anchor="middle", bold=True)
-
     def table(
         self, at: Point, widths: Sequence[float], rows: Sequence[Sequence[str]], row_height: float = 4.7
     ) -> float:

@@ -14,9 +14,12 @@ from wave_generators import drive
 from hdopt.drive.geometry import Structure
 from hdopt.errors import HdoptError
 from hdopt.geometry import grinding
+from hdopt.geometry.callouts import callouts_of
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.contour import ParallelCurve
 from hdopt.geometry.export import export_drive
+from hdopt.geometry.inspection import inspection_plan
+from hdopt.geometry.job import make_job
 from hdopt.geometry.options import ExportOptions
 
 BOUNDS = {
@@ -125,6 +128,22 @@ def test_inspection_plan_holds_every_tolerance(structure, tmp_path):
     for row in rows:
         width = float(row["zone_mm"] or 0) or float(row["upper_mm"]) - float(row["lower_mm"])
         assert float(row["uncertainty_mm"]) == pytest.approx(width / 10, abs=1e-6) and int(row["points"]) >= 5
+
+
+@pytest.mark.parametrize("profile", ["ellipse", "two_disk"])
+@pytest.mark.parametrize("structure", list(Structure))
+def test_inspection_plan_holds_every_frame_and_no_micrometer_measures_a_zone(profile, structure):
+    job = make_job(drive(profile, structure), ExportOptions(), "x", BOUNDS)
+    plan = inspection_plan(job)
+    for part in job.model.parts:
+        for callout in callouts_of(part, job.model):
+            for frame in callout.frames:
+                # A disc's rim has its coaxiality in the budget, as the position about the hole.
+                assert any(row.part == part.name and row.zone_mm == frame.zone for row in plan), (part.name, frame)
+    for row in plan:
+        if row.zone_mm is not None or row.feature == "perimeter":
+            assert "micrometer" not in row.instrument and "caliper" not in row.instrument, row.feature
+    assert len({(row.part, row.feature) for row in plan}) == len(plan)
 
 
 def test_mating_sheet_spends_no_more_than_the_bounds(tmp_path):

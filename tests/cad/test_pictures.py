@@ -13,6 +13,7 @@ from hdopt.drive.geometry import Structure
 from hdopt.geometry import drawing, picture
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.export import export_drive
+from hdopt.geometry.job import make_job
 from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.views import section_at_minor_axis_zero, seen_from
 from hdopt.report.sections.geometry import geometry_section
@@ -43,6 +44,20 @@ def test_drawing_names_sizes_tolerances_and_assumptions(profile, structure, tmp_
     places = re.findall(r'<text x="([-\d.]+)" y="([-\d.]+)"', target.read_text(encoding="utf-8"))
     x, y = np.array(places, float).T
     assert (x.min(), y.min()) > (10, 10) and x.max() < 410 and y.max() < 287
+
+
+@pytest.mark.parametrize("profile", ["ellipse", "two_disk"])
+@pytest.mark.parametrize("structure", [Structure.INTEGRAL, Structure.AUTOMATIC])
+def test_fits_in_the_overview_are_those_of_the_limits(profile, structure):
+    """A bore that is H6 on its own sheet was H7 here, and a hole H11 was H13."""
+    job = make_job(drive(profile, structure), ExportOptions(), "x", BOUNDS)
+    said = re.findall(r">⌀([\d.]+) ([A-Z]\w+)(?:/(\w+))?<", drawing.draw(job))
+    limits = {
+        (round(row.nominal, 4), row.tolerance.split()[0]) for row in job.dimensions if row.nominal and row.tolerance
+    }
+    assert said
+    for size, hole, shaft in said:
+        assert (float(size), hole) in limits and (not shaft or (float(size), shaft) in limits)
 
 
 def test_section_of_a_cam_is_its_cut_face():
