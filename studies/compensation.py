@@ -46,10 +46,9 @@ def run_case(seed: int, effect: str, severity: float, drive: Drive) -> Case | No
     from hdopt.bench import cases
     from hdopt.bench.instrument import record
     from hdopt.bench.signal_chain import read_angles, read_error
-    from hdopt.compensation.path import path_of
     from hdopt.recordings.read import recording_from_table
-    from hdopt.recordings.rows import gather, neighbours_for
-    from hdopt.workflow.compensate import compensate
+    from hdopt.recordings.rows import gather
+    from hdopt.workflow.compensate import compensate, neighbours_of, said_of
 
     spec = cases.Spec("single" if effect else "nothing", seed, (effect,) if effect else (), severity)
     drawn = cases.simulate(spec, np.random.default_rng([seed, 7]))
@@ -67,10 +66,10 @@ def run_case(seed: int, effect: str, severity: float, drive: Drive) -> Case | No
     if len(truth) != len(fresh):
         assert fresh.time is not None, "every table of the bench has its time"
         truth = truth[np.searchsorted(table["time_s"].to_numpy(), fresh.time)]
-    neighbours = neighbours_for(seen)
+    neighbours = neighbours_of(seen)
     rows = gather([fresh], neighbours)
     left = gather([replace(fresh, error_arcmin=fresh.error_arcmin - truth)], neighbours)
-    after = rows.error - made.found.at(rows.theta, rows.theta / rows.ratio, path_of(rows, made.found.crossing_deg))
+    after = rows.error - said_of(made.found, rows)
     return Case(
         seed,
         effect,

@@ -20,10 +20,14 @@ if TYPE_CHECKING:
 @recording_options
 @click.option("-o", "output", metavar="FILE", type=OutputFile(), required=True, help="Where the table goes.")
 @click.option("--as", "form", type=click.Choice(["csv", "json", "c"]), help="By default what FILE ends with, else CSV.")
-@click.option("--terms", type=int, default=64, show_default=True, help="Coefficients at most; 0 for a table.")
+@click.option(
+    "--terms",
+    type=int,
+    help="Coefficients at most; 0 for a table. By default 64, or a table where these would not do.",
+)
 @answer_options
 def command(
-    given: RecordingOptions, output: Path, form: str | None, terms: int, json_file: Path | None, seed: int
+    given: RecordingOptions, output: Path, form: str | None, terms: int | None, json_file: Path | None, seed: int
 ) -> int:
     """What a controller can subtract from the output's position.
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from hdopt.arrays import Array, Index
 
-INPUT_CELLS, OUTPUT_CELLS = 192, 96
-"""Grid of a surface: 1.9 deg of the input, 3.75 deg of the output; straight lines in between are off by half a per cent
-of an amplitude of order 4."""
+COARSE, FINE = (192, 96), (384, 192)
+"""Grids of a surface. The coarse one has 1.9 deg of the input and 3.75 deg of the output: straight lines in between are
+off by half a per cent of an amplitude of order 4; the fine one, of half the steps, is for single teeth."""
 
 
 Spectrum: TypeAlias = tuple[Index, Index, NDArray[np.complex128]]
@@ -97,10 +97,9 @@ def spectrum_of(values: Array) -> Spectrum:
     return k[upper], j[upper], spectrum[upper]
 
 
-def grid_angles() -> tuple[Array, Array]:
-    """Input and output angles of the grid's points, both (n_input, n_output), rad."""
-    a = np.arange(INPUT_CELLS) * (2 * np.pi / INPUT_CELLS)
-    b = np.arange(OUTPUT_CELLS) * (2 * np.pi / OUTPUT_CELLS)
+def grid_angles(cells: tuple[int, ...] = COARSE) -> tuple[Array, Array]:
+    """Input and output angles of the points of a grid of `cells`, both (n_input, n_output), rad."""
+    a, b = (np.arange(count) * (2 * np.pi / count) for count in cells)
     inputs, outputs = np.meshgrid(a, b, indexing="ij")
     return np.asarray(inputs, float), np.asarray(outputs, float)
 
@@ -110,7 +109,7 @@ def surface_of(
 ) -> Surface:
     """The sum of `parts` on the grid, with a `base` already there (n_input, n_output); `back` half a return error and
     `crossing_deg` the output's travel over which it crosses."""
-    inputs, outputs = grid_angles()
+    inputs, outputs = grid_angles(COARSE if base is None else base.shape)
     values = np.zeros(inputs.shape) if base is None else np.asarray(base, float).copy()
     for part in parts:
         values += part.at(inputs.ravel(), outputs.ravel()).reshape(values.shape)

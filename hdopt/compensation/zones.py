@@ -7,18 +7,21 @@ leaves a tenth of the error's peak-to-peak.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.compensation.surface import Harmonics, Spectrum, Surface, grid_angles, spectrum_of, surface_of
-from hdopt.kinematics.cartesian import CartesianModel
+from hdopt.compensation.surface import COARSE, FINE, Harmonics, Spectrum, Surface, grid_angles, spectrum_of, surface_of
+from hdopt.compensation.teeth import Teeth
 
 LEAST = 1e-5
 """Harmonics below this part of the largest are not worth a line of the table."""
-ALONE = 1e3
-"""mm by which a zone is set back so that the other one drives."""
+MOST_TERMS = 64
+POINTS = 10_000
+"""Points of a grid at which forms are compared, about."""
+SMALL = 0.05
+"""Share of the peak-to-peak that is left anyway by which a form may be off."""
 
 
 @dataclass(frozen=True)
@@ -50,18 +53,12 @@ class Zones:
         return np.asarray(larger + self.rest.at(inputs, outputs, direction), float)
 
 
-def zone_values(model: CartesianModel, errors: Array, sense: float) -> Array:
-    """What each zone of `model` with `errors` (12,) mm would make if it drove alone, on the grid, arcmin, (2, n_input,
-    n_output), times `sense` (+1 or -1); the mean of the driving one is zero."""
-    inputs, outputs = grid_angles()
-    a, b = inputs.ravel(), (inputs + outputs).ravel()
-    rotation = np.stack([np.cos(a), np.sin(a), np.cos(b), np.sin(b)])
-    alone = [
-        model.evaluate_at(rotation, errors, np.array([[-ALONE * (zone == 1)], [-ALONE * (zone == 0)]]))[0]
-        for zone in (0, 1)
-    ]
-    values = np.stack(alone).reshape(2, *inputs.shape)
-    return np.asarray(sense * (values - values.max(axis=0).mean()), float)
+def zone_values(teeth: Teeth, cells: tuple[int, int] = COARSE) -> Array:
+    """What each zone of `teeth` would make if it drove alone, on a grid of `cells` over input and output angle,
+    arcmin, (2, n_input, n_output); the mean of the driving one is zero."""
+    inputs, outputs = grid_angles(cells)
+    values = teeth.zones(np.stack([inputs.ravel(), (inputs + outputs).ravel()])).reshape(2, *cells)
+    return np.asarray(values - driving(values, teeth.sense).mean(), float)
 
 
 def driving(values: Array, sense: float) -> Array:
@@ -83,7 +80,7 @@ def in_terms(values: Array, rest: Harmonics, sense: float, terms: int) -> Zones 
     least = max(float(sizes[min(left, len(sizes) - 1)]), LEAST * float(sizes[0]))
     zones = [_kept(spectrum, mean, least) for spectrum, mean in zip(spectra, means, strict=True)]
     two = Zones(zones[0], zones[1], rest, sense)
-    return two if _off(two, both) < _off(one, both) else one
+    return two if np.std(_off(two, both)) < np.std(_off(one, both)) else one
 
 
 def _kept(spectrum: Spectrum, mean: float, least: float) -> Harmonics:
@@ -97,6 +94,25 @@ def _kept(spectrum: Spectrum, mean: float, least: float) -> Harmonics:
     )
 
 
-def _off(found: Zones | Harmonics, surface: Surface) -> float:
-    inputs, outputs = grid_angles()
-    return float(np.std(found.at(inputs.ravel(), outputs.ravel()) - surface.values.ravel()))
+def _off(found: Zones | Harmonics | Surface, surface: Surface) -> Array:
+    """What `found` is off the `surface` (arcmin) at some of its points."""
+    inputs, outputs = grid_angles(surface.values.shape)
+    some = slice(0, None, max(1, surface.values.size // POINTS))
+    return found.at(inputs.ravel()[some], outputs.ravel()[some]) - surface.values.ravel()[some]
+
+
+def formed(teeth: Teeth, rest: Harmonics, terms: int | None, left: float) -> Zones | Harmonics | Surface:
+    """What a controller takes of `teeth` and the `rest`, which has the return error: at most `terms` harmonics, a table
+    where that is 0.
+
+    With None `MOST_TERMS`, but a table where so few would be off by more than `SMALL` of the peak-to-peak that is
+    `left` (arcmin) anyway; the finer of two grids where the coarser is.
+    """
+    fine = zone_values(teeth, FINE)
+    table = surface_of([rest], driving(fine, teeth.sense), rest.back, rest.crossing_deg)
+    if terms != 0:
+        found = in_terms(fine[:, ::2, ::2], rest, teeth.sense, MOST_TERMS if terms is None else terms)
+        if terms is not None or float(np.ptp(_off(found, table))) < SMALL * left:
+            return found
+    coarse = replace(table, values=table.values[::2, ::2])
+    return coarse if float(np.ptp(_off(coarse, table))) < SMALL * left else table

@@ -119,8 +119,12 @@ def met_angles(theta: Array, advance: float, beyond: Array) -> Array:
     `advance` is Z_CS/Z_FS; `beyond` (2, 2, n), rad, how far the deepest point lies beyond the zone's end of the major
     axis the way the wave generator turns, o and o' with the zone's sign.
     """
-    turned = np.stack([theta, advance * theta])[:, None, :]
-    angles: Array = turned + beyond + np.array([0.0, math.pi])[:, None]
+    return met_at(np.stack([theta, advance * theta]), beyond)
+
+
+def met_at(turned: Array, beyond: Array) -> Array:
+    """`met_angles`, with `beyond` as there, where the input and the flexspline's teeth have `turned` (2, n), rad."""
+    angles: Array = turned[:, None, :] + beyond + np.array([0.0, math.pi])[:, None]
     return angles
 
 

@@ -14,8 +14,9 @@ from hdopt.arrays import Array, Index, Mask
 from hdopt.compensation.path import AT_ONCE, crossing_of, half_return, path_of, paths_of, some_of
 from hdopt.compensation.pursuit import dictionary, independent_share, pursue
 from hdopt.compensation.surface import Harmonics, Surface, nothing, surface_of
+from hdopt.compensation.teeth import Teeth, fit_teeth
 from hdopt.compensation.writers import FORMATS, homing_arcmin, written
-from hdopt.compensation.zones import Zones, driving, in_terms, zone_values
+from hdopt.compensation.zones import MOST_TERMS, Zones, formed
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
 from hdopt.figures import drawn
@@ -34,13 +35,14 @@ if TYPE_CHECKING:
 
 Found = Harmonics | Zones | Surface
 
-MOST_TERMS = 64
 FOLDS = 4
 SURE = 2.0
 """Standard errors by which the held-out squares must fall for a compensation to be worth writing (one-sided 98 %)."""
 GROUPS_PER_BEAT = 8
 """Stretches an output turn over which held-out squares are taken together: neighbouring turns hang together."""
 RESAMPLES = 400
+ROWS_PER_TURN, MOST_ROWS = 128, 40_000
+"""Rows an input turn that show single teeth, and how many rows there may be for their sake."""
 NONE = "none"
 STRETCHES = "stretches of the one output turn"
 
@@ -167,14 +169,15 @@ def homing_words(homing: tuple[float, float]) -> str:
 def compensate(
     recordings: AnyRecordings,
     drive: AnyDrive = None,
-    terms: int = MOST_TERMS,
+    terms: int | None = None,
     seed: int = 1,
     files: Files | None = None,
 ) -> Compensated:
     """What to subtract, from `recordings` (files or records) of one drive.
 
     `drive`: its record, a study, a shipped name or the path of a study file; None leaves the model out and takes
-    harmonics alone. `terms` coefficients at most, 0 for a table over both angles. `seed` for fits and resampling.
+    harmonics alone. `terms` coefficients at most, 0 for a table over both angles; None for 64, or a table
+    where these would be off by more than a twentieth of what is left anyway. `seed` for fits and resampling.
     `files` to write, where it is worth it: {"csv": PATH}, {"json": PATH} or {"c": PATH}. Raises `HdoptError` where
     nothing moves or `terms` is out of range, and before any work where a file cannot be written.
     """
@@ -192,14 +195,14 @@ def write_compensation(made: Compensated, files: Mapping[str, Path]) -> None:
             write_text(path, written(made.found, form, made.facts()))
 
 
-def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms: int, seed: int) -> Compensated:
+def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms: int | None, seed: int) -> Compensated:
     """The compensation from the records of `recordings`; `drive`, `terms`, `seed` and errors as for `compensate`."""
-    if not 0 <= terms <= MOST_TERMS:
+    if terms is not None and not 0 <= terms <= MOST_TERMS:
         raise HdoptError(f"--terms is {terms}; give 1 to {MOST_TERMS} coefficients, or 0 for a table")
     moving = [r for r in recordings if not r.input_locked]
     if not moving:
         raise HdoptError("the input is locked in every recording; a compensation needs recordings that turn")
-    rows = gather(moving, neighbours_for(moving))
+    rows = gather(moving, neighbours_of(moving))
     sign: tuple[float, ...] = (1.0, -1.0)
     whole: WaveformFit | None = None
     if drive is not None:
@@ -215,7 +218,7 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
     found = _candidates(rows, whole, terms, paths)[method]
     worth, evidence = _worth(before, nested, rows)
     # Parts of one recording are extrapolated in angle when held out; a fresh run over the same angles is not.
-    again = _centred(rows.error - _at(found, rows), rows, np.zeros_like(fold))
+    again = _centred(rows.error - said_of(found, rows), rows, np.zeros_like(fold))
     predicted, low, high = _predicted(again if rows.records == 1 else trials[method], rows, seed)
     ways = {"forward": 1.0, "backward": -1.0} if rows.reverses else {}
     return Compensated(
@@ -239,7 +242,10 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
 
 
 def _trials(
-    split: tuple[Rows, Index], terms: int, paths: Mapping[float, Array], fit: Callable[[Rows], WaveformFit | None]
+    split: tuple[Rows, Index],
+    terms: int | None,
+    paths: Mapping[float, Array],
+    fit: Callable[[Rows], WaveformFit | None],
 ) -> dict[str, Array]:
     """What each way leaves (n,) on every part, fitted to the others; `split` is the rows and the part of each."""
     rows, fold = split
@@ -248,8 +254,18 @@ def _trials(
         train, test = _rows(rows, fold != k), fold == k
         for name, found in _candidates(train, fit(train), terms, some_of(paths, fold != k)).items():
             left = trials.setdefault(name, np.full(len(rows), np.nan))
-            left[test] = rows.error[test] - _at(found, rows)[test]
+            left[test] = rows.error[test] - said_of(found, rows)[test]
     return {name: _centred(left, rows, fold) for name, left in trials.items()}
+
+
+def neighbours_of(recordings: Sequence[Recording]) -> int:
+    """How many neighbouring samples of these `recordings` make a row: fewer than elsewhere, where a record of no more
+    than `MOST_ROWS` rows can so show single teeth."""
+    samples = sum(len(recording) for recording in recordings)
+    turns = sum(float(np.abs(np.diff(recording.input_angle)).sum()) / TURN for recording in recordings)
+    usual = neighbours_for(recordings)
+    fewer = max(1, min(usual, int(samples / max(turns, 1.0) / ROWS_PER_TURN)))
+    return fewer if samples / fewer <= MOST_ROWS else usual
 
 
 def _folds(rows: Rows) -> tuple[Index, str]:
@@ -272,7 +288,9 @@ def _rows(rows: Rows, mask: Mask) -> Rows:
     return replace(part, record=np.unique(part.record, return_inverse=True)[1])
 
 
-def _candidates(rows: Rows, fit: WaveformFit | None, terms: int, paths: Mapping[float, Array]) -> dict[str, Found]:
+def _candidates(
+    rows: Rows, fit: WaveformFit | None, terms: int | None, paths: Mapping[float, Array]
+) -> dict[str, Found]:
     """Every way to compensate, fitted to `rows`, in the form that will be written; `paths` are those that the return
     error may take along them."""
     angles = (rows.theta, rows.theta / rows.ratio)
@@ -286,17 +304,22 @@ def _candidates(rows: Rows, fit: WaveformFit | None, terms: int, paths: Mapping[
     path = paths.get(crossing)
     if crossing:
         alone = replace(pursue(angles, rows.error, zeros, path, pairs, most), crossing_deg=crossing)
-    made: dict[str, Found] = {"harmonics": alone if terms else surface_of([alone], None, alone.back, crossing)}
+    made: dict[str, Found] = {"harmonics": surface_of([alone], None, alone.back, crossing) if terms == 0 else alone}
     if fit is None:
         return made
-    left = rows.error - fit.predict(rows.theta)
-    rest = pursue(angles, left, zeros, path, pairs, most // 2)
-    back = 0.0 if path is None else half_return(left, zeros, path)
-    values = zone_values(fit.model, fit.errors, fit.sign)
-    for name, part in {"model": nothing(back), "model and harmonics": rest}.items():
-        part = replace(part, crossing_deg=crossing)
-        base = driving(values, fit.sign)
-        made[name] = in_terms(values, part, fit.sign, terms) if terms else surface_of([part], base, part.back, crossing)
+    free = zeros if path is None else np.column_stack([zeros, path])
+    bare = Teeth.bare(fit.model, fit.errors, fit.sign)
+    teeth = fit_teeth(rows, free, bare, np.diag(fit.covariance))
+    count = round(rows.averaged)
+    for name, one in {"model": bare, "model and harmonics": bare, "model, teeth and harmonics": teeth}.items():
+        left = rows.error - one.at(rows.theta)
+        rest = nothing(0.0 if path is None else half_return(left, zeros, path))
+        if one is teeth or name != "model":
+            rest = pursue(angles, left, zeros, path, pairs, most // 2)
+        rest = replace(rest, crossing_deg=crossing)
+        made[name] = formed(
+            one.sharpened(TURN / rows.rows_per_turn, count), rest, terms, float(np.ptp(left - rest.at(*angles)))
+        )
     return made
 
 
@@ -309,9 +332,16 @@ def _crossing(left: Array, zeros: Array, paths: Mapping[float, Array]) -> float:
     return crossing_of(left, zeros, paths, independent_share(rest))
 
 
-def _at(found: Found, rows: Rows) -> Array:
-    """What `found` says of all `rows` (n,): the path since a reversal needs those before."""
-    return found.at(rows.theta, rows.theta / rows.ratio, path_of(rows, found.crossing_deg))
+def said_of(found: Found, rows: Rows) -> Array:
+    """What `found` says of all `rows` (n,), means of samples as they are: the path since a reversal needs those
+    before."""
+    count = max(1, round(rows.averaged))
+    apart = TURN / rows.rows_per_turn / count
+    value = found.back * path_of(rows, found.crossing_deg)
+    for place in range(count):
+        theta = rows.theta + (place - (count - 1) / 2) * apart
+        value = value + found.at(theta, theta / rows.ratio) / count
+    return value
 
 
 def _centred(values: Array, rows: Rows, fold: Index) -> Array:

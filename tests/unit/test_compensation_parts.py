@@ -12,6 +12,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from hdopt.compensation.pursuit import dictionary, pursue
 from hdopt.compensation.surface import Harmonics, nothing, surface_of
+from hdopt.compensation.teeth import Teeth
 from hdopt.compensation.writers import written
 from hdopt.compensation.zones import Zones, driving, in_terms, zone_values
 from hdopt.drive.errors import DriveErrors
@@ -138,7 +139,7 @@ def test_kinks_where_the_driving_zone_changes_are_kept_by_few_terms(mirrored):
     sense = -1.0 if mirrored else 1.0
     theta = np.arange(80 * 90) * 2 * np.pi / 90
     true = sense * model.evaluate(theta, errors)[0]
-    values = zone_values(model, errors, sense)
+    values = zone_values(Teeth.bare(model, errors, sense))
     found = in_terms(values, nothing(), sense, 64)
     one = surface_of([], driving(values, sense)).harmonics(64)
     left = [np.ptp(true - each.at(theta, theta / 80)) for each in (found, one)]
