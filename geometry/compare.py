@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -13,11 +12,14 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError
-from hdopt.files import read_text
+from hdopt.files import cells_of, read_text
 from hdopt.geometry.contour import Circle, Contour
 
 POLAR, CARTESIAN = ("angle_deg", "radius_mm"), ("x_mm", "y_mm")
 FEWEST_POINTS = 16
+MOST_PREAMBLE = 100
+"""Lines of a measuring machine's own words in which the names of the columns are looked for."""
+
 LARGEST_GAP = math.radians(30)
 FitMethod = Literal["least_squares", "minimum_zone"]
 MOST_PROGRAMMES, SETTLED = 20, 1e-9
@@ -64,23 +66,25 @@ def read_cam(path: Path) -> Array:
     """Points (n, 2), mm, of a CSV at `path` with columns angle_deg,radius_mm (clockwise from the major axis) or
     x_mm,y_mm.
 
-    `#` starts a comment; further columns are left alone. Raises `HdoptError` with the line of what cannot be used.
+    `#` starts a comment; further columns, and what a machine says above the line of names, are left alone. Cells are
+    parted by commas, or by semicolons or tabs, between which numbers may have a decimal comma. Raises `HdoptError` with
+    the line of what cannot be used.
     """
     lines = [
         (number, line)
-        for number, line in enumerate(read_text(path, "a CSV of a measured cam").splitlines(), 1)
+        for number, line in enumerate(read_text(path, "a CSV of a measured cam", foreign=True).splitlines(), 1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
-    header = [cell.strip() for cell in next(csv.reader([lines[0][1]]))] if lines else []
-    kind = next((names for names in (POLAR, CARTESIAN) if set(names) <= set(header)), None)
-    if kind is None:
-        raise HdoptError(
-            f"{path}: its first line must name the columns {','.join(POLAR)} or {','.join(CARTESIAN)}; add it"
-        )
+    first, header, kind = _header(path, lines)
     columns = [header.index(name) for name in kind]
     values = []
-    for number, line in lines[1:]:
-        cells = next(csv.reader([line]))
+    for number, line in lines[first + 1 :]:
+        cells = cells_of(line)
+        if any(cell.strip() for cell in cells[len(header) :]):
+            raise HdoptError(
+                f"{path}, line {number}: holds {len(cells)} cells under {len(header)} names; does a decimal comma "
+                "stand where a comma separates? part the cells by semicolons"
+            )
         try:
             row = [float(cells[column]) for column in columns]
         except (ValueError, IndexError):
@@ -95,6 +99,16 @@ def read_cam(path: Path) -> Array:
         return table
     angle = np.radians(table[:, 0])
     return np.column_stack([table[:, 1] * np.sin(angle), table[:, 1] * np.cos(angle)])
+
+
+def _header(path: Path, lines: Sequence[tuple[int, str]]) -> tuple[int, list[str], tuple[str, str]]:
+    """Which of the `lines`, (number, text), names the columns; all its names, and the two that are wanted."""
+    for index, (_, line) in enumerate(lines[:MOST_PREAMBLE]):
+        header = [cell.strip() for cell in cells_of(line)]
+        for names in (POLAR, CARTESIAN):
+            if set(names) <= set(header):
+                return index, header, names
+    raise HdoptError(f"{path}: a line must name the columns {','.join(POLAR)} or {','.join(CARTESIAN)}; add it")
 
 
 def fit_cam(points: Array, contour: Contour, probe_radius: float = 0.0, method: FitMethod = "least_squares") -> CamFit:

@@ -7,6 +7,8 @@ written to as it is.
 
 from __future__ import annotations
 
+import codecs
+import csv
 import json
 import math
 import os
@@ -122,8 +124,11 @@ def note_input(path: Path, content: bytes | None = None) -> None:
         work.inputs[real] = hashlib.sha256(content).hexdigest()
 
 
-def read_text(path: Path, wanted: str) -> str:
-    """The text of the UTF-8 file `path`; `wanted` says in messages what to give instead, as 'a study file'."""
+def read_text(path: Path, wanted: str, foreign: bool = False) -> str:
+    """The text of the UTF-8 file `path`; `wanted` says in messages what to give instead, as 'a study file'.
+
+    A `foreign` file, that an instrument or a spreadsheet wrote, may also be UTF-16 with its mark, or Windows-1252.
+    """
     try:
         with open(path, "rb") as file:
             content = file.read(LARGEST_TEXT + 1)
@@ -132,10 +137,28 @@ def read_text(path: Path, wanted: str) -> str:
     if len(content) > LARGEST_TEXT:
         raise HdoptError(f"{path} is larger than {LARGEST_TEXT // 2**20} MiB; give {wanted}")
     note_input(path, content)
+    utf_16 = foreign and content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:
-        return content.decode("utf-8-sig")
+        return content.decode("utf-16" if utf_16 else "utf-8-sig")
     except UnicodeDecodeError as error:
+        with suppress(UnicodeDecodeError):
+            if foreign and not utf_16:
+                return content.decode("cp1252")
         raise HdoptError(f"{path} is not a text file (byte {error.start} is not UTF-8); give {wanted}") from error
+
+
+DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*")
+
+
+def cells_of(line: str) -> list[str]:
+    """The cells of a `line` of a CSV, cut at semicolons, else at tabs, else at commas, with a point in each number that
+    has a decimal comma."""
+    separator = next((mark for mark in ";\t" if mark in line), ",")
+    try:
+        (cells,) = csv.reader([line], delimiter=separator)
+    except (csv.Error, ValueError):  # a cell beyond all limits, or a line without any
+        cells = line.split(separator)
+    return [cell.replace(",", ".") if DECIMAL_COMMA.fullmatch(cell) else cell for cell in cells]
 
 
 def read_json(path: Path, wanted: str) -> Any:

@@ -55,8 +55,9 @@ def command(cam: str, study: str | None, drive: str | None, overrides: tuple[str
     """A measured cam against the one that the study designs: best fit, deviations, verdict.
 
     CAM.csv has the columns angle_deg,radius_mm (clockwise from the major axis) or x_mm,y_mm: the cam's surface, or the
-    centre of a ball with --probe-radius-mm. Exit status 1 says that a point lies outside the profile's tolerance zone.
-    The study that --write-study writes goes to `hdopt ke` and `hdopt stack`.
+    centre of a ball with --probe-radius-mm. Between semicolons or tabs, numbers may have decimal commas. Exit status 1
+    says that a point lies outside the profile's tolerance zone. The study that --write-study writes goes to `hdopt ke`
+    and `hdopt stack`.
     """
     from hdopt.workflow.compare import compare, write_comparison
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from hdopt.arrays import Array
 from hdopt.drive.values import DriveError, require, require_positive
 from hdopt.errors import HdoptError, shown
-from hdopt.files import read_text
+from hdopt.files import cells_of, read_text
 
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(64)
 
@@ -338,20 +338,20 @@ class MeasuredProfile:
 def read_polar(path: Path, what: str) -> tuple[Array, Array]:
     """Angles (rad) and radii (mm) from the CSV file `path` of rows angle_deg, radius_mm, (n,) each, as they stand.
 
-    A header line is optional, `#` starts a comment. Raises `DriveError` that names `what`, file and line.
+    A header line is optional, `#` starts a comment; between semicolons or tabs, numbers may have a decimal comma.
+    Raises `DriveError` that names `what`, file and line.
     """
     try:
-        text = read_text(path, "a CSV text file")
+        text = read_text(path, "a CSV text file", foreign=True)
     except HdoptError as error:
         raise DriveError(f"{what} {path}: cannot be read ({error})") from error
     points: list[tuple[float, float]] = []
     header_allowed = True
     for number, line in enumerate(text.splitlines(), 1):
-        row = line.split(",")
-        if not line.strip() or row[0].lstrip().startswith("#"):
+        if not line.strip() or line.lstrip().startswith("#"):
             continue
         try:
-            angle, radius = (float(cell) for cell in row)
+            angle, radius = (float(cell) for cell in cells_of(line))
         except ValueError:
             require(
                 header_allowed,

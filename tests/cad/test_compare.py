@@ -13,8 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hdopt.cli import main
+from hdopt.drive.profiles import read_polar
 from hdopt.errors import HdoptError
-from hdopt.geometry.compare import fit_cam
+from hdopt.geometry.compare import fit_cam, read_cam
 from hdopt.geometry.contour import Circle, ParallelCurve
 from hdopt.study import load_study
 from hdopt.workflow.compare import compare, write_measured_study
@@ -184,9 +185,11 @@ def test_a_study_that_cannot_be_written_leaves_no_table_behind(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("1,2\n", "its first line must name the columns angle_deg,radius_mm or x_mm,y_mm"),
+        ("1,2\n", "a line must name the columns angle_deg,radius_mm or x_mm,y_mm"),
         ("angle_deg,radius_mm\n1,2\n3,x\n", "line 3: does not hold angle_deg and radius_mm as numbers"),
         ("angle_deg,radius_mm\n1,nan\n", "line 2: holds a number that is not finite"),
+        ("angle_deg,radius_mm\n0,5,28,05\n", "line 2: holds 4 cells under 2 names; does a decimal comma stand"),
+        ("angle_deg;radius_mm\n0,5;1.028,05\n", "line 2: does not hold angle_deg and radius_mm as numbers"),
         ("angle_deg,radius_mm\n1,28\n", "has 1 points; at least 16 are needed"),
         (
             "angle_deg,radius_mm\n" + "".join(f"{i},28\n" for i in range(180)),
@@ -201,3 +204,24 @@ def test_unusable_measurements_are_refused(text, message, tmp_path, capsys):
     (tmp_path / "cam.csv").write_text(text)
     code, said = run(capsys, tmp_path / "cam.csv")
     assert code == 2 and re.search(message, said.err), said.err
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_files_of_german_machines_say_the_same(encoding, separator, tmp_path):
+    """Decimal commas, words above the names, a further column, Windows' encoding; as a study's measured profile too."""
+    points = measured(error=lambda t: 0.003 * np.cos(5 * t), points=90)
+    angle, radius = np.degrees(np.arctan2(*points.T)) % 360, np.hypot(*points.T)
+    plain, german = tmp_path / "plain.csv", tmp_path / "german.csv"
+    rows = [(f"{a:.6f}", f"{r:.6f}", "1.5") for a, r in zip(angle, radius, strict=True)]
+    names = ("angle_deg", "radius_mm", "force_n")
+    plain.write_text("\n".join(",".join(row) for row in (names, *rows)))
+    lines = ["Prüfer: Müller, Raum 3", *(separator.join(row).replace(".", ",") for row in (names, *rows))]
+    german.write_bytes("\r\n".join(lines).encode(encoding))
+    assert read_cam(german).tolist() == read_cam(plain).tolist()
+    own = tmp_path / "own.csv"
+    own.write_bytes("\r\n".join(separator.join(row[:2]).replace(".", ",") for row in rows).encode(encoding))
+    assert [column.tolist() for column in read_polar(own, "cam")] == [
+        np.radians([float(row[0]) for row in rows]).tolist(),
+        [float(row[1]) for row in rows],
+    ]
