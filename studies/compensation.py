@@ -78,7 +78,7 @@ def run_case(seed: int, effect: str, severity: float, drive: Drive) -> Case | No
         float(np.ptp(rows.error)),
         float(np.ptp(after)),
         float(np.ptp(left.error)),
-        made.predicted,
+        made.recordings[-1].expected,
     )
 
 
@@ -118,6 +118,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     parser = argparse.ArgumentParser(prog="python -m hdopt.studies.compensation", description=__doc__)
     parser.add_argument("--cases", type=int, default=60)
+    parser.add_argument("--skip", type=int, default=0, help="Leave out so many cases of the list's beginning.")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", default="compensation.csv", help="One line a case; cases that stand there are kept.")
     options = parser.parse_args(arguments)
@@ -128,7 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         kept = pd.DataFrame()
     rows = kept.to_dict("records")
     done = {int(row["seed"]) for row in rows}
-    for seed, effect, severity in plan(options.seed, options.cases):
+    for seed, effect, severity in plan(options.seed, options.skip + options.cases)[options.skip :]:
         if seed in done:
             continue
         case = run_case(seed, effect, severity, drive)

@@ -60,7 +60,7 @@ def _lines(found: Compensated, output: Path) -> Iterator[str]:
     if len(found.recordings) > 1:
         for part in found.recordings:
             speed = "" if part.speed_rpm is None else f" at {part.speed_rpm:.4g} r/min"
-            yield f"  {part.name}{speed}: {part.before:.4g} -> {part.after:.4g} arcmin"
+            yield f"  {part.name}{speed}: {part.before:.4g} -> {part.after:.4g} arcmin, expect {part.expected:.4g}"
     for warning in found.warnings:
         yield f"note: {warning}"
     if found.worth:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any  # Any: values of JSON
 import numpy as np
 
 from hdopt.arrays import Array, Index, Mask
+from hdopt.compensation.expected import NORMAL, peak_to_peak_again
 from hdopt.compensation.path import AT_ONCE, crossing_of, half_return, path_of, paths_of, some_of
 from hdopt.compensation.pursuit import dictionary, independent_share, pursue
 from hdopt.compensation.surface import Harmonics, Surface, nothing, surface_of
@@ -40,7 +41,6 @@ SURE = 2.0
 """Standard errors by which the held-out squares must fall for a compensation to be worth writing (one-sided 98 %)."""
 GROUPS_PER_BEAT = 8
 """Stretches an output turn over which held-out squares are taken together: neighbouring turns hang together."""
-RESAMPLES = 400
 ROWS_PER_TURN, MOST_ROWS = 128, 40_000
 """Rows an input turn that show single teeth, and how many rows there may be for their sake."""
 NONE = "none"
@@ -49,12 +49,14 @@ STRETCHES = "stretches of the one output turn"
 
 @dataclass(frozen=True)
 class PerRecording:
-    """Held-out peak-to-peak (arcmin) of one recording at its usual input speed (r/min, None without a clock)."""
+    """Held-out peak-to-peak (arcmin) of one recording at its usual input speed (r/min, None without a clock), and what
+    to expect of a fresh one under its conditions."""
 
     name: str
     speed_rpm: float | None
     before: float
     after: float
+    expected: float
 
 
 @dataclass(frozen=True)
@@ -125,8 +127,8 @@ class Compensated(ShownAsTable):
         """One row a recording: held-out peak-to-peak without and with the compensation."""
         import pandas as pd
 
-        rows = [(part.name, part.speed_rpm, part.before, part.after) for part in self.recordings]
-        columns = ["recording", "speed_rpm", "before_arcmin", "after_arcmin"]
+        rows = [(part.name, part.speed_rpm, part.before, part.after, part.expected) for part in self.recordings]
+        columns = ["recording", "speed_rpm", "before_arcmin", "after_arcmin", "expected_arcmin"]
         return pd.DataFrame(rows, columns=columns)
 
     def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
@@ -219,7 +221,10 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
     worth, evidence = _worth(before, nested, rows)
     # Parts of one recording are extrapolated in angle when held out; a fresh run over the same angles is not.
     again = _centred(rows.error - said_of(found, rows), rows, np.zeros_like(fold))
-    predicted, low, high = _predicted(again if rows.records == 1 else trials[method], rows, seed)
+    left = again if rows.records == 1 else trials[method]
+    rng = np.random.default_rng(seed)
+    each = [peak_to_peak_again(left[rows.record == n], rows.block[rows.record == n], rng) for n in range(rows.records)]
+    predicted, low, high = _predicted(each)
     ways = {"forward": 1.0, "backward": -1.0} if rows.reverses else {}
     return Compensated(
         found,
@@ -232,7 +237,7 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
         low,
         high,
         {name: float(np.ptp(nested[rows.direction == way])) for name, way in ways.items()},
-        _per_recording(moving, rows, before, nested),
+        _per_recording(moving, rows, (before, nested), each),
         held_out,
         {NONE: float(np.std(before))} | {name: float(np.std(left)) for name, left in trials.items()},
         homing_arcmin(found, rows.ratio),
@@ -277,7 +282,9 @@ def _folds(rows: Rows) -> tuple[Index, str]:
         return np.asarray(beat % FOLDS, np.int64), "output turns"
     passes = np.r_[0, np.cumsum(np.diff(rows.direction) != 0)]
     if passes.max() >= 3:
-        return np.asarray(passes // 2 % FOLDS, np.int64), "reversals"
+        # By length, so that no part holds all that reaches round the output.
+        rank = np.argsort(np.argsort(-np.bincount(passes), kind="stable"), kind="stable")
+        return np.asarray(rank[passes] % FOLDS, np.int64), "reversals"
     order = (rows.theta - rows.theta.min()) / max(float(np.ptp(rows.theta)), 1e-9)
     return np.asarray(np.minimum((order * FOLDS).astype(int), FOLDS - 1), np.int64), STRETCHES
 
@@ -374,36 +381,23 @@ def _worth(before: Array, after: Array, rows: Rows) -> tuple[bool, float]:
     return evidence > SURE, min(evidence, 1e6)
 
 
-def _predicted(left: Array, rows: Rows, seed: int) -> tuple[float, float, float]:
-    """Peak-to-peak to expect of a fresh recording of this length, with a 95 % interval.
-
-    The mean over the recordings of what is `left` in each; the interval resamples whole input turns, each with its own
-    extremes.
-    """
-    rng = np.random.default_rng(seed)
-    values, variance = [], 0.0
-    for number in range(rows.records):
-        mask = rows.record == number
-        values.append(float(np.ptp(left[mask])))
-        _, block = np.unique(rows.block[mask], return_inverse=True)
-        high, low = np.full(block.max() + 1, -np.inf), np.full(block.max() + 1, np.inf)
-        np.maximum.at(high, block, left[mask])
-        np.minimum.at(low, block, left[mask])
-        draws = rng.integers(len(high), size=(RESAMPLES, len(high)))
-        # A resampled extreme never exceeds the sample's: its spread is right, its place is not.
-        variance += float(np.var(high[draws].max(axis=1) - low[draws].min(axis=1))) / rows.records
-    value, spread = float(np.mean(values)), math.sqrt(variance)
-    return value, max(value - 1.96 * spread, 0.0), value + 1.96 * spread
+def _predicted(each: Sequence[tuple[float, float]]) -> tuple[float, float, float]:
+    """Peak-to-peak to expect of a fresh recording of this length, with a 95 % interval: the mean over the recordings,
+    of `each` of which value and standard deviation are known."""
+    value = float(np.mean([value for value, _ in each]))
+    spread = NORMAL * math.sqrt(float(np.mean([spread**2 for _, spread in each])))
+    return value, max(value - spread, 0.0), value + spread
 
 
 def _per_recording(
-    recordings: Sequence[Recording], rows: Rows, before: Array, after: Array
+    recordings: Sequence[Recording], rows: Rows, held_out: tuple[Array, Array], each: Sequence[tuple[float, float]]
 ) -> tuple[PerRecording, ...]:
     found = []
     for number, recording in enumerate(recordings):
         mask = rows.record == number
         speed = None if rows.speed is None else float(np.median(np.abs(rows.speed[mask]))) * 60 / TURN
-        found.append(PerRecording(recording.name, speed, float(np.ptp(before[mask])), float(np.ptp(after[mask]))))
+        before, after = (float(np.ptp(left[mask])) for left in held_out)
+        found.append(PerRecording(recording.name, speed, before, after, each[number][0]))
     return tuple(found)
 
 

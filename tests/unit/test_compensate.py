@@ -20,7 +20,7 @@ from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.rows import gather
 from hdopt.study import load_study
-from hdopt.workflow.compensate import _worth, compensate
+from hdopt.workflow.compensate import _folds, _worth, compensate
 
 RATIO, TURN, NOISE = 80.0, 2 * np.pi, 0.01
 ERRORS = DriveErrors(
@@ -235,3 +235,16 @@ def test_a_fall_within_chance_is_not_worth_a_file():
     assert not _worth(before, after, rows)[0]
     steady = np.sqrt(0.8 + 0.05 * (stretch % 2))
     assert _worth(before, steady, rows)[0]
+
+
+def test_no_part_holds_all_that_reaches_round_the_output():
+    """Three short strokes, then a long one there and back: with the long ones held out together the fit would know a
+    tenth of the output's turn, and the model would lose against harmonics for that alone."""
+    ends = np.cumsum([0, 3, -3, 4, -4, 60, -60]) * TURN
+    theta = np.concatenate([np.arange(a, b, np.sign(b - a) * TURN / 40) for a, b in itertools.pairwise(ends)])
+    frame = pd.DataFrame({"input_angle_deg": np.degrees(theta), "output_angle_deg": np.degrees(theta) / RATIO})
+    rows = gather([recording_from_table(frame, RATIO)])
+    fold, name = _folds(rows)
+    assert name == "reversals"
+    for k in range(fold.max() + 1):
+        assert np.ptp(rows.theta[fold != k]) > 59 * TURN
