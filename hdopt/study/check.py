@@ -112,6 +112,8 @@ def _fault(fault: ErrorDetails, document: Document, section: str) -> str:
     hint = _number_hint(value) if kind in ("float_type", "int_type", "float_parsing", "int_parsing") else None
     if hint is not None:
         return f"{where}: is {value!r}; {hint}"
+    if kind in ("less_than", "less_than_equal") and 1 in fault["ctx"].values() and 1 < value <= 100:
+        return f"{where}: is {value!r}, in per cent as it seems; it is a share: write {value / 100:.6g}"
     if kind in KINDS:
         return f"{where}: is {value!r}; it must be {KINDS[kind]}"
     message = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")

@@ -10,13 +10,15 @@ from typing import Any  # Any: what a study file holds, of TOML's several kinds
 from hdopt.study.document import Document, Keys, leaves
 
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+EXAMPLE = re.compile(r"\b(?:such as|as in|for example)\b[^;]*")
+"""What a message shows for its reader to write: numbers there are nobody's."""
 COMMON = 100
 """Whole numbers up to this stand in many a message and many a study: they are taken only beside their key's name."""
 
 
 def numbers_in(message: str) -> set[float]:
-    """The numbers that stand in `message`; a comma or a full stop that follows is none of them."""
-    return {float(found) for found in NUMBER.findall(message)}
+    """The numbers that stand in `message`, but in its examples; a comma or a full stop that follows is none of them."""
+    return {float(found) for found in NUMBER.findall(EXAMPLE.sub("", message))}
 
 
 def shows(message: str, value: Any, name: str) -> bool:

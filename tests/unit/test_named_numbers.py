@@ -90,3 +90,15 @@ def test_a_message_about_a_section_gets_file_and_line(tmp_path):
     text = 'drive = "csf-25-80"\n\n[tolerances.axis_tilt_y_deg]\ndistribution = "normal"\nmean = 300\nstd = 0.05\n'
     with pytest.raises(HdoptError, match=r"s\.toml, line 3: \[tolerances\] axis_tilt_y_deg: truncation"):
         hdopt.stack(study_file(tmp_path, text + "lower = -0.2\nupper = 0.2\n"), 2048)
+
+
+def test_an_example_in_a_message_is_no_value_of_the_study():
+    """Would catch 'b = 0.01', shown for the reader to write, taken for the study's eccentricity of 0.01 mm."""
+    with pytest.raises(HdoptError, match="^allocate needs costs"):
+        hdopt.allocate("csf-25-80")
+
+
+@pytest.mark.parametrize("given", ["99.73", "95"])
+def test_a_share_in_per_cent_is_answered_with_the_share(given):
+    with pytest.raises(HdoptError, match=rf"in per cent as it seems; it is a share: write {float(given) / 100:g}$"):
+        hdopt.stack(hdopt.load_study("csf-25-80", [f"requirement.yield={given}"]))
