@@ -56,7 +56,7 @@ class Column:
         return max((len(cell) for cell in self.cells), default=0) > 60
 
 
-NARROW_CHARACTERS = 50
+NARROW_CHARACTERS = 46
 """What a screen of 390 px shows of a table's line."""
 LEAST_OF_WORDS, WORDS_WRAP_AT, SENTENCES_WRAP_AT = 9, 12, 40
 """Characters below which a column of short words, of longer ones, and of sentences is not set narrower."""
