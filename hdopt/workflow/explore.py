@@ -326,7 +326,10 @@ def _command(study: Study) -> str:
 
 def _toml(study: Study) -> str:
     """The study as a file, with "@section.key@" wherever the page puts its present value."""
-    data = {name: dict(content) if isinstance(content, dict) else content for name, content in study.data.items()}
+    given = {
+        name: content for name, content in study.data.items() if content != {}
+    }  # a section without keys says nothing
+    data = {name: dict(content) if isinstance(content, dict) else content for name, content in given.items()}
     for key in ("pressure_angle_deg",):
         data["drive"][key] = f"@drive.{key}@"
     for key in ("profile", "structure", "width_mm", "wrap_angle_deg"):

@@ -127,3 +127,9 @@ def test_the_command_writes_the_page_and_says_so(tmp_path):
     data = data_of(page.read_text())
     assert data["command"] == "csf-25-80 --set width_mm=8"
     assert next(one for one in data["parameters"] if one["key"] == "width_mm")["value"] == 8
+
+
+def test_the_study_that_the_page_copies_has_no_empty_section():
+    """Would catch '[export]' without a key at the end of what is copied."""
+    text = data_of(explorer_page(load_study("csf-25-80"), 4).html)["toml"]
+    assert "[drive]" in text and not re.search(r"^\[\w+\]\s*(\Z|\n\s*\[)", text, re.M)

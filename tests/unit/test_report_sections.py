@@ -260,3 +260,10 @@ def test_lines_of_designs_are_thinned_evenly_with_both_ends():
     steps = np.diff(drawn)
     assert max(steps) - min(steps) <= 1
     assert len(_thinned(designs[:5], "peak_to_peak_arcmin")) == 5
+
+
+@pytest.mark.parametrize(("deviation", "words"), [(3.8e-10, "<0.001 µm"), (0.0312, "≤0.031 µm"), (1e-3, "≤0.001 µm")])
+def test_a_profile_in_a_file_is_not_said_to_a_thousandth_of_an_atom(deviation, words):
+    from hdopt.report.sections.geometry import deviation_words
+
+    assert deviation_words(deviation) == words

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any  # Any: values of JSON
 import pandas as pd
 
 from hdopt.report import Download, Item, KeyFigures, Picture, Section, Table, Text
+from hdopt.report.cells import NAMES
 
 if TYPE_CHECKING:
     from hdopt.geometry.export import ExportResult
@@ -31,9 +32,9 @@ def geometry_section(
 
     values = result.to_dict()
     made = [part for part in values["parts"] if not part["context"]]
-    figures = {"parts": str(len(made)), "fingerprint": result.identity.fingerprint}
+    figures = {"Parts": str(len(made)), "Fingerprint": result.identity.fingerprint}
     if result.profile_deviation_um is not None:
-        figures["profile in the files, off the analytic curve"] = f"{result.profile_deviation_um:.2g} um at most"
+        figures["Profile in the files, off the analytic curve"] = deviation_words(result.profile_deviation_um)
     items: list[Item] = [KeyFigures(figures)]
     items.append(
         Picture(
@@ -65,6 +66,11 @@ def _summary(values: Mapping[str, Any]) -> str:
     )
 
 
+def deviation_words(deviation_um: float) -> str:
+    """How far a profile in a file is off, at most, in um: below a nanometre it is rounding, which nobody can make."""
+    return "<0.001 µm" if deviation_um < 1e-3 else f"≤{deviation_um:.2g} µm"
+
+
 def _parts(key: str, made: Sequence[Mapping[str, Any]]) -> Table:
     rows = [(_words(part["name"]), part["volume_mm3"], *part["bounding_box_mm"]) for part in made]
     frame = pd.DataFrame(rows, columns=["part", "volume [mm³]", "x [mm]", "y [mm]", "z [mm]"])
@@ -75,7 +81,7 @@ def _dimensions(key: str, result: ExportResult) -> Table:
     rows = [(_words(row.part), row.name, row.nominal, row.tolerance, row.source) for row in result.dimensions]
     frame = pd.DataFrame(rows, columns=["part", "dimension", "nominal [mm]", "tolerance", "from"])
     caption = "Tolerances are those of the study, or of its allocation; the last column says where each comes from."
-    return Table(f"{key}-dimensions", "Key dimensions", frame, caption, {"nominal [mm]": ".4f"})
+    return Table(f"{key}-dimensions", "Key dimensions", frame, caption, {"nominal [mm]": ".4f", "from": NAMES})
 
 
 def _assumptions(key: str, result: ExportResult) -> list[Table]:
