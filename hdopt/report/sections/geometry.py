@@ -67,7 +67,7 @@ def _summary(values: Mapping[str, Any]) -> str:
 
 
 def deviation_words(deviation_um: float) -> str:
-    """How far a profile in a file is off, at most, in um: below a nanometre it is rounding, which nobody can make."""
+    """The largest `deviation_um` of a profile in a file, in words: below a nanometre it is rounding."""
     return "<0.001 µm" if deviation_um < 1e-3 else f"≤{deviation_um:.2g} µm"
 
 
