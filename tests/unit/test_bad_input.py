@@ -125,7 +125,9 @@ def test_a_cam_with_a_field_beyond_all_limits(tmp_path, capsys):
     ends_with_two(capsys, arguments, "cam.csv")
 
 
-@pytest.mark.parametrize("name", ["negative", "not finite", "foreign", "text", "other JSON", "deep"])
+@pytest.mark.parametrize(
+    "name", ["negative", "nil", "not finite", "not a number", "another study", "foreign", "text", "other JSON", "deep"]
+)
 def test_allocations(name, tmp_path, capsys):
     text, message = {
         "negative": (
@@ -133,16 +135,25 @@ def test_allocations(name, tmp_path, capsys):
             "is '-1'; it must be a finite",
         ),
         "not finite": ('{"errors": {"axis_eccentricity_mm": {"tolerance": Infinity}}}', "which is not finite"),
+        "nil": ('{"errors": {"axis_eccentricity_mm": {"tolerance": 0}}}', "is '0'; it must be a finite number above 0"),
+        "not a number": ('{"errors": {"axis_eccentricity_mm": {"tolerance": NaN}}}', "which is not finite"),
+        "another study": (
+            '{"study": "chase-shaft-housing", "errors": {"axis_eccentricity_mm": {"tolerance": 0.01}}}',
+            "is of the study 'chase-shaft-housing', not of 'csf-25-80'; give the allocation of this study",
+        ),
         "foreign": ('{"errors": {"gap": {"tolerance": 1}}}', "unknown tolerance 'gap'"),
         "text": ('{"errors": {"axis_eccentricity_mm": {"tolerance": "wide"}}}', "is 'wide'"),
         "other JSON": ('{"peak_to_peak_arcmin": 1}', "holds no tolerances under 'errors'"),
         "deep": ("[" * 100_000, "is nested too deeply"),
     }[name]
     (tmp_path / "a.json").write_text(text)
-    arguments = ["export", "--allocation", str(tmp_path / "a.json"), "--dxf", str(tmp_path / "a.dxf")]
-    said = ends_with_two(capsys, arguments, message)
+    (tmp_path / "earlier.cam.csv").write_text("kept")
+    outputs = {"dxf": "a.dxf", "cam": "earlier.cam.csv", "json": "a2.json"}
+    arguments = [word for kind, file in outputs.items() for word in (f"--{kind}", str(tmp_path / file))]
+    said = ends_with_two(capsys, ["export", "--allocation", str(tmp_path / "a.json"), *arguments], message)
     assert "a.json" in said
-    assert not (tmp_path / "a.dxf").exists()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "earlier.cam.csv"]
+    assert (tmp_path / "earlier.cam.csv").read_text() == "kept"
 
 
 def test_costs_that_a_solver_gives_up_on(capsys):
