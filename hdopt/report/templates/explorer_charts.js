@@ -218,7 +218,7 @@ globalThis.HdoptCharts = (() => {
       ctx.strokeStyle = colours.bad; ctx.lineWidth = 1.5; ctx.setLineDash([5, 4]);
       line(ctx, [[at.left, at.y(limit)], [at.right, at.y(limit)]]);
       ctx.setLineDash([]);
-      words(ctx, `limit ${short(limit)}`, at.left + 6, at.y(limit) - 8, colours.bad);
+      words(ctx, `limit ${short(limit)}`, at.right - 6, at.y(limit) + 10, colours.bad, "right");
     }
     if (reference) dot(ctx, at, reference, top, colours.reference, 4.5);
     dot(ctx, at, now, top, metNow === false ? colours.bad : colours.accent, 6);
