@@ -161,33 +161,54 @@ def cells_of(line: str) -> list[str]:
     return [cell.replace(",", ".") if DECIMAL_COMMA.fullmatch(cell) else cell for cell in cells]
 
 
+DEEP = 100
+"""Brackets open at a time beyond any sound file."""
+
+
+def line_of(text: str, part: str) -> int:
+    """The line of `text` in which `part` begins; the first where it is not in it."""
+    return text.count("\n", 0, max(0, text.find(part))) + 1
+
+
+def line_of_depth(text: str) -> int:
+    """The line of `text` in which more brackets are open than in any sound file; else the last one."""
+    depth = line = 1
+    for letter in re.findall(r"[\[{\]}\n]", text):
+        line += letter == "\n"
+        depth += (letter in "[{") - (letter in "]}")
+        if depth > DEEP:
+            break
+    return line
+
+
 def read_json(path: Path, wanted: str) -> Any:
     """The JSON value in the file `path`; `wanted` says in messages what to give instead. Numbers that are not finite,
     or that no float can hold, are refused; nothing of the content is echoed."""
     text = read_text(path, wanted)
 
-    def refuse(number: str) -> NoReturn:
-        raise ValueError(f"holds the number {number[:12]}, which is not finite")
+    def refuse(number: str, why: str) -> NoReturn:
+        raise HdoptError(f"{path}, line {line_of(text, number)}: {why}; give {wanted}")
+
+    def not_finite(number: str) -> NoReturn:
+        refuse(number, f"holds the number {number[:12]}, which is not finite")
 
     def integer(digits: str) -> int:
         if len(digits) > 18:
-            raise ValueError(f"holds an integer of {len(digits)} digits")
+            refuse(digits, f"holds an integer of {len(digits)} digits")
         return int(digits)
 
     def number(digits: str) -> float:
         value = float(digits)
         if not math.isfinite(value):
-            refuse(digits)
+            not_finite(digits)
         return value
 
     try:
-        return json.loads(text, parse_constant=refuse, parse_int=integer, parse_float=number)
+        return json.loads(text, parse_constant=not_finite, parse_int=integer, parse_float=number)
     except json.JSONDecodeError as error:
         raise HdoptError(f"{path}, line {error.lineno}: is not valid JSON ({error.msg}); give {wanted}") from error
     except RecursionError as error:
-        raise HdoptError(f"{path}: is nested too deeply; give {wanted}") from error
-    except ValueError as error:
-        raise HdoptError(f"{path}: {error}; give {wanted}") from error
+        raise HdoptError(f"{path}, line {line_of_depth(text)}: is nested too deeply; give {wanted}") from error
 
 
 def write_text(path: Path, text: str) -> None:

@@ -23,6 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
     `arguments` stand in for those of the process. HDOPT_TRACEBACK=1 in the environment shows where a fault arose.
     """
+    _open_streams()
     try:
         with _sigterm_raises():
             status = _run(arguments)
@@ -41,6 +42,18 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         _say(_message(error))
         sys.exit(UNUSABLE)
     sys.exit(status)
+
+
+def _open_streams() -> None:
+    """Nothing in place of what the caller closed (`>&-`, some schedulers of jobs): the first file that is opened would
+    else take its number, and get what is printed."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest number that is free: this one
+    sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")
+    sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")
 
 
 def _run(arguments: Sequence[str] | None) -> int:

@@ -13,6 +13,7 @@ from hdopt.files import FilesOfWork
 from hdopt.study.named import shows
 
 MOST_FILES = 3
+FILE = re.compile(r"(?:read|write) (?:to )?\S*[/.]")
 OPTION = re.compile(r"(?:^|[\s'(])--?[a-z]")
 
 
@@ -24,7 +25,7 @@ def placed(message: str, context: click.Context | None, work: FilesOfWork) -> st
         places += work.values(message)
     if places:
         return f"{'; '.join(places[:MOST_FILES])}: {message}"
-    if OPTION.search(message) or any(name in message for name in _given(context, work)):
+    if OPTION.search(message) or FILE.search(message) or any(name in message for name in _given(context, work)):
         return message
     files = [work.facts["source"]] if work.facts.get("source") else [path.name for path in work.inputs]
     return f"{', '.join(files[:MOST_FILES])}: {message}" if files else message

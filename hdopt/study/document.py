@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
 from hdopt.errors import HdoptError, shown
-from hdopt.files import read_text
+from hdopt.files import line_of, line_of_depth, read_text
 from hdopt.study.toml_faults import why_no_toml
 
 Keys = tuple[str, ...]
@@ -63,9 +63,12 @@ def parse_document(text: str, source: str) -> Document:
     except tomllib.TOMLDecodeError as error:
         raise HdoptError(f"{source} {why_no_toml(error, text)}") from error
     except RecursionError as error:
-        raise HdoptError(f"{source} is nested too deeply; a study has {DEEPEST} levels at most") from error
+        place = f"{source}, line {line_of_depth(text)}"
+        raise HdoptError(f"{place}: is nested too deeply; a study has {DEEPEST} levels at most") from error
     except ValueError as error:  # Python refuses integers of more than 4300 digits
-        raise HdoptError(f"{source} holds an integer of more than 4300 digits; TOML allows 64 bits") from error
+        digits = re.search(r"\d{4300}", text)
+        place = f"{source}, line {line_of(text, digits.group() if digits else '')}"
+        raise HdoptError(f"{place}: holds an integer of more than 4300 digits; TOML allows 64 bits") from error
     document = Document(data, source, _key_lines(text), (text,))
     _check_size(document)
     return document

@@ -17,14 +17,17 @@ BASE = 'drive = "csf-25-80"\n'
 RECORDING = "time_s,input_deg,output_deg\n" + "\n".join(f"{i * 0.01},{i * 3.6},{i * 3.6 / 80}" for i in range(400))
 
 STUDIES = {
-    "deep array": ("a = " + "[" * 5000 + "]" * 5000, "is nested too deeply"),
+    "deep array": ("a = " + "[" * 5000 + "]" * 5000, "line 1: is nested too deeply"),
     "deep keys": (".".join("a" * 3000) + " = 1\n", "levels deep"),
     "deep table": ("[" + ".".join("a" * 3000) + "]\n", "levels deep"),
     "400 digits": (
         BASE + "[errors]\naxis_tilt_x_deg = 1" + "0" * 400,
         "line 3, errors.axis_tilt_x_deg: is an integer",
     ),
-    "5000 digits": (BASE + "[errors]\naxis_tilt_x_deg = 1" + "0" * 5000, "more than 4300 digits"),
+    "5000 digits": (
+        BASE + "[errors]\naxis_tilt_x_deg = 1" + "0" * 5000,
+        "line 3: holds an integer of more than 4300 digits",
+    ),
     "5000 letters": (BASE + "x" * 5000 + " = 1\n", "a name of 5000 letters"),
     "many faults": (BASE + "[errors]\n" + "".join(f"a{i} = 1\n" for i in range(100)), "more faults"),
     "a long blank": ("[" + " " * 200_000 + "x\n", "is not valid TOML"),
@@ -206,6 +209,19 @@ def test_a_full_disk_behind_standard_output():
     with open("/dev/full", "w") as full, process("studies", stdout=full) as running:
         assert running.wait(60) == 2
         assert running.stderr.read() == "hdopt: writing to standard output failed: No space left on device\n"
+
+
+@pytest.mark.parametrize("closed", [1, 2])
+def test_a_closed_stream_is_as_good_as_nothing(closed, tmp_path):
+    """Would catch an answer in the first file that is opened, and a message that goes to standard output instead."""
+    words = ["new", str(tmp_path / "mine")] if closed == 1 else ["ke", "no-such-study"]
+    code = (
+        f"import os, sys; os.close({closed}); os.execv(sys.executable, [sys.executable, '-m', 'hdopt', *sys.argv[1:]])"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout + done.stderr) == (0 if closed == 1 else 2, "")
+    if closed == 1:
+        assert (tmp_path / "mine.toml").read_text().startswith("#")
 
 
 def test_a_closed_pipe_ends_quietly():

@@ -123,10 +123,10 @@ def test_an_input_can_be_no_output(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[" * 100_000, "is nested too deeply"),
+        ("[" * 100_000, "line 1: is nested too deeply"),
         ('{"a": 1' + "0" * 400 + "}", "holds an integer of 401 digits"),
         ('{"a": 1' + "0" * 5000 + "}", "holds an integer of 5001 digits"),
-        ('{"a": NaN}', "holds the number NaN, which is not finite"),
+        ('{"b": 1,\n"a": NaN}', "line 2: holds the number NaN, which is not finite"),
         ('{"a": 1e999}', "holds the number 1e999, which is not finite"),
         ("root:x:0:0:secret", r"line 1: is not valid JSON \(Expecting value\); give it"),
     ],
