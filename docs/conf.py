@@ -15,6 +15,7 @@ from write_pages import write_pages  # noqa: E402
 
 project = "hdopt"
 author = "The hdopt developers"
+copyright = "2026 the hdopt authors"
 version = release = installed("hdopt")
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_gallery.gen_gallery"]
 myst_enable_extensions = ["deflist", "dollarmath"]
