@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from hdopt.compensation import teeth as module
 from hdopt.compensation.surface import nothing
 from hdopt.compensation.teeth import CELLS, Teeth, fit_teeth
 from hdopt.compensation.zones import formed
@@ -100,3 +101,15 @@ def test_a_form_is_as_good_as_what_is_left_asks_for(kind, table):
     assert np.ptp(off) < (0.31 * HEIGHT if table else 0.06 * 0.4)
     assert hasattr(found, "values") == table
     assert len(formed(teeth, nothing(), 20, 0.4)) <= 20
+
+
+def test_a_long_record_is_fitted_on_some_of_its_rows(monkeypatch):
+    """Would catch memory that grows with the record: of 12 300 rows at most 5000 reach the fit, enough for lobes."""
+    seen = []
+    weighed = module._weighed
+    monkeypatch.setattr(module, "MOST_ROWS", 5000)
+    monkeypatch.setattr(module, "_weighed", lambda design, *rest: seen.append(len(design)) or weighed(design, *rest))
+    found, _ = fitted(record("lobes", 1.0), "lobes", 1.0)
+    fresh = record("lobes", 1.0, seed=2)
+    assert max(seen) <= 5000
+    assert left(fresh, found.at(fresh.theta)) < 1.1 * NOISE
