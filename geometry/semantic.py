@@ -65,7 +65,11 @@ def annotate(document: TDocStd_Document, whole: TDF_Label, callouts: Sequence[Ca
     for callout in callouts:
         labels = _labels(shapes, whole, solid, callout.faces) if callout.size or callout.frames else []
         if callout.size is not None:
-            _add_size(tolerances, labels, callout)
+            first = callout.faces[0]
+            ends = (
+                [shapes.AddSubShape(whole, face) for face in opposite(solid, first)] if isinstance(first, Flank) else []
+            )
+            _add_size(tolerances, labels, callout, ends)
         for frame in callout.frames:
             _add_frame(tolerances, labels, frame, datums)
 
@@ -120,7 +124,19 @@ def _sequence(labels: Sequence[TDF_Label]) -> Any:
     return sequence
 
 
-def _add_size(tolerances: Any, labels: Sequence[TDF_Label], callout: Callout) -> None:
+def opposite(solid: cq.Shape, flank: Flank) -> tuple[TopoDS_Face, TopoDS_Face]:
+    """A face of a `solid` on either side of its axis that matches a `flank`: a bore cuts each side of a slot in two, so
+    that the first two faces may lie in one plane."""
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+
+    sides: dict[bool, TopoDS_Face] = {}
+    for face in faces_of(solid, flank):
+        place = BRepAdaptor_Surface(face).Plane().Location()
+        sides.setdefault(place.X() * math.sin(flank.direction) + place.Y() * math.cos(flank.direction) > 0, face)
+    return sides[True], sides[False]
+
+
+def _add_size(tolerances: Any, labels: Sequence[TDF_Label], callout: Callout, ends: Sequence[TDF_Label]) -> None:
     from OCP.XCAFDimTolObjects import XCAFDimTolObjects_DimensionObject, XCAFDimTolObjects_DimensionType
     from OCP.XCAFDoc import XCAFDoc_Dimension
 
@@ -140,7 +156,7 @@ def _add_size(tolerances: Any, labels: Sequence[TDF_Label], callout: Callout) ->
     dimension.SetUpperTolValue(upper)
     dimension.SetLowerTolValue(-lower)
     if across:
-        tolerances.SetDimension(_sequence(labels[:1]), _sequence(labels[1:2]), label)
+        tolerances.SetDimension(_sequence(ends[:1]), _sequence(ends[1:]), label)
     else:
         tolerances.SetDimension(_sequence(labels), _sequence([]), label)
     XCAFDoc_Dimension.Set_s(label).SetObject(dimension)

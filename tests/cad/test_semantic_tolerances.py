@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 
+import cadquery as cq
 import pytest
 from wave_generators import drive
 
 from hdopt.drive.geometry import Structure
 from hdopt.geometry import semantic
+from hdopt.geometry.callouts import Flank, callouts_of
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.export import export_drive
+from hdopt.geometry.job import make_job
 from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.part21 import Part21, StatedSize, StatedTolerance
 
@@ -57,6 +60,21 @@ def test_every_structure_carries_its_tolerances(profile, structure, tmp_path):
     datums = [body for body in found.instances.values() if body.startswith("DATUM(")]
     letters = [body[-3] for body in datums]
     assert len(letters) == len(set(letters)) >= 3
+
+
+@pytest.mark.parametrize("profile", ["ellipse", "two_disk"])
+def test_widths_lie_between_faces_that_are_so_far_apart(profile):
+    """Of keyways, slots and blocks, whose sides a bore cuts in two."""
+    job = make_job(drive(profile, Structure.AUTOMATIC), ExportOptions(), "x", BOUNDS)
+    seen = 0
+    for part, solid in job.made:
+        for callout in callouts_of(part, job.model):
+            if callout.size is not None and isinstance(callout.faces[0], Flank):
+                one, other = (cq.Face(face) for face in semantic.opposite(solid, callout.faces[0]))
+                across = (one.Center() - other.Center()).dot(one.normalAt())
+                assert abs(across) == pytest.approx(callout.size[0], abs=1e-9), (part.name, callout.lines[0])
+                seen += 1
+    assert seen == 5
 
 
 def test_magnitudes_of_zero_fail_the_check(tmp_path, monkeypatch):
