@@ -36,6 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         _drop_output()
         sys.exit(DONE)
     except Exception as error:
+        _leave_if_interrupted(error, at_once=arguments is None)
         if os.environ.get("HDOPT_TRACEBACK"):
             raise
         _drop_broken_output(error)
@@ -114,6 +115,18 @@ def _leave(status: int, message: str, at_once: bool) -> NoReturn:
             sys.stdout.flush()
         os._exit(status)
     sys.exit(status)
+
+
+def _leave_if_interrupted(error: Exception, at_once: bool) -> None:
+    """End as on an interruption where one is what `error` came from: a compiled library that is interrupted while it
+    is imported says that it cannot be."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, KeyboardInterrupt):
+            _leave(INTERRUPTED, "interrupted", at_once)
+        if isinstance(cause, Terminated):
+            _leave(TERMINATED, "ended by SIGTERM", at_once)
+        cause = cause.__cause__ or cause.__context__
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from hdopt.cli import main
+from hdopt.cli import Terminated, main
 from hdopt.errors import HdoptError, in_brief, shown
 
 BASE = 'drive = "csf-25-80"\n'
@@ -202,6 +202,23 @@ def process(*arguments, **options):
 
 def _interruptible():
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@pytest.mark.parametrize(("interruption", "status"), [(KeyboardInterrupt, 130), (Terminated, 143)])
+def test_an_interruption_that_a_library_hides_is_still_one(interruption, status, monkeypatch, capsys):
+    """A compiled library that is interrupted while it is imported raises an ImportError, which ended with status 2."""
+
+    def imported(arguments):
+        try:
+            raise interruption
+        except BaseException as error:
+            raise ImportError("initialization failed") from error
+
+    monkeypatch.setattr("hdopt.cli._run", imported)
+    with pytest.raises(SystemExit) as ended:
+        main(["studies"])
+    assert ended.value.code == status
+    assert "initialization" not in capsys.readouterr().err
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
