@@ -73,6 +73,9 @@ def real_residuals(study: Study, context: Context) -> StepResult:
     return StepResult((section,), results, says=tuple(says))
 
 
+MISSED = "Every case not answered exactly"
+
+
 def residuals_section(cases: pd.DataFrame, table: pd.DataFrame) -> Section:
     """The page of all `cases` (as `judged` puts them) and the `table` of how they came out by noise and severity."""
     hidden, empty = cases[cases.hidden != "nothing"], cases[cases.hidden == "nothing"]
@@ -85,7 +88,10 @@ def residuals_section(cases: pd.DataFrame, table: pd.DataFrame) -> Section:
     ]
     rows = cases.assign(hidden=cases.hidden.map(label), said=cases.said.map(_in_words))
     rows = (
-        rows[~cases.exact].drop(columns="exact").rename(columns={"among": "among the offered", "wrong": "wrong name"})
+        rows[~cases.exact]
+        .reset_index(drop=True)
+        .drop(columns="exact")
+        .rename(columns={"among": "among the offered", "wrong": "wrong name"})
     )
     return Section(
         "real-residuals",
@@ -96,8 +102,10 @@ def residuals_section(cases: pd.DataFrame, table: pd.DataFrame) -> Section:
                 "residuals-summary",
                 "Answered exactly, among the explanations offered, unknown, or named wrongly",
                 table,
+                "",
+                {"severity": "g"},
             ),
-            *((Table("residuals-missed", "Every case not answered exactly", rows),) if len(rows) else ()),
+            *((Table("residuals-missed", MISSED, rows, "", {"severity": "g"}),) if len(rows) else ()),
             Text(
                 "Severity is the hidden rms in units of the real residual's (real motion) or of the drive's own error."
             ),
