@@ -29,6 +29,8 @@ KINDS = {
 }
 """Type of a fault in pydantic's terms -> what should stand there instead."""
 DECIMAL_COMMA = re.compile(r"\s*([+-]?\d+),(\d+)\s*")
+PER_CENT_FROM = 2
+"""A share from here to 100 is one in per cent; just above 1 it may as well be too large."""
 WITH_UNIT = re.compile(r"\s*([+-]?\d+(?:\.\d+)?)\s*([A-Za-zµ°]+)\s*")
 
 
@@ -112,7 +114,7 @@ def _fault(fault: ErrorDetails, document: Document, section: str) -> str:
     hint = _number_hint(value) if kind in ("float_type", "int_type", "float_parsing", "int_parsing") else None
     if hint is not None:
         return f"{where}: is {value!r}; {hint}"
-    if kind in ("less_than", "less_than_equal") and 1 in fault["ctx"].values() and 1 < value <= 100:
+    if kind in ("less_than", "less_than_equal") and 1 in fault["ctx"].values() and PER_CENT_FROM <= value <= 100:
         return f"{where}: is {value!r}, in per cent as it seems; it is a share: write {value / 100:.6g}"
     if kind in KINDS:
         return f"{where}: is {value!r}; it must be {KINDS[kind]}"

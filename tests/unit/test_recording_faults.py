@@ -1,5 +1,6 @@
 """Every fault that real recordings have, in every format: repaired with a warning that says so, or refused."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -154,4 +155,5 @@ def test_command_refuses_with_one_sentence(tmp_path, capsys, name):
         main(["diagnose", str(path), "--drive", "none", "--ratio", str(FAULTS[name].ratio)])
     assert end.value.code == 2
     said = capsys.readouterr().err.strip().splitlines()
-    assert len(said) == 1 and said[0].startswith("hdopt: bench.csv: ")
+    # An option that the message quotes stands before the file.
+    assert len(said) == 1 and re.match(r"hdopt: (--ratio [\d.]+: )?bench\.csv: ", said[0])

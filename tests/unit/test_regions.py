@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -66,7 +67,8 @@ def test_constants_are_followed_where_someone_asks(result, monkeypatch, key, ask
     found = search(study(f"search.regions={key}"), regions=asked)
     assert (len(calls), found.regions is not None) == (followed, bool(followed))
     monkeypatch.setattr("hdopt.report.sections.search._checked_figures", lambda _: {})
-    words = [item.text for item in confidence_section(found, None).items if isinstance(item, Text)]
+    section = confidence_section(found, SimpleNamespace(fresh=None))
+    words = [item.text for item in section.items if isinstance(item, Text)]
     assert any("--set search.regions=true" in text for text in words) != bool(followed)
 
 

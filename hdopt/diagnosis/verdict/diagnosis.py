@@ -118,7 +118,7 @@ class Diagnosis(ShownAsTable):
 
         found = [(effect.id, effect.confidence, effect.parameters) for effect in self.effects]
         rows = [
-            (of, sure, name, *((math.nan,) * 3 if p.undefined else (p.value, p.low, p.high)), p.unit)
+            (of, sure, name, *((math.nan, math.nan, math.nan) if p.undefined else (p.value, p.low, p.high)), p.unit)
             for of, sure, parameters in [*found, ("base model", None, self.base.parameters)]
             for name, p in parameters.items()
         ]
