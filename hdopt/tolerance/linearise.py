@@ -50,14 +50,14 @@ class Linearisation:
         return self.value + z * self.std
 
 
-def linearise(response: Response, space: InputSpace, seed: int) -> Linearisation:
-    """The straight line of `response` over `space` about the mean magnitudes, averaged over the directions that `seed`
-    draws; costs (2 k + 1) x 4096 responses for k magnitudes.
+def linearise(response: Response, space: InputSpace, seed: int, directions: int = DIRECTIONS) -> Linearisation:
+    """The straight line of `response` over `space` about the mean magnitudes, averaged over so many `directions` that
+    `seed` draws; costs (2 k + 1) times as many responses for k magnitudes.
 
     Slopes are central differences over half a standard deviation to either side: small against the response's
     curvature, large against its kinks, which the average over directions has already smoothed.
     """
-    u = next(ScrambledSobol(1).blocks(seed, 0, DIRECTIONS, space.dimension))
+    u = next(ScrambledSobol(1).blocks(seed, 0, directions, space.dimension))
     inputs = space.sample(u)
     straight = [name for name in space.names if name not in space.turning and not _is_fixed(space, name)]
     columns = [space.index(name) for name in straight]

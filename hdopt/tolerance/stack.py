@@ -27,7 +27,7 @@ from hdopt.tolerance.intervals import (
     smallest_n,
     student_half_width,
 )
-from hdopt.tolerance.linearise import Linearisation, linearise
+from hdopt.tolerance.linearise import DIRECTIONS, Linearisation, linearise
 from hdopt.tolerance.response import Response, Signed, evaluate
 from hdopt.tolerance.sampling import BLOCK, Sampling, ScrambledSobol, replicate_sizes
 from hdopt.tolerance.space import InputSpace
@@ -254,7 +254,8 @@ class StackRequest:
 
     `limit` is the upper limit in `unit`, `required_yield` the share that must keep it, `n` the samples in all, drawn by
     `sampling` with `seed`; `quantiles` are reported beside the usual ones; `engine` computes the replicates. `fused`:
-    one compiled pass makes the drives where it can. `linearised` takes the place of a response that is dear.
+    one compiled pass makes the drives where it can. `linearised` takes the place of a response that is dear, and
+    `directions` are those that its straight line is averaged over.
     """
 
     limit: float
@@ -267,6 +268,7 @@ class StackRequest:
     unit: str = "arcmin"
     fused: bool = True
     linearised: Response | None = None
+    directions: int = DIRECTIONS
 
 
 def run_stack(response: Response, space: InputSpace, request: StackRequest) -> Stack:
@@ -292,7 +294,7 @@ def run_stack(response: Response, space: InputSpace, request: StackRequest) -> S
     pooled = merge(part.values for part in parts)
     two_sided = isinstance(response, Signed)
     straight = request.linearised or response
-    line = linearise(straight.signed if isinstance(straight, Signed) else straight, space, seed)
+    line = linearise(straight.signed if isinstance(straight, Signed) else straight, space, seed, request.directions)
     z = float(special.ndtri((1 + required) / 2 if two_sided else required))
     performance, notes = _performance(parts, pooled, sampling, request.limit)
     return Stack(

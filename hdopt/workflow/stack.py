@@ -21,6 +21,7 @@ from hdopt.tolerance.distributions import Distribution
 from hdopt.tolerance.drive_inputs import DriveProblem, DriveResponse, drive_problem
 from hdopt.tolerance.exact_response import MOST_DRIVES, ExactResponse
 from hdopt.tolerance.linear_stack import LinearResponse
+from hdopt.tolerance.linearise import DIRECTIONS
 from hdopt.tolerance.response import Response
 from hdopt.tolerance.results import SobolResult, StackResult
 from hdopt.tolerance.sampling import SAMPLINGS
@@ -34,6 +35,7 @@ STACK_N = 2**18
 USUAL_YIELD = 0.9973
 """Share of drives that must keep a limit where nobody says: as many as lie within 3 standard deviations of a normal."""
 SOBOL_N = 2**14
+FEWEST_DIRECTIONS = 128
 PILOT_N, PILOT_MEASURED = 512, 32
 """Drives of which the pilot for the model error takes the largest and some others; with measured teeth, which take
 long."""
@@ -251,6 +253,7 @@ def stack(
             quantiles=quantiles,
             unit=problem.unit,
             linearised=problem.response,
+            directions=_directions(problem, n),
         ),
     )
     worst = rare = None
@@ -291,6 +294,17 @@ def _exact_response(problem: ToleranceProblem, n: int, distance: ModelError | No
     if n > MOST_DRIVES:
         raise HdoptError(f"{n} drives by the exact geometry take too long; ask for up to {MOST_DRIVES}, with -n")
     return ExactResponse(response)
+
+
+def _directions(problem: ToleranceProblem, n: int) -> int:
+    """Directions that the straight line of `problem` is averaged over, where its sample has `n` drives. On a measured
+    cam each drive takes the exact geometry, a hundred thousand times as long as the kernel: the line then takes no more
+    drives than the sample, or 128 directions."""
+    response = problem.response
+    if not isinstance(response, DriveResponse) or response.drive.wave_generator.profile.tip_is_smooth:
+        return DIRECTIONS
+    most = n // (2 * len(problem.space.names) + 1)
+    return min(DIRECTIONS, max(FEWEST_DIRECTIONS, 1 << max(most, 1).bit_length() - 1))
 
 
 def _method(problem: ToleranceProblem, seed: int) -> tuple[str | None, ModelError | None]:

@@ -20,9 +20,20 @@ from hdopt.tolerance.drive_bound import peak_to_peak_bound_arcmin
 from hdopt.tolerance.drive_inputs import contributor_distribution, drive_problem
 from hdopt.tolerance.exact_response import ExactResponse
 from hdopt.tolerance.sampling import ScrambledSobol
+from hdopt.tolerance.space import InputSpace, Tolerance
+from hdopt.tolerance.stack import StackRequest, run_stack
 from hdopt.tolerance.tail import tail_probability
 from hdopt.tolerance.worst_case import WorstCase, find_worst_case
-from hdopt.workflow.stack import _exact_at, _exact_response, screen, sobol, stack, study_problem
+from hdopt.workflow.stack import (
+    ToleranceProblem,
+    _directions,
+    _exact_at,
+    _exact_response,
+    screen,
+    sobol,
+    stack,
+    study_problem,
+)
 
 TURN = Uniform(lower=0.0, upper=360.0)
 
@@ -370,3 +381,24 @@ def test_the_exact_geometry_is_refused_where_it_takes_too_long_or_is_none():
         problem.by("exakt")
     with pytest.raises(HdoptError, match="whose teeth are sines"):
         stack(study_problem(load_study("chase-shaft-housing")).by("exact"), 64)
+
+
+@pytest.mark.parametrize(
+    ("profile", "n", "directions"), [("ellipse", 300, 4096), ("measured", 300, 128), ("measured", 3000, 512)]
+)
+def test_the_line_of_a_dear_response_takes_no_more_drives_than_the_sample(profile, n, directions):
+    """Would catch a stack of 1,400 drives on a measured cam that goes on for 100,000 more, an hour without a word."""
+    tolerances = {"wg_eccentricity_mm": Rayleigh(scale=0.0025), "wg_eccentricity_direction_deg": TURN}
+    assert _directions(ToleranceProblem.of_drive(drive(PROFILES[profile]), tolerances, 1.0), n) == directions
+
+
+def test_directions_asked_for_are_all_that_the_line_costs():
+    rows = []
+
+    def counted(inputs):
+        rows.append(len(inputs))
+        return inputs.sum(axis=1)
+
+    space = InputSpace({f"x{i}": Tolerance(Normal(std=1.0)) for i in range(3)})
+    run_stack(counted, space, StackRequest(limit=3.0, n=2048, directions=128, engine="process"))
+    assert sum(rows) == 2048 + (2 * 3 + 1) * 128
