@@ -24,8 +24,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     `arguments` stand in for those of the process. HDOPT_TRACEBACK=1 in the environment shows where a fault arose.
     """
     _open_streams()
+    came: list[int] = []
     try:
-        with _sigterm_raises():
+        with _signals_raise(came):
             status = _run(arguments)
             sys.stdout.flush()
     except KeyboardInterrupt:
@@ -36,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         _drop_output()
         sys.exit(DONE)
     except Exception as error:
-        _leave_if_interrupted(error, at_once=arguments is None)
+        _leave_if_interrupted(error, came, at_once=arguments is None)
         if os.environ.get("HDOPT_TRACEBACK"):
             raise
         _drop_broken_output(error)
@@ -117,34 +118,44 @@ def _leave(status: int, message: str, at_once: bool) -> NoReturn:
     sys.exit(status)
 
 
-def _leave_if_interrupted(error: Exception, at_once: bool) -> None:
-    """End as on an interruption where one is what `error` came from: a compiled library that is interrupted while it
-    is imported says that it cannot be."""
+def _leave_if_interrupted(error: Exception, came: Sequence[int], at_once: bool) -> None:
+    """End as on an interruption where one `came` (statuses of what came) or is what `error` came from: a compiled
+    library that is interrupted, in a callback or while it is imported, raises an error of its own."""
+    hidden = list(came)
     cause: BaseException | None = error
     while cause is not None:
-        if isinstance(cause, KeyboardInterrupt):
-            _leave(INTERRUPTED, "interrupted", at_once)
-        if isinstance(cause, Terminated):
-            _leave(TERMINATED, "ended by SIGTERM", at_once)
+        if isinstance(cause, KeyboardInterrupt | Terminated):
+            hidden.append(INTERRUPTED if isinstance(cause, KeyboardInterrupt) else TERMINATED)
         cause = cause.__cause__ or cause.__context__
+    if hidden:
+        _leave(hidden[-1], "interrupted" if hidden[-1] == INTERRUPTED else "ended by SIGTERM", at_once)
 
 
 @contextmanager
-def _sigterm_raises() -> Iterator[None]:
-    """SIGTERM as an exception, so that what is half-written goes; only the main thread may ask for that."""
+def _signals_raise(came: list[int]) -> Iterator[None]:
+    """SIGTERM as an exception, as SIGINT is, so that what is half-written goes; what `came` is noted by its status.
+    Only the main thread may ask for that, and a SIGINT that is ignored stays so."""
 
     def terminate(number: int, frame: FrameType | None) -> None:
+        came.append(TERMINATED)
         raise Terminated
 
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        came.append(INTERRUPTED)
+        raise KeyboardInterrupt
+
     try:
-        before = signal.signal(signal.SIGTERM, terminate)
+        before = {signal.SIGTERM: signal.signal(signal.SIGTERM, terminate)}
     except ValueError:  # not the main thread
         yield
         return
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        before[signal.SIGINT] = signal.signal(signal.SIGINT, interrupt)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _drop_broken_output(error: Exception) -> None:

@@ -204,6 +204,30 @@ def _interruptible():
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interruption_that_a_callback_swallows_is_still_one(number, status, monkeypatch, capsys):
+    """Would catch status 2 where compiled code drops the exception that a signal raised and ends with its own."""
+
+    def computed(arguments):
+        try:
+            os.kill(os.getpid(), number)
+            time.sleep(5)
+        except BaseException:
+            lost = True
+        assert lost
+        raise RuntimeError("the kernel was left in an undefined state")
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    monkeypatch.setattr("hdopt.cli._run", computed)
+    try:
+        with pytest.raises(SystemExit) as ended:
+            main(["studies"])
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert ended.value.code == status
+    assert "undefined" not in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(("interruption", "status"), [(KeyboardInterrupt, 130), (Terminated, 143)])
 def test_an_interruption_that_a_library_hides_is_still_one(interruption, status, monkeypatch, capsys):
     """A compiled library that is interrupted while it is imported raises an ImportError, which ended with status 2."""

@@ -142,10 +142,10 @@ SLOW_WRITER = """
 import signal, sys, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background work begins with it ignored
 from pathlib import Path
-from hdopt.cli import _sigterm_raises, Terminated
+from hdopt.cli import _signals_raise, Terminated
 from hdopt.files import replacing
 try:
-    with _sigterm_raises(), replacing(Path(sys.argv[1])) as passing:
+    with _signals_raise([]), replacing(Path(sys.argv[1])) as passing:
         passing.write_text("half")
         print("writing", flush=True)
         time.sleep(30)
