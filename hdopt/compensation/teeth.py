@@ -14,7 +14,7 @@ import numpy as np
 
 from hdopt.arrays import Array, Index
 from hdopt.compensation.pursuit import independent_share
-from hdopt.effects.met import Spline, Waves, met_at
+from hdopt.effects.met import Spline, Waves, met_angles, met_at
 from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel
 from hdopt.recordings.rows import Rows
 
@@ -55,15 +55,16 @@ class Teeth:
     def added(self, turned: Array) -> Array:
         """What both zones meet, mm of arc, (2, n), where the input and the flexspline's teeth have `turned` (2, n),
         rad."""
-        beyond = self.model.beyond_at(np.concatenate([[np.cos(t), np.sin(t)] for t in turned]), self.errors)
-        angles = met_at(turned, beyond)
+        return self.at_angles(met_at(turned, self.model.beyond_at(_rotation(turned), self.errors)))
+
+    def at_angles(self, angles: Array) -> Array:
+        """What stands on the splines, mm of arc, (2, n), where the zones meet them at `angles` (2, 2, n), rad."""
         return _looked_up(self.cs, angles[0]) + _looked_up(self.fs, angles[1])
 
     def zones(self, turned: Array) -> Array:
         """What each zone would make if it drove alone, arcmin, (2, n), where the input and the flexspline's teeth have
         `turned` (2, n), rad; times `sense`."""
-        rotation = np.concatenate([[np.cos(t), np.sin(t)] for t in turned])
-        added = self.added(turned)
+        rotation, added = _rotation(turned), self.added(turned)
         alone = [self.model.evaluate_at(rotation, self.errors, added - ALONE[1 - zone])[0] for zone in (0, 1)]
         return np.asarray(self.sense * np.stack(alone), float)
 
@@ -88,6 +89,11 @@ class Teeth:
 
 ALONE = 1e3 * np.eye(2)[:, :, None]
 """mm by which one zone is set back so that the other one drives."""
+
+
+def _rotation(turned: Array) -> Array:
+    """Cosine and sine of both rows of `turned` (2, n), rad, as `CartesianModel.rotation` has them, (4, n)."""
+    return np.concatenate([[np.cos(t), np.sin(t)] for t in turned])
 
 
 def _looked_up(table: Array, angle: Array) -> Array:
@@ -165,10 +171,8 @@ def _linear(found: Teeth, both: list[Waves], theta: Array) -> tuple[Array, Array
     """Columns of the waves (n, p), slopes of the errors (n, 12), and the error (n,) of `found` at `theta`, arcmin."""
     model = found.model
     rotation = model.rotation(theta)
-    angles = met_at(np.stack([theta, model.advance * theta]), model.beyond_at(rotation, found.errors))
-    value, zone, slopes = model.evaluate_at(
-        rotation, found.errors, found.added(np.stack([theta, model.advance * theta]))
-    )
+    angles = met_angles(theta, model.advance, model.beyond_at(rotation, found.errors))
+    value, zone, slopes = model.evaluate_at(rotation, found.errors, found.at_angles(angles))
     met = angles[:, zone, np.arange(len(theta))]
     columns = np.hstack([w.columns(met[w.spline], zone) for w in both]) * model.arcmin_per_mm
     return columns, slopes, value

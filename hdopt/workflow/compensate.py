@@ -321,7 +321,7 @@ def _candidates(
     for name, one in {"model": bare, "model and harmonics": bare, "model, teeth and harmonics": teeth}.items():
         left = rows.error - one.at(rows.theta)
         rest = nothing(0.0 if path is None else half_return(left, zeros, path))
-        if one is teeth or name != "model":
+        if name != "model":
             rest = pursue(angles, left, zeros, path, pairs, most // 2)
         rest = replace(rest, crossing_deg=crossing)
         made[name] = formed(
