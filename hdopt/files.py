@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import errno
 import json
 import math
 import os
@@ -36,6 +37,8 @@ STREAMS = ("/dev/fd/", "/dev/stdout", "/dev/stderr", "/proc/self/fd/")
 JsonReady = dict[str, Any]
 """What `to_json` writes: numbers, text, arrays, and lists and mappings of them to any depth, which no narrower type
 says in a way that readers of a key could use."""
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Errors of a disk, a quota or a process that may write no more."""
 PASSING = ".hdopt-passing"
 """End of the names that files bear until they are whole."""
 
@@ -344,9 +347,8 @@ def replacing(path: Path) -> Iterator[Path]:
         except OSError as error:
             if isinstance(error, BrokenPipeError):
                 raise
-            raise HdoptError(
-                f"cannot write {path}: {_why(error)}; give a file in a folder that can be written"
-            ) from error
+            remedy = "make room there" if error.errno in FULL else "give a file in a folder that can be written"
+            raise HdoptError(f"cannot write {path}: {_why(error)}; {remedy}") from error
     finally:
         with suppress(OSError):
             passing.unlink(missing_ok=True)
@@ -456,7 +458,8 @@ def make_folder(path: Path) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
-        raise HdoptError(f"cannot make the folder {path}: {_why(error)}; give a folder that can be made") from error
+        remedy = "make room there" if getattr(error, "errno", None) in FULL else "give a folder that can be made"
+        raise HdoptError(f"cannot make the folder {path}: {_why(error)}; {remedy}") from error
 
 
 def _real(path: Path) -> Path:

@@ -63,6 +63,13 @@ class Parts:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
+def holds_parts(folder: Path) -> bool:
+    """Whether a folder of `Parts` holds a finished part; one that was being written when the work ended is none."""
+    return folder.is_dir() and any(
+        entry.name != KEY_FILE and not entry.name.startswith(".") for entry in folder.iterdir()
+    )
+
+
 def _require_own(folder: Path) -> None:
     state = folder.stat()
     if hasattr(os, "getuid") and (state.st_uid != os.getuid() or state.st_mode & 0o022):

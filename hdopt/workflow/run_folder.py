@@ -12,7 +12,7 @@ from pathlib import Path
 
 from hdopt.errors import HdoptError
 from hdopt.files import make_folder, sync_folder
-from hdopt.parallel.kept import Parts
+from hdopt.parallel.kept import Parts, holds_parts
 
 SUFFIX = ".hdopt-run"
 """End of the hidden name that a run folder has until it is whole."""
@@ -32,21 +32,50 @@ def run_folder(folder: Path, key: str, resume: bool) -> Iterator[RunFolder]:
     """A folder to fill for `folder`; `finish` puts it in place.
 
     Only one run at a time fills it: a second one is refused. Where the work ends early, `folder` stays as it was, and
-    the finished parts stay hidden beside it for `resume`. `key` names the work: parts of other work are dropped.
+    the finished parts, if there are any, stay hidden beside it for `resume`; nothing else stays. `key` names the work:
+    parts of other work are dropped.
     """
     target = Path(os.path.realpath(folder))
     _check(folder, target)
-    make_folder(target.parent)
-    hidden = target.with_name(f".{target.name}{SUFFIX}")
-    lock = _lock(hidden, folder)
+    with _missing_parents_made(target):
+        hidden = target.with_name(f".{target.name}{SUFFIX}")
+        lock = _lock(hidden, folder)
+        try:
+            parts = Parts.open(hidden / "parts", key, resume)
+            new = hidden / "new"
+            shutil.rmtree(new, ignore_errors=True)
+            make_folder(new)
+            yield RunFolder(target, new, parts)
+        except BaseException:
+            _leave_parts_only(hidden, parts=hidden / "parts")
+            raise
+        finally:
+            os.close(lock)
+
+
+@contextmanager
+def _missing_parents_made(target: Path) -> Iterator[None]:
+    """The folders above `target`, those that were not there removed again where the work in them ends early and leaves
+    nothing in them."""
+    missing = [parent for parent in target.parents if not parent.exists()]
     try:
-        parts = Parts.open(hidden / "parts", key, resume)
-        new = hidden / "new"
-        shutil.rmtree(new, ignore_errors=True)
-        make_folder(new)
-        yield RunFolder(target, new, parts)
-    finally:
-        os.close(lock)
+        make_folder(target.parent)
+        yield
+    except BaseException:
+        with suppress(OSError):  # not empty: something stays in it
+            for parent in missing:
+                parent.rmdir()
+        raise
+
+
+def _leave_parts_only(hidden: Path, parts: Path) -> None:
+    """Of the `hidden` folder of work that ended early, leave the finished `parts`; without any, nothing. Called with
+    the lock held: whoever waits for it sees that the folder is another one."""
+    shutil.rmtree(hidden / "new", ignore_errors=True)
+    if not holds_parts(parts):
+        shutil.rmtree(parts, ignore_errors=True)
+        with suppress(OSError):  # not empty: an old run that could not be put back
+            hidden.rmdir()
 
 
 def finish(run: RunFolder, old_files: Iterable[str]) -> None:
@@ -133,4 +162,8 @@ def _exchange(new: Path, target: Path) -> None:
     if not done:
         aside = new.with_name("old")
         os.rename(target, aside)
-        os.rename(new, target)
+        try:
+            os.rename(new, target)
+        except OSError:
+            os.rename(aside, target)
+            raise

@@ -1,17 +1,21 @@
 """A run folder is replaced as a whole or not at all, one run at a time, and an interrupted run goes on."""
 
+import errno
 import hashlib
 import json
 import os
+import resource
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 import hdopt.workflow.run
+from hdopt.cli import main
 from hdopt.errors import HdoptError
-from hdopt.files import watching_files
+from hdopt.files import replacing, watching_files, write_text
 from hdopt.parallel.engine import engine_in_force
 from hdopt.parallel.kept import Kept, Parts, forget_old
 from hdopt.parallel.local import ThisProcess, Threads
@@ -57,7 +61,7 @@ def steps(monkeypatch):
     def first(study, context):
         done["waveform"] += 1
         file = context.folder / "drawing.svg"
-        file.write_text("a drawing")
+        write_text(file, "a drawing")
         return StepResult((Section("one", "One", (Text("one"),)),), {"file": str(file)}, (file,), (f"wrote {file}",))
 
     def item(i):
@@ -104,6 +108,61 @@ def test_a_broken_run_leaves_the_old_folder_and_resumes_where_it_stood(study, tm
     )
     assert ours == theirs
     assert not (tmp_path / ".out.hdopt-run").exists()
+
+
+ENDS = (0, 20, 300, 1000, 10_000, None)
+"""Bytes that a file may have, from the first file of a run to its page; None: the disk is full at its last file."""
+
+
+@pytest.mark.parametrize("old", [False, True], ids=["new folder", "folder of an earlier run"])
+@pytest.mark.parametrize("most", ENDS)
+def test_a_full_disk_leaves_finished_parts_or_nothing(study, tmp_path, steps, monkeypatch, capsys, most, old):
+    place = tmp_path / "disk"
+    place.mkdir()
+    folder = place / "out" if old else place / "missing" / "too" / "out"
+    if old:
+        run_study(study, folder)
+    before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
+    if most is None:
+        monkeypatch.setattr(hdopt.workflow.run, "write_text", full_disk)
+    with largest_file(most):
+        assert ended(["run", str(tmp_path / "study.toml"), "-o", str(folder)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("hdopt: ") and said.count("\n") == 1 and "cannot write" in said and "make room" in said
+    hidden = folder.with_name(".out.hdopt-run")
+    left = {path: path.read_bytes() for path in place.rglob("*") if path.is_file() and hidden not in path.parents}
+    assert left == before
+    if hidden.exists():
+        assert [path.name for path in hidden.iterdir()] == ["parts"]
+        names = {path.name for path in (hidden / "parts").iterdir()}
+        assert "work" in names and len(names) > 1, "no folder without a finished part"
+        parts = Parts(hidden / "parts", "")
+        assert all(parts.load(name) is not None for name in names - {"work"}), "each of them whole"
+    else:
+        assert set(place.rglob("*")) == {place / "out", *before} if old else not list(place.rglob("*"))
+
+
+def ended(arguments):
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    return end.value.code
+
+
+def full_disk(path, text):
+    with replacing(path):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@contextmanager
+def largest_file(size):
+    """No file of this process may become larger than `size` bytes."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    if size is not None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.mark.parametrize("change", ["seed", "study", "fresh"])
