@@ -41,6 +41,10 @@ class MissingLibrary(HdoptError):
     """A library of the system is needed that this machine lacks. The message names its package."""
 
 
+class EngineFailed(HdoptError):
+    """What does the work cannot do it, whatever the input: a cluster out of reach, a worker that died."""
+
+
 class NoResult(HdoptError):
     """Numbers, each allowed by itself, that lead to no result together; `placed` once the message says where they
     stand."""

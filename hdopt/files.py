@@ -75,7 +75,7 @@ class FilesOfWork:
     """Says where to look when numbers lead to no result; None for work without a study."""
 
     values: Callable[[str], tuple[str, ...]] | None = None
-    """Says where the values stand that a message shows; None for work without a study."""
+    """Says where the values and keys stand that a message shows or names; None for work without a study."""
 
     def place_of_numbers(self) -> str:
         """Where the numbers of this work stand: in its study, else in its inputs."""
@@ -196,7 +196,7 @@ def read_json(path: Path, wanted: str) -> Any:
         refuse(number, f"holds the number {number[:12]}, which is not finite")
 
     def integer(digits: str) -> int:
-        if len(digits) > 18:
+        if len(digits.lstrip("-")) > 19:  # the largest seed has 19
             refuse(digits, f"holds an integer of {len(digits)} digits")
         return int(digits)
 

@@ -68,10 +68,13 @@ def _placing(work: Callable[..., R]) -> Callable[..., R]:
 
     @wraps(work)
     def placing(*arguments: object, **options: object) -> R:
-        from hdopt.errors import HdoptError, MissingLibrary, NoResult
+        from hdopt.errors import EngineFailed, HdoptError, MissingLibrary, NoResult
 
         try:
             return work(*arguments, **options)
+        except EngineFailed as error:
+            error.args = (f"--engine: {error}", *error.args[1:])
+            raise
         except HdoptError as error:
             if not isinstance(error, NoResult | MissingLibrary):
                 from hdopt.cli.place import placed

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import Any  # Any: values of options
 
 import click
 from click.core import ParameterSource
@@ -13,7 +12,7 @@ from hdopt.files import FilesOfWork
 from hdopt.study.named import shows
 
 MOST_FILES = 3
-FILE = re.compile(r"(?:read|write) (?:to )?\S*[/.]")
+FILE = re.compile(r"(?:(?:read|write)(?: to)?|folder) \S*[/.]")
 OPTION = re.compile(r"(?:^|[\s'(])--?[a-z]")
 
 
@@ -25,14 +24,15 @@ def placed(message: str, context: click.Context | None, work: FilesOfWork) -> st
         places += work.values(message)
     if places:
         return f"{'; '.join(places[:MOST_FILES])}: {message}"
-    if OPTION.search(message) or FILE.search(message) or any(name in message for name in _given(context, work)):
+    if OPTION.search(message) or FILE.search(message) or _names_an_input(message, context, work):
         return message
     files = [work.facts["source"]] if work.facts.get("source") else [path.name for path in work.inputs]
     return f"{', '.join(files[:MOST_FILES])}: {message}" if files else message
 
 
 def _options(message: str, context: click.Context) -> Iterator[str]:
-    """'-n 20' for every option whose name and value stand in the `message`, and not yet its spelling."""
+    """'-n 20' for every option whose name and value stand in the `message`, or whose text in quotes, and not yet its
+    spelling."""
     for parameter in context.command.params:
         if not isinstance(parameter, click.Option) or parameter.name is None:
             continue
@@ -43,17 +43,16 @@ def _options(message: str, context: click.Context) -> Iterator[str]:
         value = context.params.get(parameter.name)
         default = context.get_parameter_source(parameter.name) is not ParameterSource.COMMANDLINE
         for one in value if isinstance(value, tuple) else (value,):
-            if shows(message, one, name):
+            quoted = isinstance(one, str) and not default and repr(one) in message
+            if quoted or shows(message, one, name):
                 yield f"{option} {one}" + (" (the default)" if default else "")
 
 
-def _given(context: click.Context | None, work: FilesOfWork) -> Iterator[str]:
-    """Names of files and values that the user gave, which a message may hold as its place."""
-    yield from (path.name for path in (*work.inputs, *work.outputs))
-    if source := work.facts.get("source"):
-        yield source
-    values: list[Any] = [] if context is None else list(context.params.values())
-    for value in values:
-        for one in value if isinstance(value, tuple) else (value,):
-            if isinstance(one, str) and len(one) > 1:
-                yield one
+def _names_an_input(message: str, context: click.Context | None, work: FilesOfWork) -> bool:
+    """Whether `message` names a file, or what the user gave in place of one."""
+    names = {path.name for path in (*work.inputs, *work.outputs)} | {work.facts.get("source", "")}
+    parameters = [] if context is None else [p for p in context.command.params if isinstance(p, click.Argument)]
+    for parameter in parameters:
+        value = context.params.get(parameter.name or "") if context else None
+        names |= {str(one) for one in (value if isinstance(value, tuple) else (value,)) if one is not None}
+    return any(re.search(rf"(?<![\w.-]){re.escape(name)}(?![\w-])", message) for name in names if name)

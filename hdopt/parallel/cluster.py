@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, TypeAlias, TypeVar  # Any: distributed has no types for what is used of it
 
-from hdopt.errors import HdoptError
+from hdopt.errors import EngineFailed
 from hdopt.parallel.workers import as_worker, cores
 
 Client: TypeAlias = Any  # distributed has no types of its own for what is used here
@@ -33,7 +33,7 @@ class Dask:
 
     Its workers need the same hdopt, NumPy, SciPy and Numba. `timeout_s`: how long to wait for the scheduler, and for a
     worker where there is none (any more). `secure`: TLS, with the certificates that Dask's own configuration names.
-    Raises `HdoptError` for whatever keeps the cluster from answering; never waits longer than that.
+    Raises `EngineFailed` for whatever keeps the cluster from answering; never waits longer than that.
     """
 
     address: str
@@ -86,7 +86,7 @@ class Dask:
         try:
             socket.create_connection((host.strip("[]"), int(port)), timeout=self.timeout_s).close()
         except OSError as error:
-            raise HdoptError(
+            raise EngineFailed(
                 f"no Dask scheduler answers at {self.address} ({error.strerror or type(error).__name__}); start one "
                 "with 'dask scheduler' and give its HOST:PORT, or use --engine threads"
             ) from error
@@ -104,7 +104,7 @@ class Dask:
             )
         except Exception as error:  # whatever a foreign listener provokes, the message is the same
             tls = "" if self.secure else "; a scheduler with TLS needs dask+tls://"
-            raise HdoptError(
+            raise EngineFailed(
                 f"what listens at {self.address} is no Dask scheduler of this version ({type(error).__name__} within "
                 f"{self.timeout_s:g} s){tls}"
             ) from error
@@ -120,20 +120,20 @@ class Dask:
         try:
             found = within(self.timeout_s, lambda: _versions_there(client))
         except TimeoutError as error:
-            raise HdoptError(
+            raise EngineFailed(
                 f"the workers of the scheduler at {self.address} do not answer for {self.timeout_s:g} s; restart them"
             ) from error
         for address, there in found.items():
             if isinstance(there, Exception):
-                raise HdoptError(f"the worker {address} does not answer ({type(there).__name__}); start it again")
+                raise EngineFailed(f"the worker {address} does not answer ({type(there).__name__}); start it again")
             for name in MUST_AGREE:
                 if there[name] != here[name]:
                     has = f"has {name} {there[name]}" if there[name] else f"has no {name}"
-                    raise HdoptError(f"the worker {address} {has}, here it is {here[name]}; install the same there")
+                    raise EngineFailed(f"the worker {address} {has}, here it is {here[name]}; install the same there")
         return max(1, sum(int(worker["nthreads"]) for worker in workers.values()))
 
-    def _no_workers(self) -> HdoptError:
-        return HdoptError(
+    def _no_workers(self) -> EngineFailed:
+        return EngineFailed(
             f"the Dask scheduler at {self.address} has had no workers for {self.timeout_s:g} s; start some with "
             f"'dask worker {self.url}'"
         )
@@ -147,7 +147,7 @@ class Dask:
             try:
                 return future.result(timeout=GLANCE_S)
             except KilledWorker as error:
-                raise HdoptError(
+                raise EngineFailed(
                     f"{error.last_worker.address if error.last_worker else 'a worker'} and others before it died over "
                     "the same piece of work, for want of memory most likely; give them more, or fewer threads each"
                 ) from error
@@ -164,8 +164,8 @@ class Dask:
                 elif time.monotonic() - last_seen > self.timeout_s:
                     raise self._no_workers() from error
 
-    def _lost(self) -> HdoptError:
-        return HdoptError(
+    def _lost(self) -> EngineFailed:
+        return EngineFailed(
             f"the connection to the Dask scheduler at {self.address} was lost in the middle of the work; see whether "
             "it still runs, and start again"
         )

@@ -9,7 +9,7 @@ from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from hdopt.errors import HdoptError
+from hdopt.errors import EngineFailed
 from hdopt.parallel.workers import as_worker, become_worker, cores, in_a_worker, one_linear_algebra_thread
 
 T = TypeVar("T")
@@ -111,7 +111,7 @@ class Processes:
         try:
             yield from in_order(pool, submit, items, WAITING * self.workers)
         except BrokenProcessPool as error:
-            raise HdoptError(
+            raise EngineFailed(
                 "a worker process ended in the middle of its work, for want of memory most likely; give fewer workers, "
                 f"as in --engine processes:{max(1, self.workers // 2)}"
             ) from error

@@ -280,14 +280,14 @@ def study_of(document: Document, name: str, folder: Path) -> Study:
     if (work := files_of_work()) is not None:
         work.facts |= {"study": name, "study_sha256": study.sha256, "source": document.source}
         work.place = lambda: place_of_numbers(document)
-        work.values = lambda message: _values_named(document, message)
+        work.values = lambda message: _places_named(document, message)
     return study
 
 
-def _values_named(document: Document, message: str) -> tuple[str, ...]:
-    from hdopt.study.named import values_named
+def _places_named(document: Document, message: str) -> tuple[str, ...]:
+    from hdopt.study.named import places_named
 
-    return values_named(document, message)
+    return places_named(document, message)
 
 
 def place_of_numbers(document: Document) -> str:

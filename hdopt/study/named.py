@@ -1,4 +1,4 @@
-"""Which values of a study a message speaks of: those that it shows, with file and line."""
+"""Which values and keys of a study a message speaks of: those that it shows or names, with file and line."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from typing import Any  # Any: what a study file holds, of TOML's several kinds
 from hdopt.study.document import Document, Keys, leaves
 
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
-EXAMPLE = re.compile(r"\b(?:such as|as in|for example)\b[^;]*")
+EXAMPLE = re.compile(r"\b(?:such as|as in|as with|for example)\b[^;]*")
 """What a message shows for its reader to write: numbers there are nobody's."""
+KEY = re.compile(r"(?<![\w.\-/])[a-z]\w*(?:\.\w+)+|\[(\w+)\](?: (\w+))?")
+"""A key as messages name it: export.bore_mm, [tolerances], [tolerances] axis_tilt_x_deg."""
 COMMON = 100
 """Whole numbers up to this stand in many a message and many a study: they are taken only beside their key's name."""
 
@@ -51,6 +53,25 @@ def values_named(document: Document, message: str) -> tuple[str, ...]:
         if _stands(document, path) and shows(message, value, path[-1]):
             shown.setdefault(float(value), []).append(path)
     return tuple(document.where(paths[0]) for paths in shown.values() if len(paths) == 1)
+
+
+def keys_named(document: Document, message: str) -> tuple[str, ...]:
+    """Where in `document` the keys and sections stand that `message` names, 'FILE, line N, a.b' each; keys that it
+    does not have, and those of examples, are left out."""
+    found: dict[Keys, None] = {}
+    for named in KEY.finditer(EXAMPLE.sub("", message)):
+        section, key = named.groups()
+        path = tuple(named.group().split(".")) if section is None else (section,)
+        for longest in (path, (*path, key or "")):
+            if longest in document.lines:
+                found.pop(path, None)
+                found[longest] = None
+    return tuple(document.where(path) for path in found)
+
+
+def places_named(document: Document, message: str) -> tuple[str, ...]:
+    """Where in `document` to look for what `message` says: at the values that it shows, then at the keys it names."""
+    return tuple(dict.fromkeys((*values_named(document, message), *keys_named(document, message))))
 
 
 def _stands(document: Document, path: Keys) -> bool:

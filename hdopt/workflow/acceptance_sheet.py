@@ -68,7 +68,7 @@ def acceptance_sheet(
     if speed_rpm is not None and not 0 < speed_rpm < math.inf:
         raise HdoptError(f"the input speed is {speed_rpm:g} rpm; it must be a finite number above 0")
     if mountings and len(mountings) != len(recordings):
-        raise HdoptError(f"{len(mountings)} mountings are named for {len(recordings)} recordings; name one for each")
+        raise HdoptError(f"--mounting names {len(mountings)} for {len(recordings)} recordings; name one for each")
     moving = [r for r in recordings if not r.input_locked]
     sweeps = [t for t in map(torsion_of, recordings) if t is not None]
     parts = tuple(figures.cells_of(r) for r in moving)

@@ -14,7 +14,7 @@ from hdopt.errors import HdoptError, numbers_of
 from hdopt.recordings.recording import Recording
 from hdopt.study import Study, as_study, place_of_numbers
 from hdopt.study.document import Document
-from hdopt.study.named import values_named
+from hdopt.study.named import places_named
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -45,8 +45,8 @@ _SECTION = re.compile(r"\[(\w+)\]:? ?(\w*)")
 
 @contextmanager
 def _sections_placed(document: Document) -> Iterator[None]:
-    """Messages that begin with a section of the study, '[tolerances] axis_tilt_y_deg: ...', or show a value of it, get
-    file and line."""
+    """Messages that begin with a section of the study, '[tolerances] axis_tilt_y_deg: ...', or show a value or name a
+    key of it, get file and line."""
     try:
         yield
     except HdoptError as error:
@@ -62,7 +62,7 @@ def _place(message: str, document: Document) -> str:
         return document.where(path).removesuffix(f", {'.'.join(path)}")
     if document.source in message or "--set " in message:
         return ""
-    return "; ".join(values_named(document, message)[:MOST_NAMED])
+    return "; ".join(places_named(document, message)[:MOST_NAMED])
 
 
 def recordings_named(work: F) -> F:

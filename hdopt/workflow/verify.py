@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any  # Any: values of JSON
+from typing import TYPE_CHECKING, Any, cast  # Any: values of JSON
 
 from hdopt.errors import HdoptError
 from hdopt.files import ShownAsTable, read_json
@@ -72,15 +72,13 @@ def verify_run(folder: str | Path, progress: Progress = iter) -> Verification:
     Raises `HdoptError` where the folder holds no run, or its study is no longer where it was.
     """
     folder = Path(folder)
-    old = read_json(folder / RESULTS_FILE, "a folder that `hdopt run` wrote")
-    known = old.get("provenance") if isinstance(old, dict) else None
-    if not isinstance(known, dict) or not isinstance(known.get("source"), dict) or not known["source"]:
-        raise HdoptError(f"{folder / RESULTS_FILE} does not say which study it is of; run the study again")
+    old = _results_of(folder)
+    known, seed = old["provenance"], old["provenance"].get("seed", 1)
     recipe = known["source"]
     study = load_study(recipe.get("source"), tuple(recipe.get("overrides", ())), recipe.get("drive"))
     with tempfile.TemporaryDirectory() as scratch:
         new_folder = Path(scratch) / "run"
-        run_study(study, new_folder, int(known.get("seed", 1)), progress)
+        run_study(study, new_folder, seed, progress)
         new = json.loads((new_folder / RESULTS_FILE).read_bytes())
         same: list[str] = []
         differing: list[str] = []
@@ -88,8 +86,30 @@ def verify_run(folder: str | Path, progress: Progress = iter) -> Verification:
             (same if _alike(folder / name, new_folder / name, known, new["provenance"]) else differing).append(name)
         numbers = tuple(_differences(_moved(old["steps"], folder), _moved(new["steps"], new_folder)))
     (differing if numbers else same).append(RESULTS_FILE)
-    changes = tuple(_changes(known, provenance(study, int(known.get("seed", 1)))))
+    changes = tuple(_changes(known, provenance(study, seed)))
     return Verification(folder, tuple(same), tuple(differing), numbers, changes)
+
+
+FORM: Mapping[str, type[Any]] = {"source": dict, "files": dict, "inputs": dict, "libraries": dict, "machine": dict}
+"""What a run's provenance holds under these keys, where it has them; it must have the first two."""
+
+
+def _results_of(folder: Path) -> dict[str, Any]:
+    """The results of the run in `folder`, of the form that a run writes them in; `HdoptError` for any other."""
+    path = folder / RESULTS_FILE
+    old = read_json(path, "a folder that `hdopt run` wrote")
+    known = old.get("provenance") if isinstance(old, dict) else None
+    if not isinstance(known, dict) or not known.get("source") or not isinstance(old.get("steps"), dict):
+        raise HdoptError(f"{path} does not say which study it is of; run the study again")
+    recipe, seed, date = known["source"], known.get("seed", 1), known.get("date", "")
+    sound = all(isinstance(known.get(key, {}), kind) for key, kind in FORM.items()) and "files" in known
+    sound = sound and type(seed) is int and 0 <= seed < 2**63 and isinstance(date, str)
+    names = [recipe.get("source"), recipe.get("drive")] if isinstance(recipe, dict) else [0]
+    overrides = recipe.get("overrides", []) if isinstance(recipe, dict) else 0
+    listed = isinstance(overrides, list) and all(isinstance(text, str) for text in overrides)
+    if not (sound and listed and all(name is None or isinstance(name, str) for name in names)):
+        raise HdoptError(f"{path} is not as `hdopt run` writes it, under provenance; run the study again")
+    return cast(dict[str, Any], old)
 
 
 def _alike(old: Path, new: Path, then: Mapping[str, Any], now: Mapping[str, Any]) -> bool:

@@ -17,6 +17,7 @@ from hdopt.files import (
     replacing,
     replacing_all,
     to_csv,
+    to_json,
     watching_files,
     write_text,
 )
@@ -152,6 +153,12 @@ try:
 except (KeyboardInterrupt, Terminated):
     sys.exit(3)
 """
+
+
+def test_the_largest_seed_is_read_again(tmp_path):
+    """`hdopt run --verify` reads it from results.json."""
+    (tmp_path / "r.json").write_text(to_json({"seed": 2**63 - 1, "least": -(2**63)}))
+    assert read_json(tmp_path / "r.json", "another") == {"seed": 2**63 - 1, "least": -(2**63)}
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

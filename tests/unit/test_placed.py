@@ -1,5 +1,7 @@
 """A refusal names the option, or the file and line, of the number that it speaks of."""
 
+import re
+
 import click
 import pytest
 from hypothesis import given, settings
@@ -7,9 +9,14 @@ from hypothesis import strategies as st
 
 import hdopt
 from hdopt.cli import main
-from hdopt.cli.app import COMMANDS, cli
+from hdopt.cli.app import COMMANDS, _placing, cli
+from hdopt.cli.place import placed
+from hdopt.errors import EngineFailed
+from hdopt.files import FilesOfWork, note_input, watching_files
+from hdopt.parallel.cluster import Dask
+from hdopt.study import leaves, load_study
 from hdopt.study.document import parse_document
-from hdopt.study.named import shows, values_named
+from hdopt.study.named import keys_named, places_named, shows, values_named
 
 STUDY = """drive = "csf-25-80"
 
@@ -102,3 +109,78 @@ def test_a_common_number_is_taken_only_beside_its_name():
     document = parse_document("a_mm = 2\nlimit = 3\nb = 0.25\nc = 0.25\nd = 0.75\n", "s.toml")
     assert values_named(document, "the limit is 3, 2 are needed") == ("s.toml, line 2, limit",)
     assert values_named(document, "0.25 and 0.75") == ("s.toml, line 5, d",)
+
+
+WORDS = st.sampled_from(
+    ["the", "solver", "sobol", "ellipse", "threads", "rss", "least_squares", "csf-25-80", "none", "12", "0.5", "arcmin"]
+)
+COMMAND_LINES = {
+    "stack": ["csf-25-80-tolerances"],
+    "allocate": ["csf-25-80-tolerances"],
+    "search": ["csf-25-80-design-trade"],
+    "ke": ["s.toml"],
+    "run": ["s.toml"],
+    "export": ["s.toml"],
+    "compare": ["cam.csv"],
+    "explore": [],
+    "inspect": ["r.csv"],
+    "diagnose": ["r.csv", "--drive", "none", "--ratio", "7.2"],
+    "compensate": ["r.csv", "-o", "o.csv"],
+}
+
+
+@pytest.mark.parametrize("name", COMMAND_LINES)
+def test_whatever_a_command_refuses_names_a_file_or_an_option(name, inputs):
+    """Words that are the defaults of options are in many a message, and no place to look."""
+    (inputs / "s.toml").write_text(STUDY)
+    context = cli.get_command(click.Context(cli), name).make_context(name, list(COMMAND_LINES[name]))
+    with watching_files() as work, context:
+        study = context.params.get("study")
+        if "recordings" not in context.params:
+            load_study(None if name == "compare" else study)
+        for recording in context.params.get("recordings", ()):
+            note_input(recording)
+        places = [re.escape(path.name) for path in work.inputs] + [re.escape(work.facts.get("source", "r.csv"))]
+        places += [rf"(?<!\S){word}(?!\w)" for parameter in context.command.params for word in parameter.opts]
+
+        @settings(max_examples=50, derandomize=True, deadline=None)
+        @given(st.lists(WORDS, min_size=1, max_size=8).map(" ".join))
+        def refused(message):
+            if name in ("inspect", "diagnose", "compensate") or not re.search(rf"(?<!\S){study}(?!\S)", message):
+                said = placed(message, context, work)
+                assert said.endswith(message)
+                assert any(re.search(place, said.removesuffix(message)) for place in places), said
+
+        refused()
+
+
+@pytest.mark.parametrize("source", ["csf-25-80-tolerances", "csf-25-80-design-trade", "paper-reproduction"])
+def test_a_message_that_names_a_key_comes_with_its_line(source):
+    document = load_study(source).document
+    keys = [path for path in leaves(document.data) if path in document.lines and len(path) > 1]
+    for path in keys:
+        dotted = ".".join(path)
+        said = placed(f"the pieces do not fit; change {dotted}", None, of(document))
+        assert said.startswith(f"{document.source}, line {document.lines[path]}, {dotted}: ")
+        if len(path) == 2:
+            assert placed(f"[{path[0]}] {path[1]} is too large", None, of(document)).startswith(document.where(path))
+        assert keys_named(document, f"nothing fits; leave it out, as with {dotted}") == (), "an example is nobody's"
+    assert len(keys) >= 3 and keys_named(document, "hdopt.stack and drive.nothing, docs/a.b") == ()
+
+
+def of(document):
+    return FilesOfWork(facts={"source": document.source}, values=lambda message: places_named(document, message))
+
+
+def test_an_engine_that_fails_is_no_fault_of_the_study():
+    def work():
+        Dask("127.0.0.1:9", timeout_s=1.0)._knock()
+
+    with pytest.raises(EngineFailed, match="^--engine: no Dask scheduler answers at 127"):
+        _placing(work)()
+
+
+def test_an_option_whose_word_is_refused_is_named(inputs, capsys):
+    (inputs / "s.toml").write_text(STUDY)
+    said = refusal(["compare", "cam.csv", "--part", "lid"], capsys)
+    assert said.startswith("hdopt: --part lid: unknown part")

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import hdopt.workflow.run
+import hdopt.workflow.verify
 from hdopt.cli import main
 from hdopt.errors import HdoptError
 from hdopt.files import replacing, watching_files, write_text
@@ -251,6 +252,24 @@ def test_a_folder_without_a_run_cannot_be_verified(tmp_path):
     (tmp_path / "results.json").write_text("{}")
     with pytest.raises(HdoptError, match="does not say which study it is of"):
         verify_run(tmp_path)
+
+
+def test_results_of_another_form_are_refused_with_their_file(study, tmp_path, steps, monkeypatch):
+    """Somebody's edit, a half-merged file: each part of it in turn, and never a bare KeyError."""
+    path = tmp_path / "out" / "results.json"
+    with watching_files():
+        run_study(study, path.parent)
+    sound = path.read_text()
+    monkeypatch.setattr(hdopt.workflow.verify, "run_study", lambda *_: pytest.fail("was repeated"))
+    for wrong in (None, 1, -1, 1.5, "x", [], [1], {"source": [], "overrides": 3}):
+        for place in (["steps"], ["provenance"], *(["provenance", key] for key in ("source", "files", "seed", "date"))):
+            results = json.loads(sound)
+            beside = results["provenance"] if len(place) > 1 else results
+            if type(wrong) is not type(beside[place[-1]]) or wrong == -1 or place[-1] in ("source", "provenance"):
+                beside[place[-1]] = wrong
+                path.write_text(json.dumps(results))
+                with pytest.raises(HdoptError, match=r"results\.json (does not say|is not as)"):
+                    verify_run(path.parent)
 
 
 @pytest.mark.parametrize("engine", [ThisProcess(), Threads(3)])
