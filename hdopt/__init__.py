@@ -6,6 +6,7 @@ docs/python.md lists them. Names are imported when they are first used, so that 
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any  # Any: whatever of the package is asked for by name
 
@@ -143,7 +144,21 @@ def __getattr__(name: str) -> Any:
         return version("hdopt")
     if name not in _EXPORTS:
         raise AttributeError(f"module 'hdopt' has no attribute {name!r}")
-    return getattr(import_module(_EXPORTS[name]), name)
+    return _public(name)
+
+
+@cache
+def _public(name: str) -> Any:
+    from types import FunctionType
+
+    if name not in _EXPORTS:  # a built-in type, of an annotation
+        raise KeyError(name)
+    found = getattr(import_module(_EXPORTS[name]), name)
+    if not isinstance(found, FunctionType):
+        return found
+    from hdopt.workflow.called import as_called
+
+    return as_called(found, _public)
 
 
 def __dir__() -> list[str]:

@@ -10,6 +10,10 @@ class HdoptError(ValueError):
     """Unusable input. The message says what came, what is allowed, and what to do next."""
 
 
+class WrongCall(HdoptError, TypeError):
+    """A call of a public function with an argument that it does not take."""
+
+
 class MissingValue(HdoptError):
     """A number is needed that nobody gave."""
 

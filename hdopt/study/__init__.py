@@ -12,7 +12,16 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar  # Any: what a study file holds, of TOML's several kinds
 
-from hdopt.errors import HdoptError, MissingSection, MissingValue, NoResult, numbers_of, shown, unknown_name
+from hdopt.errors import (
+    HdoptError,
+    MissingSection,
+    MissingValue,
+    NoResult,
+    WrongCall,
+    numbers_of,
+    shown,
+    unknown_name,
+)
 from hdopt.files import files_of_work
 from hdopt.study.document import (
     SET_ON_COMMAND_LINE,
@@ -181,8 +190,13 @@ class Study:
         a table takes the section's place. The new study is checked like a file, and no file is read again. Raises
         `HdoptError` for an unknown or ambiguous key.
         """
+        if not isinstance(changes, Mapping | None) or not all(isinstance(key, str) for key in changes or ()):
+            raise WrongCall(
+                f"study.with_: {shown(str(changes))} holds no keys; give KEY=VALUE, or a dictionary of dotted path "
+                'and value, as in study.with_({"wave_generator.width_mm": 8})'
+            )
         values = {**(changes or {}), **more}
-        return study_of(with_values(self.document, values.items(), "with_"), self.name, self.folder)
+        return study_of(with_values(self.document, values.items(), "study.with_"), self.name, self.folder)
 
     @property
     def title(self) -> str:
@@ -343,7 +357,7 @@ def with_values(document: Document, values: Iterable[tuple[str, Any]], place: st
         path = (key,) if key in SECTIONS and isinstance(value, Mapping) else _resolve(key, data, place)
         set_value(data, path, value)
         lines[path] = SET_ON_COMMAND_LINE
-    return replace(document, data=data, lines=lines)
+    return replace(document, data=data, lines=lines, set_by=place)
 
 
 def _resolve(key: str, data: Mapping[str, Any], place: str) -> tuple[str, ...]:
@@ -357,6 +371,8 @@ def _resolve(key: str, data: Mapping[str, Any], place: str) -> tuple[str, ...]:
         if parts[1] in known:
             return parts
         raise HdoptError(f"{place} [study]: {unknown_key(parts[1], known)}")
+    if len(parts) == 1 and key in SECTIONS:
+        raise HdoptError(f"{place} {key}: is a section; give a table of its keys, or one of them, {key}.KEY")
     if parts[0] != "effects":
         # The effects compile: they are asked only about what no other section has.
         found = _match(key, parts, data, known_paths(data, without=("effects",)), place)

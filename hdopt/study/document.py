@@ -17,7 +17,7 @@ from hdopt.study.toml_faults import why_no_toml
 Keys = tuple[str, ...]
 
 SET_ON_COMMAND_LINE = 0
-"""Stands for the line of a key that --set gave."""
+"""Stands for the line of a key that --set, or `Study.with_`, gave."""
 
 DEEPEST = 12
 """Levels of tables and arrays; the deepest study that ships has five."""
@@ -34,17 +34,18 @@ _KEY = re.compile(r"^\s*((?:\"[^\"]*\"|'[^']*'|[A-Za-z0-9_.-])+)\s*=")
 @dataclass(frozen=True)
 class Document:
     """A parsed study file: its nested `data`, and the `source` and `lines` that messages point to; `texts` are those of
-    the files that it was read from, what lies below first."""
+    the files that it was read from, what lies below first. `set_by` is what keys without a line were set by."""
 
     data: Mapping[str, Any]
     source: str
     lines: Mapping[Keys, int]
     texts: tuple[str, ...] = ()
+    set_by: str = "--set"
 
     def where(self, path: Keys) -> str:
         """'FILE, line N, a.b': the closest place in the file to the key `path`."""
         if self.lines.get(path) == SET_ON_COMMAND_LINE:
-            return f"--set {'.'.join(path)}"
+            return f"{self.set_by} {'.'.join(path)}"
         for depth in range(len(path), 0, -1):
             if self.lines.get(path[:depth], SET_ON_COMMAND_LINE) != SET_ON_COMMAND_LINE:
                 return f"{self.source}, line {self.lines[path[:depth]]}, {'.'.join(path)}"

@@ -60,7 +60,7 @@ def _place(message: str, document: Document) -> str:
     if found := _SECTION.match(message):
         path = tuple(part for part in found.groups() if part)
         return document.where(path).removesuffix(f", {'.'.join(path)}")
-    if document.source in message or "--set " in message:
+    if document.source in message or f"{document.set_by} " in message:
         return ""
     return "; ".join(places_named(document, message)[:MOST_NAMED])
 

@@ -18,7 +18,7 @@ def test_a_changed_study_equals_one_loaded_with_the_change():
 
 def test_a_changed_study_is_checked_like_a_file():
     study = hdopt.load_study()
-    with pytest.raises(HdoptError, match=r"with_ unknown key 'widht_mm'; .*'width_mm'"):
+    with pytest.raises(HdoptError, match=r"study.with_ unknown key 'widht_mm'; .*'width_mm'"):
         study.with_(widht_mm=8.0)
     with pytest.raises(HdoptError, match=r"width_mm: is -1\.0; it must be greater than or equal to 0\.1"):
         study.with_(width_mm=-1.0)
