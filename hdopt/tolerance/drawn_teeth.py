@@ -88,11 +88,6 @@ def check_graded(drive: Drive, graded: Mapping[str, GradedTeeth]) -> None:
             raise HdoptError(
                 f"{spline} are measured one by one in [{spline}] and toleranced in [tolerances]; leave either out"
             )
-    if graded and not drive.wave_generator.profile.tip_is_smooth:
-        raise HdoptError(
-            f"teeth are not drawn for the profile {drive.wave_generator.profile.name!r}, which takes the exact "
-            "geometry drive by drive; take another profile, or tooth amplitudes instead of pitch tolerances"
-        )
 
 
 def drawn_peak_to_peak_arcmin(

@@ -153,15 +153,13 @@ class DriveResponse:
         return matrix
 
     def __call__(self, inputs: Array) -> Array:
-        from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin, peak_to_peak_arcmin
+        from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin
 
         if self.teeth:
             return drawn_peak_to_peak_arcmin(self.drive, self.matrix(inputs), inputs, self.teeth, *self._shares)
         if self.drive.has_measured_teeth and self.homogenization != 1:
             return self._shared(inputs)
-        if self.drive.wave_generator.profile.tip_is_smooth:
-            return self.homogenization * matrix_peak_to_peak_arcmin(self.drive, self.matrix(inputs))
-        return self.homogenization * peak_to_peak_arcmin(self.drive, self.errors(inputs))
+        return self.homogenization * matrix_peak_to_peak_arcmin(self.drive, self.matrix(inputs))
 
     def _shared(self, inputs: Array) -> Array:
         """Each term of drives with `inputs` (n, d) as the teeth in contact share it: sines by k_e, misalignment by its

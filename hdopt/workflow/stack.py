@@ -206,11 +206,6 @@ def _linear(study: Study) -> ToleranceProblem:
 def _homogenization(study: Study, kind: str) -> float:
     if kind == "single_tooth":
         return 1.0
-    if study.drive.has_measured_teeth and not study.drive.wave_generator.profile.tip_is_smooth:
-        raise HdoptError(
-            "measured teeth on a measured wave generator are not evened out in a stack; take "
-            'requirement.homogenization = "single_tooth"'
-        )
     from hdopt.mechanics.contact_model import contact_of
 
     return contact_of(study.drive).homogenization()
@@ -298,7 +293,7 @@ def _exact_response(problem: ToleranceProblem, n: int, distance: ModelError | No
 
 def _directions(problem: ToleranceProblem, n: int) -> int:
     """Directions that the straight line of `problem` is averaged over, where its sample has `n` drives. On a measured
-    cam each drive takes the exact geometry, a hundred thousand times as long as the kernel: the line then takes no more
+    cam each drive takes the exact geometry, some thousand times as long as the closed form: the line then takes no more
     drives than the sample, or 128 directions."""
     response = problem.response
     if not isinstance(response, DriveResponse) or response.drive.wave_generator.profile.tip_is_smooth:
