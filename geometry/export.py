@@ -16,7 +16,7 @@ import numpy as np
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError, MissingLibrary, unknown_name
 from hdopt.figures import drawn
-from hdopt.files import JsonReady, ShownAsTable, replacing_all
+from hdopt.files import JsonReady, ShownAsTable, is_special, replacing_all
 from hdopt.geometry.budget import CalloutTables
 from hdopt.geometry.dimensions import Dimension
 from hdopt.geometry.formats import FORMATS
@@ -128,14 +128,15 @@ def export_drive(
         if kind not in FORMATS:
             raise HdoptError(unknown_name("file format", kind, FORMATS))
     targets = {kind: Path(path) for kind, path in files.items()}
-    if len({path.resolve() for path in targets.values()}) < len(targets):
+    files_meant = [path.resolve() for path in targets.values() if not is_special(path)]
+    if len(set(files_meant)) < len(files_meant):
         raise HdoptError("two files of the export have the same name; give each its own")
     _require_suffixes(targets)
     job = make_job(drive, options, name, bounds, contributors)
     if any(FORMATS[kind].needs_solids for kind in targets):
         require_cadquery()
     checks = {}
-    replaced = tuple(kind for kind, path in targets.items() if path.exists())
+    replaced = tuple(kind for kind, path in targets.items() if path.exists() and not is_special(path))
     with replacing_all(targets.values()) as paths:
         passing = dict(zip(targets, paths, strict=True))
         for kind, path in passing.items():

@@ -2,7 +2,7 @@
 
 An output gets a passing name in its own folder, reaches the disk, and only then takes its name: whoever looks sees the
 old file or the new one. A symbolic link is followed (the link stays, its target changes); a device, pipe or socket is
-written to as it is.
+written to as it is, and a pipe that nothing reads is refused.
 """
 
 from __future__ import annotations
@@ -15,10 +15,12 @@ import math
 import os
 import re
 import secrets
+import signal
 import stat
 import tempfile
+import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -76,6 +78,8 @@ class FilesOfWork:
 
     values: Callable[[str], tuple[str, ...]] | None = None
     """Says where the values and keys stand that a message shows or names; None for work without a study."""
+    came: list[BaseException] = field(default_factory=list)
+    """What signals have raised so far."""
 
     def place_of_numbers(self) -> str:
         """Where the numbers of this work stand: in its study, else in its inputs."""
@@ -336,31 +340,73 @@ def replacing(path: Path) -> Iterator[Path]:
     What stands under it at the end reaches the disk and takes the place of `path`; where anything fails, and on Ctrl-C
     and SIGTERM too, `path` stays as it was and the passing file goes. Raises `HdoptError` for what cannot be written.
     """
-    check_output(path)
-    real = _real(path)
-    passing = _passing_name(real)
-    try:
-        try:
-            _create(passing, real)
-            yield passing
-            _finish(passing, real)
-        except OSError as error:
-            if isinstance(error, BrokenPipeError):
-                raise
-            remedy = "make room there" if error.errno in FULL else "give a file in a folder that can be written"
-            raise HdoptError(f"cannot write {path}: {_why(error)}; {remedy}") from error
-    finally:
-        with suppress(OSError):
-            passing.unlink(missing_ok=True)
+    with replacing_all((path,)) as (passing,):
+        yield passing
 
 
 @contextmanager
 def replacing_all(paths: Iterable[Path]) -> Iterator[list[Path]]:
-    """The same for several `paths` that belong together: none takes its name before all are whole."""
-    from contextlib import ExitStack
+    """The same for several `paths` that belong together: all take their names, or none does."""
+    targets = list(paths)
+    for path in targets:
+        check_output(path)
+    reals = {path: _real(path) for path in targets}
+    passing = {path: _passing_name(real) for path, real in reals.items()}
+    work = _of_work.get()
+    before = len(work.came) if work is not None else 0
+    _under_way.update(passing.values())
+    try:
+        for path in targets:
+            _create(passing[path], reals[path])
+        yield [passing[path] for path in targets]
+        if work is not None and len(work.came) > before:
+            raise work.came[-1]  # a signal that compiled code swallowed
+        _finish(targets, passing, reals)
+    except OSError as error:
+        if isinstance(error, BrokenPipeError):
+            raise
+        meant = [path for path in targets if error.filename in (str(passing[path]), str(reals[path]))] or targets
+        remedy = "make room there" if error.errno in FULL else "give a file in a folder that can be written"
+        raise HdoptError(f"cannot write {', '.join(map(str, meant))}: {_why(error)}; {remedy}") from error
+    finally:
+        with _signals_wait():
+            _drop(passing.values())
 
-    with ExitStack() as stack:
-        yield [stack.enter_context(replacing(path)) for path in paths]
+
+_under_way: set[Path] = set()
+"""Passing names that may stand on disk."""
+
+
+def drop_passing_files() -> None:
+    """Remove what stands under passing names, before a process ends at once and leaves no time for it."""
+    _drop(tuple(_under_way))
+
+
+def _drop(names: Iterable[Path]) -> None:
+    for name in names:
+        with suppress(OSError):
+            name.unlink(missing_ok=True)
+        _under_way.discard(name)
+
+
+@contextmanager
+def _signals_wait() -> Iterator[None]:
+    """SIGINT and SIGTERM come at the end of the block instead of within it, where this thread is the one they reach."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    handlers = {}
+    try:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(number) not in (None, signal.SIG_IGN):
+                handlers[number] = signal.signal(number, lambda number, frame: came.append(number))
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for late in came:
+            signal.raise_signal(late)
 
 
 def is_special(path: Path) -> bool:
@@ -386,15 +432,39 @@ def _create(passing: Path, real: Path) -> None:
         passing.chmod(stat.S_IMODE(real.stat().st_mode))
 
 
-def _finish(passing: Path, real: Path) -> None:
-    if is_special(real):
-        with open(real, "wb") as device:
-            device.write(passing.read_bytes())
-        return
-    with open(passing, "rb") as file:
-        os.fsync(file.fileno())
-    os.replace(passing, real)
-    sync_folder(real.parent)
+def _finish(targets: Sequence[Path], passing: Mapping[Path, Path], reals: Mapping[Path, Path]) -> None:
+    """Give the `passing` files the names of their `targets`, once all of them have reached the disk."""
+    files = [path for path in targets if not is_special(path)]
+    for path in files:
+        with open(passing[path], "rb") as file:
+            os.fsync(file.fileno())
+    for path in targets:
+        if path not in files:
+            _pass_on(passing[path], path)
+    with _signals_wait():
+        for path in files:
+            os.replace(passing[path], reals[path])
+    for folder in dict.fromkeys(reals[path].parent for path in files):
+        sync_folder(folder)
+
+
+def _pass_on(content: Path, path: Path) -> None:
+    """Write the `content` of a file to the device, pipe or socket at `path`. A pipe without a reader is refused:
+    opening it would wait for one, perhaps for ever."""
+    is_stream = str(path).startswith(STREAMS)
+    try:
+        handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
+    except OSError as error:
+        if error.errno != errno.ENXIO or not stat.S_ISFIFO(path.stat().st_mode):
+            raise
+        if is_stream:
+            raise BrokenPipeError from error
+        raise HdoptError(
+            f"cannot write {path}: it is a pipe that nothing reads; start its reader first, or give a file"
+        ) from error
+    with open(handle, "wb") as device:
+        os.set_blocking(handle, True)
+        device.write(content.read_bytes())
 
 
 def sync_folder(folder: Path) -> None:
@@ -417,12 +487,12 @@ def check_output(path: Path) -> None:
         name = real.name
         if real.is_dir() or str(path).endswith(os.sep) or not name:
             raise HdoptError(f"cannot write {path}: it is a folder; give the name of a file")
-        if real.is_symlink():
-            raise HdoptError(f"cannot write {path}: the link leads nowhere; give the name of a file")
         if is_special(real):
             if not os.access(real, os.W_OK):
                 raise HdoptError(f"cannot write {path}: permission denied; give a file that can be written")
             return
+        if real.is_symlink():
+            raise HdoptError(f"cannot write {path}: the link leads nowhere; give the name of a file")
         if len(os.fsencode(name)) > 255 or "\0" in str(path):
             raise HdoptError(f"cannot write {path}: the name is too long or not one; give a shorter name")
         if not real.parent.is_dir():

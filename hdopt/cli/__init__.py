@@ -24,10 +24,10 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     `arguments` stand in for those of the process. HDOPT_TRACEBACK=1 in the environment shows where a fault arose.
     """
     _open_streams()
-    came: list[int] = []
+    came: list[BaseException] = []
     try:
         with _signals_raise(came):
-            status = _run(arguments)
+            status = _run(arguments, came)
             sys.stdout.flush()
     except KeyboardInterrupt:
         _leave(INTERRUPTED, "interrupted", at_once=arguments is None)
@@ -58,7 +58,7 @@ def _open_streams() -> None:
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")
 
 
-def _run(arguments: Sequence[str] | None) -> int:
+def _run(arguments: Sequence[str] | None, came: list[BaseException]) -> int:
     import warnings
 
     import click
@@ -72,6 +72,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         warnings.filterwarnings("ignore", category=RuntimeWarning)
     try:
         with watching_files() as work, numbers_of(work.place_of_numbers):
+            work.came = came
             status = cli.main(args=arguments, prog_name="hdopt", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as help_text:
         help_text.show()
@@ -110,39 +111,46 @@ def _say(message: str) -> None:
 def _leave(status: int, message: str, at_once: bool) -> NoReturn:
     """End after an interruption. A process of our own ends `at_once`: threads under way and the unloading of compiled
     libraries, which an interruption may have left in any state, are not waited for."""
+    if at_once:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     _say(message)
     if at_once:
+        from hdopt.files import drop_passing_files
+
+        drop_passing_files()
         with suppress(OSError, ValueError):
             sys.stdout.flush()
         os._exit(status)
     sys.exit(status)
 
 
-def _leave_if_interrupted(error: Exception, came: Sequence[int], at_once: bool) -> None:
-    """End as on an interruption where one `came` (statuses of what came) or is what `error` came from: a compiled
-    library that is interrupted, in a callback or while it is imported, raises an error of its own."""
+def _leave_if_interrupted(error: Exception, came: Sequence[BaseException], at_once: bool) -> None:
+    """End as on an interruption where one `came` or is what `error` came from: a compiled library that is interrupted,
+    in a callback or while it is imported, raises an error of its own."""
     hidden = list(came)
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, KeyboardInterrupt | Terminated):
-            hidden.append(INTERRUPTED if isinstance(cause, KeyboardInterrupt) else TERMINATED)
+            hidden.append(cause)
         cause = cause.__cause__ or cause.__context__
-    if hidden:
-        _leave(hidden[-1], "interrupted" if hidden[-1] == INTERRUPTED else "ended by SIGTERM", at_once)
+    if hidden and isinstance(hidden[-1], Terminated):
+        _leave(TERMINATED, "ended by SIGTERM", at_once)
+    elif hidden:
+        _leave(INTERRUPTED, "interrupted", at_once)
 
 
 @contextmanager
-def _signals_raise(came: list[int]) -> Iterator[None]:
-    """SIGTERM as an exception, as SIGINT is, so that what is half-written goes; what `came` is noted by its status.
+def _signals_raise(came: list[BaseException]) -> Iterator[None]:
+    """SIGTERM as an exception, as SIGINT is, so that what is half-written goes; what `came` is noted.
     Only the main thread may ask for that, and a SIGINT that is ignored stays so."""
 
     def terminate(number: int, frame: FrameType | None) -> None:
-        came.append(TERMINATED)
-        raise Terminated
+        came.append(Terminated())
+        raise came[-1]
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        came.append(INTERRUPTED)
-        raise KeyboardInterrupt
+        came.append(KeyboardInterrupt())
+        raise came[-1]
 
     try:
         before = {signal.SIGTERM: signal.signal(signal.SIGTERM, terminate)}

@@ -1,6 +1,8 @@
 """Outputs are written whole or not at all, inputs are never outputs, and JSON input is refused in one sentence."""
 
+import gc
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -173,6 +175,95 @@ def test_a_signal_leaves_no_passing_file(tmp_path, number):
         assert process.wait(20) == 3
     assert names(tmp_path) == ["report.html"]
     assert (tmp_path / "report.html").read_text() == "old"
+
+
+def interrupted_at(line, work):
+    """Run `work` with a SIGINT at the `line`th line that hdopt.files or contextlib runs in it; whether it came."""
+    left = line
+
+    def trace(frame, event, argument):
+        nonlocal left
+        if not frame.f_code.co_filename.endswith(("hdopt/files.py", "contextlib.py")):
+            return None
+        if event == "line":
+            left -= 1
+            if left == 0:
+                signal.raise_signal(signal.SIGINT)
+        return trace
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    sys.settrace(trace)
+    try:
+        work()
+        return False
+    except KeyboardInterrupt:
+        return True
+    finally:
+        sys.settrace(None)
+        signal.signal(signal.SIGINT, before)
+
+
+def test_an_interruption_at_any_line_leaves_all_files_or_none(tmp_path, monkeypatch):
+    """And none of a passing name, however late it comes."""
+    monkeypatch.setattr(os, "fsync", lambda handle: None)  # slow, and changes no name
+    wanted = [tmp_path / name for name in "ab"]
+
+    def write():
+        with replacing_all(wanted) as passing:
+            for path in passing:
+                path.write_text("new")
+
+    line, outcomes = 0, set()
+    came = True
+    while came:
+        line += 1
+        for path in wanted:
+            path.write_text("old")
+        came = interrupted_at(line, write)
+        if names(tmp_path) != ["a", "b"]:
+            gc.collect()  # what an interrupted `with` statement had not entered yet
+        assert names(tmp_path) == ["a", "b"], line
+        found = {path.read_text() for path in wanted}
+        assert len(found) == 1, line
+        outcomes |= found
+    assert line > 50 and outcomes == {"old", "new"}
+
+
+def test_a_signal_that_compiled_code_swallows_stops_the_names(tmp_path):
+    with watching_files() as work, pytest.raises(KeyboardInterrupt), replacing(tmp_path / "a") as passing:
+        passing.write_text("whole")
+        work.came.append(KeyboardInterrupt())
+    assert names(tmp_path) == []
+    with watching_files() as work:
+        work.came.append(KeyboardInterrupt())  # one that a search has answered with its best so far
+        write_text(tmp_path / "a", "whole")
+    assert names(tmp_path) == ["a"]
+
+
+def test_a_pipe_that_nothing_reads_is_refused_and_one_with_a_reader_gets_it_all(tmp_path):
+    pipe, link, other = tmp_path / "pipe.txt", tmp_path / "link.txt", tmp_path / "other.txt"
+    os.mkfifo(pipe)
+    link.symlink_to(pipe)
+    for name in (pipe, link):
+        with pytest.raises(HdoptError, match=rf"cannot write {re.escape(str(name))}: it is a pipe that nothing reads"):
+            with replacing_all([other, name]) as passing:
+                for path in passing:
+                    path.write_text("x")
+        assert names(tmp_path) == ["link.txt", "pipe.txt"]
+        text = "0123456789" * 100_000  # more than a pipe holds
+        got = tmp_path / "got"
+        with open(got, "w") as into, subprocess.Popen(["cat", str(name)], stdout=into) as reader:
+            deadline = time.monotonic() + 20
+            while True:
+                try:
+                    write_text(name, text)
+                    break
+                except HdoptError:  # not opened yet
+                    assert time.monotonic() < deadline
+            assert reader.wait(20) == 0
+        assert got.read_text() == text
+        got.unlink()
+    assert link.is_symlink() and names(tmp_path) == ["link.txt", "pipe.txt"]
 
 
 READER = """
