@@ -18,7 +18,7 @@ from hdopt.cli.common import (
     table_options,
     watched,
 )
-from hdopt.cli.log import lines_in_a_log
+from hdopt.cli.log import looked_at
 from hdopt.cli.recorded import RecordingOptions, recording_options
 
 if TYPE_CHECKING:
@@ -80,11 +80,15 @@ def _one(
     given: RecordingOptions, nuisance: tuple[str, ...], files: dict[str, Path], json_file: Path | None, seed: int
 ) -> None:
     """The diagnosis of one drive, said and written."""
+    from threading import get_ident
+
     from hdopt.workflow.diagnose import diagnose, write_diagnosis
+    from hdopt.workflow.diagnosis_stages import DiagnosisWatch
 
     source = given.source()
     read = source.recordings(given.recordings)
-    with lines_in_a_log(f"diagnosis of {len(read)} recording{'s' if len(read) > 1 else ''}"):
+    label = f"diagnosis of {len(read)} recording{'s' if len(read) > 1 else ''}"
+    with looked_at(label, DiagnosisWatch(get_ident()).words):
         diagnosis = diagnose(read, source, seed=seed, nuisance=nuisance)
     try:
         write_diagnosis(diagnosis, files, [recording.name for recording in read], source)
