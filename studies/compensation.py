@@ -48,7 +48,8 @@ def run_case(seed: int, effect: str, severity: float, drive: Drive) -> Case | No
     from hdopt.bench.signal_chain import read_angles, read_error
     from hdopt.recordings.read import recording_from_table
     from hdopt.recordings.rows import gather
-    from hdopt.workflow.compensate import compensate, neighbours_of, said_of
+    from hdopt.workflow.compensate import compensate
+    from hdopt.workflow.compensation_trials import neighbours_of, said_of
 
     spec = cases.Spec("single" if effect else "nothing", seed, (effect,) if effect else (), severity)
     drawn = cases.simulate(spec, np.random.default_rng([seed, 7]))

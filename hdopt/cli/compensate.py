@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any  # Any: what click hands over
 
 import click
 
@@ -15,6 +15,20 @@ if TYPE_CHECKING:
     from hdopt.workflow.compensate import Compensated
 
 
+class Terms(click.ParamType):  # type: ignore[type-arg]  # generic in newer Click only
+    """A whole number, or auto (None)."""
+
+    name = "N|auto"
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> int | None:
+        if value is None or value == "auto":
+            return None
+        try:
+            return int(value)
+        except ValueError:
+            self.fail(f"{value!r} is neither a whole number nor auto", parameter, context)
+
+
 @click.command()
 @table_options
 @recording_options
@@ -22,8 +36,10 @@ if TYPE_CHECKING:
 @click.option("--as", "form", type=click.Choice(["csv", "json", "c"]), help="By default what FILE ends with, else CSV.")
 @click.option(
     "--terms",
-    type=int,
-    help="Coefficients at most; 0 for a table. By default 64, or a table where these would not do.",
+    type=Terms(),
+    default="64",
+    show_default=True,
+    help="Coefficients at most; 0 for a table, auto for 64 or, where these would not do, a table.",
 )
 @answer_options
 def command(
@@ -55,8 +71,8 @@ def _lines(found: Compensated, output: Path) -> Iterator[str]:
     )
     for way, left in found.both.items():
         yield f"  {way}: {left:.4g} arcmin left"
-    if found.found.crossing_deg:
-        yield f"  after a reversal the return error crosses over about {found.found.crossing_deg:.2g} deg of output"
+    if found.found.crossing.deg:
+        yield f"  after a reversal the return error crosses over about {found.found.crossing.deg:.2g} deg of output"
     if len(found.recordings) > 1:
         for part in found.recordings:
             speed = "" if part.speed_rpm is None else f" at {part.speed_rpm:.4g} r/min"

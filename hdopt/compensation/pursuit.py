@@ -51,14 +51,20 @@ def pursue(
     y = residual[::stride]
     basis, _ = np.linalg.qr(free[::stride])
     left = y - basis @ (basis.T @ y)
-    phases = np.array(pairs, float) @ np.vstack([angles[0][::stride], angles[1][::stride]])
-    cos, sin = np.cos(phases), np.sin(phases)
+    turned = [
+        {order: np.exp(1j * order * angle[::stride]) for order in {pair[which] for pair in pairs}}
+        for which, angle in enumerate(angles)
+    ]
+    waves = np.array([turned[0][k] * turned[1][j] for k, j in pairs])
+    # Single precision to choose among them: half the memory to read for every term.
+    cos, sin = waves.real.astype(np.float32), waves.imag.astype(np.float32)
     chosen: list[int] = []
     for _ in range(terms):
-        score = (cos @ left) ** 2 + (sin @ left) ** 2
+        now = left.astype(np.float32)
+        score = (cos @ now) ** 2 + (sin @ now) ** 2
         score[chosen] = 0.0
         best = int(np.argmax(score))
-        new = np.column_stack([cos[best], sin[best]])
+        new = np.column_stack([waves[best].real, waves[best].imag])
         for _ in range(2):
             new = new - basis @ (basis.T @ new)
         part, size = np.linalg.qr(new)

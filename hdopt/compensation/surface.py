@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,18 +25,29 @@ Spectrum: TypeAlias = tuple[Index, Index, NDArray[np.complex128]]
 """Orders k and j, and amplitudes, (m,) each."""
 
 
+class Crossing(NamedTuple):
+    """Output's travel `deg` over which the side of the return error crosses after a reversal (0: at once), and where it
+    stood at the `start` of a recording: 1 on the side of the motion, -1 on the other, 0 between."""
+
+    deg: float = 0.0
+    start: float = 1.0
+
+
+AT_ONCE = Crossing()
+
+
 @dataclass(frozen=True)
 class Harmonics:
     """Terms c cos(k a + j b) + s sin(k a + j b), arcmin: `k` and `j` (m,) whole, `cos` and `sin` (m,); `back` is half
-    the return error, added forward and taken away backward, once it has crossed over `crossing_deg` of output after a
-    reversal (0: at once; `hdopt.compensation.path`)."""
+    the return error, added forward and taken away backward, once it has crossed after a reversal as `crossing` says
+    (`hdopt.compensation.path`)."""
 
     k: Index
     j: Index
     cos: Array
     sin: Array
     back: float = 0.0
-    crossing_deg: float = 0.0
+    crossing: Crossing = AT_ONCE
 
     def __len__(self) -> int:
         return len(self.k)
@@ -45,10 +56,22 @@ class Harmonics:
         """Error (arcmin, n) at input and output angles `inputs`, `outputs` (n,) rad and `direction` +1, -1, 0 or the
         path between (`path_of`)."""
         value = np.zeros(np.shape(inputs)) + self.back * np.asarray(direction)
-        for k, j, c, s in zip(self.k, self.j, self.cos, self.sin, strict=True):
-            phase = k * inputs + j * outputs
-            value += c * np.cos(phase) + s * np.sin(phase)
+        whole = {order: np.exp(1j * order * outputs) for order in set(self.j.tolist())}
+        for k in sorted(set(self.k.tolist())):
+            terms = zip(self.j[self.k == k].tolist(), self.amplitudes[self.k == k].tolist(), strict=True)
+            value += (np.exp(1j * k * inputs) * sum(size * whole[j] for j, size in terms)).real
         return np.asarray(value, float)
+
+    @property
+    def amplitudes(self) -> NDArray[np.complex128]:
+        """c - i s of every term, (m,): the term is the real part of it times exp(i (k a + j b))."""
+        return np.asarray(self.cos - 1j * self.sin, np.complex128)
+
+    def on_grid(self, cells: tuple[int, ...]) -> Array:
+        """Error (arcmin) without the return error on the points of `grid_angles` of `cells`, (n_input, n_output)."""
+        a, b = (np.arange(count) * (2 * np.pi / count) for count in cells)
+        inputs, outputs = np.exp(1j * np.outer(a, self.k)), np.exp(1j * np.outer(self.j, b))
+        return np.asarray(((inputs * self.amplitudes) @ outputs).real, float)
 
 
 def nothing(back: float = 0.0) -> Harmonics:
@@ -58,12 +81,15 @@ def nothing(back: float = 0.0) -> Harmonics:
 
 @dataclass(frozen=True)
 class Surface:
-    """The error on an even grid, `values` (n_input, n_output) arcmin, mean zero; `back` and `crossing_deg` as in
+    """The error on an even grid, `values` (n_input, n_output) arcmin, mean zero; `back` and `crossing` as in
     `Harmonics`."""
 
     values: Array
     back: float = 0.0
-    crossing_deg: float = 0.0
+    crossing: Crossing = AT_ONCE
+
+    def __len__(self) -> int:
+        return int(self.values.size)
 
     def at(self, inputs: Array, outputs: Array, direction: Array | float = 0.0) -> Array:
         """Error (arcmin, n) by straight lines between grid points at `inputs`, `outputs` (n,) rad and `direction`."""
@@ -78,12 +104,16 @@ class Surface:
         high = v[i0, j1] * (1 - p) + v[i1, j1] * p
         return np.asarray(low * (1 - q) + high * q + self.back * np.asarray(direction), float)
 
+    def on_grid(self, cells: tuple[int, ...]) -> Array:
+        """Error (arcmin) without the return error on the points of `grid_angles` of `cells`, (n_input, n_output)."""
+        return self.at(*grid_angles(cells))
+
     def harmonics(self, terms: int) -> Harmonics:
         """The `terms` largest harmonics of this surface, by its Fourier transform."""
         k, j, found = spectrum_of(self.values)
         keep = np.argsort(-np.abs(found), kind="stable")[:terms]
         chosen = found[keep]
-        return Harmonics(k[keep], j[keep], 2 * chosen.real, -2 * chosen.imag, self.back, self.crossing_deg)
+        return Harmonics(k[keep], j[keep], 2 * chosen.real, -2 * chosen.imag, self.back, self.crossing)
 
 
 def spectrum_of(values: Array) -> Spectrum:
@@ -105,12 +135,11 @@ def grid_angles(cells: tuple[int, ...] = COARSE) -> tuple[Array, Array]:
 
 
 def surface_of(
-    parts: Sequence[Harmonics], base: Array | None = None, back: float = 0.0, crossing_deg: float = 0.0
+    parts: Sequence[Harmonics], base: Array | None = None, back: float = 0.0, crossing: Crossing = AT_ONCE
 ) -> Surface:
     """The sum of `parts` on the grid, with a `base` already there (n_input, n_output); `back` half a return error and
-    `crossing_deg` the output's travel over which it crosses."""
-    inputs, outputs = grid_angles(COARSE if base is None else base.shape)
-    values = np.zeros(inputs.shape) if base is None else np.asarray(base, float).copy()
+    how it crosses after a reversal, `crossing`."""
+    values = np.zeros(COARSE) if base is None else np.asarray(base, float).copy()
     for part in parts:
-        values += part.at(inputs.ravel(), outputs.ravel()).reshape(values.shape)
-    return Surface(values - values.mean(), back, crossing_deg)
+        values += part.on_grid(values.shape)
+    return Surface(values - values.mean(), back, crossing)

@@ -21,8 +21,8 @@ from hdopt.recordings.rows import Rows
 SHORTEST = 64
 """Highest waves round a spline: of a raised tooth, its neighbours half as much, they leave an eighth of the tip."""
 ROWS_PER_WAVE = 2.5
-MOST_ROWS = 40_000
-"""Rows that the fit takes, evenly spread: 90 MB for every 40 000 with both splines' waves."""
+MOST_ROWS = 20_000
+"""Rows that the fit takes, evenly spread: 45 MB for every 20 000 with both splines' waves."""
 LONE = 10
 """Waves up to this number are weighed one by one (lobes), shorter ones in bands of half an octave."""
 ROUNDS, EVIDENCE_ROUNDS = 8, 25

@@ -23,7 +23,8 @@ def written(found: Found, form: str, facts: Mapping[str, Any]) -> str:
 def _csv(found: Found, facts: Mapping[str, Any]) -> str:
     head = [f"# {key}: {str(value).replace(chr(10), ' ')}" for key, value in facts.items()]
     head.append(f"# half_return_arcmin: {found.back!r}")
-    head.append(f"# return_crossing_output_deg: {found.crossing_deg!r}")
+    head.append(f"# return_crossing_output_deg: {found.crossing.deg!r}")
+    head.append(f"# return_path_at_start: {found.crossing.start!r}")
     if isinstance(found, Zones):
         head.append(f"# error_arcmin: sum 0, with the half return, + the {_which(found)} of sums 1 and 2")
         rows = ["k_input,j_output,cos_arcmin,sin_arcmin,sum"]
@@ -58,7 +59,8 @@ def _terms(found: Harmonics | Zones) -> list[tuple[int, int, float, float, int]]
 
 def _json(found: Found, facts: Mapping[str, Any]) -> str:
     content: dict[str, Any] = {"schema": 1, **facts, "half_return_arcmin": found.back}
-    content["return_crossing_output_deg"] = found.crossing_deg
+    content["return_crossing_output_deg"] = found.crossing.deg
+    content["return_path_at_start"] = found.crossing.start
     if isinstance(found, Surface):
         content["table_arcmin"] = found.values.tolist()
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
@@ -75,7 +77,8 @@ _HEAD = """/* Kinematic error of a drive, to be subtracted: output = input/N - e
 {facts}
    input_rad from the zero of the recording's input count, output_rad = input_rad/N counted on;
    path: the side of the return error, +1 forward, -1 backward, 0 unknown; keep it, and after each move call
-   path = hdopt_path(path, output_moved_rad), which crosses over {crossing!r} deg of output after a reversal. */
+   path = hdopt_path(path, output_moved_rad), which crosses over {crossing!r} deg of output after a reversal.
+   The recordings began with a path of {start!r} times the side of their first motion. */
 #include <math.h>
 
 double hdopt_path(double path, double output_moved_rad)
@@ -132,9 +135,9 @@ double hdopt_error_arcmin(double input_rad, double output_rad, double path)
 def _c(found: Found, facts: Mapping[str, Any]) -> str:
     said = "\n".join(f"   {key}: {value}" for key, value in facts.items()).replace("*/", "* /")
     # Crossing at once leaves nothing of the old side, however small the move.
-    turn = math.radians(found.crossing_deg)
+    turn = math.radians(found.crossing.deg)
     remains = f"exp(-fabs(output_moved_rad) / {turn!r})" if turn > 0 else "0"
-    head = _HEAD.format(facts=said, crossing=found.crossing_deg, remains=remains)
+    head = _HEAD.format(facts=said, crossing=found.crossing.deg, start=found.crossing.start, remains=remains)
     if not isinstance(found, Surface):
         columns = list(zip(*_terms(found), strict=True)) or [()] * 5
         numbers = {name: _list(column) for name, column in zip(("k", "j", "cos", "sin", "sum"), columns, strict=True)}

@@ -12,14 +12,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.compensation.surface import COARSE, FINE, Harmonics, Spectrum, Surface, grid_angles, spectrum_of, surface_of
+from hdopt.compensation.surface import (
+    COARSE,
+    FINE,
+    Crossing,
+    Harmonics,
+    Spectrum,
+    Surface,
+    grid_angles,
+    spectrum_of,
+    surface_of,
+)
 from hdopt.compensation.teeth import Teeth
 
 LEAST = 1e-5
 """Harmonics below this part of the largest are not worth a line of the table."""
 MOST_TERMS = 64
-POINTS = 10_000
-"""Points of a grid at which forms are compared, about."""
+EVERY = 3
+"""Forms are compared at every third point of a grid each way: whole steps and halves of one half as fine."""
 SMALL = 0.05
 """Share of the peak-to-peak that is left anyway by which a form may be off."""
 
@@ -42,8 +52,8 @@ class Zones:
         return self.rest.back
 
     @property
-    def crossing_deg(self) -> float:
-        return self.rest.crossing_deg
+    def crossing(self) -> Crossing:
+        return self.rest.crossing
 
     def at(self, inputs: Array, outputs: Array, direction: Array | float = 0.0) -> Array:
         """Error (arcmin, n) at input and output angles `inputs`, `outputs` (n,) rad and `direction` +1, -1, 0 or the
@@ -51,6 +61,11 @@ class Zones:
         first, second = self.first.at(inputs, outputs), self.second.at(inputs, outputs)
         larger = np.maximum(first, second) if self.sense > 0 else np.minimum(first, second)
         return np.asarray(larger + self.rest.at(inputs, outputs, direction), float)
+
+    def on_grid(self, cells: tuple[int, ...]) -> Array:
+        """Error (arcmin) without the return error on the points of `grid_angles` of `cells`, (n_input, n_output)."""
+        both = np.stack([self.first.on_grid(cells), self.second.on_grid(cells)])
+        return np.asarray(driving(both, self.sense) + self.rest.on_grid(cells), float)
 
 
 def zone_values(teeth: Teeth, cells: tuple[int, int] = COARSE) -> Array:
@@ -69,7 +84,7 @@ def driving(values: Array, sense: float) -> Array:
 def in_terms(values: Array, rest: Harmonics, sense: float, terms: int) -> Zones | Harmonics:
     """At most `terms` harmonics for the zones' `values` (2, n_input, n_output) arcmin and `rest`, which has the return
     error; `sense` as in `Zones`. The larger of two sums, or one sum where so few terms leave less that way."""
-    both = surface_of([rest], driving(values, sense), rest.back, rest.crossing_deg)
+    both = surface_of([rest], driving(values, sense), rest.back, rest.crossing)
     one = both.harmonics(terms)
     spectra = [spectrum_of(zone) for zone in values]
     means = [float(zone.mean()) for zone in values]
@@ -96,23 +111,24 @@ def _kept(spectrum: Spectrum, mean: float, least: float) -> Harmonics:
 
 def _off(found: Zones | Harmonics | Surface, surface: Surface) -> Array:
     """What `found` is off the `surface` (arcmin) at some of its points."""
-    inputs, outputs = grid_angles(surface.values.shape)
-    some = slice(0, None, max(1, surface.values.size // POINTS))
-    return found.at(inputs.ravel()[some], outputs.ravel()[some]) - surface.values.ravel()[some]
+    some = surface.values[::EVERY, ::EVERY]
+    return np.asarray(found.on_grid(some.shape) - some, float)
 
 
-def formed(teeth: Teeth, rest: Harmonics, terms: int | None, left: float) -> Zones | Harmonics | Surface:
+def formed(teeth: Teeth, rest: Harmonics, terms: int | None, left: float) -> tuple[Zones | Harmonics | Surface, float]:
     """What a controller takes of `teeth` and the `rest`, which has the return error: at most `terms` harmonics, a table
-    where that is 0.
+    where that is 0; and how far that is off both (arcmin, peak-to-peak).
 
     With None `MOST_TERMS`, but a table where so few would be off by more than `SMALL` of the peak-to-peak that is
     `left` (arcmin) anyway; the finer of two grids where the coarser is.
     """
     fine = zone_values(teeth, FINE)
-    table = surface_of([rest], driving(fine, teeth.sense), rest.back, rest.crossing_deg)
+    table = surface_of([rest], driving(fine, teeth.sense), rest.back, rest.crossing)
     if terms != 0:
         found = in_terms(fine[:, ::2, ::2], rest, teeth.sense, MOST_TERMS if terms is None else terms)
-        if terms is not None or float(np.ptp(_off(found, table))) < SMALL * left:
-            return found
+        off = float(np.ptp(_off(found, table)))
+        if terms is not None or off < SMALL * left:
+            return found, off
     coarse = replace(table, values=table.values[::2, ::2])
-    return coarse if float(np.ptp(_off(coarse, table))) < SMALL * left else table
+    off = float(np.ptp(_off(coarse, table)))
+    return (coarse, off) if off < SMALL * left else (table, 0.0)

@@ -3,48 +3,50 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 import numpy as np
 
-from hdopt.arrays import Array, Index, Mask
+from hdopt.arrays import Array
 from hdopt.compensation.expected import NORMAL, peak_to_peak_again
-from hdopt.compensation.path import AT_ONCE, crossing_of, half_return, path_of, paths_of, some_of
-from hdopt.compensation.pursuit import dictionary, independent_share, pursue
-from hdopt.compensation.surface import Harmonics, Surface, nothing, surface_of
-from hdopt.compensation.teeth import Teeth, fit_teeth
+from hdopt.compensation.path import paths_of
 from hdopt.compensation.writers import FORMATS, homing_arcmin, written
-from hdopt.compensation.zones import MOST_TERMS, Zones, formed
+from hdopt.compensation.zones import MOST_TERMS, SMALL
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
 from hdopt.figures import drawn
 from hdopt.files import ShownAsTable, write_text
 from hdopt.recordings.recording import TURN, Recording
-from hdopt.recordings.rows import Rows, gather, neighbours_for
+from hdopt.recordings.rows import Rows, gather
+from hdopt.workflow.compensation_trials import (
+    STRETCHES,
+    Found,
+    candidates,
+    centred,
+    choose,
+    folds,
+    model_of,
+    neighbours_of,
+    said_of,
+    tried,
+)
 from hdopt.workflow.output_files import Files, checked_files
 from hdopt.workflow.placed import recordings_named
 from hdopt.workflow.recorded_drive import AnyDrive, AnyRecordings, recorded_drive
-from hdopt.workflow.waveform_fit import WaveformFit, fit_rows
 
 if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
     from matplotlib.figure import Figure as MatplotlibFigure
 
-Found = Harmonics | Zones | Surface
-
-FOLDS = 4
 SURE = 2.0
 """Standard errors by which the held-out squares must fall for a compensation to be worth writing (one-sided 98 %)."""
 GROUPS_PER_BEAT = 8
 """Stretches an output turn over which held-out squares are taken together: neighbouring turns hang together."""
-ROWS_PER_TURN, MOST_ROWS = 128, 40_000
-"""Rows an input turn that show single teeth, and how many rows there may be for their sake."""
 NONE = "none"
-STRETCHES = "stretches of the one output turn"
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ class Compensated(ShownAsTable):
             "file": file,
             "worth": self.worth,
             "method": self.method,
-            "terms": self.found.values.size if isinstance(self.found, Surface) else len(self.found),
+            "terms": len(self.found),
             "heldout_peak_to_peak_arcmin": {
                 "before": self.before,
                 "after": self.after,
@@ -112,7 +114,11 @@ class Compensated(ShownAsTable):
                 "high": self.high,
             },
             "directions": self.both,
-            "return": {"half_arcmin": self.found.back, "crossing_output_deg": self.found.crossing_deg},
+            "return": {
+                "half_arcmin": self.found.back,
+                "crossing_output_deg": self.found.crossing.deg,
+                "path_at_start": self.found.crossing.start,
+            },
             "recordings": [vars(part) for part in self.recordings],
             "held_out": self.held_out,
             "evidence": self.evidence,
@@ -171,14 +177,14 @@ def homing_words(homing: tuple[float, float]) -> str:
 def compensate(
     recordings: AnyRecordings,
     drive: AnyDrive = None,
-    terms: int | None = None,
+    terms: int | None = MOST_TERMS,
     seed: int = 1,
     files: Files | None = None,
 ) -> Compensated:
     """What to subtract, from `recordings` (files or records) of one drive.
 
     `drive`: its record, a study, a shipped name or the path of a study file; None leaves the model out and takes
-    harmonics alone. `terms` coefficients at most, 0 for a table over both angles; None for 64, or a table
+    harmonics alone. `terms` coefficients at most, 0 for a table over both angles; None for 64 coefficients, or a table
     where these would be off by more than a twentieth of what is left anyway. `seed` for fits and resampling.
     `files` to write, where it is worth it: {"csv": PATH}, {"json": PATH} or {"c": PATH}. Raises `HdoptError` where
     nothing moves or `terms` is out of range, and before any work where a file cannot be written.
@@ -200,27 +206,26 @@ def write_compensation(made: Compensated, files: Mapping[str, Path]) -> None:
 def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms: int | None, seed: int) -> Compensated:
     """The compensation from the records of `recordings`; `drive`, `terms`, `seed` and errors as for `compensate`."""
     if terms is not None and not 0 <= terms <= MOST_TERMS:
-        raise HdoptError(f"--terms is {terms}; give 1 to {MOST_TERMS} coefficients, or 0 for a table")
+        raise HdoptError(f"--terms is {terms}; give 1 to {MOST_TERMS} coefficients, 0 for a table, or auto")
     moving = [r for r in recordings if not r.input_locked]
     if not moving:
         raise HdoptError("the input is locked in every recording; a compensation needs recordings that turn")
     rows = gather(moving, neighbours_of(moving))
-    sign: tuple[float, ...] = (1.0, -1.0)
-    whole: WaveformFit | None = None
-    if drive is not None:
-        whole = fit_rows(rows, drive, seed, sign)
-        sign = (whole.sign,)
-    fold, held_out = _folds(rows)
+    whole = None if drive is None else model_of(rows, drive, seed)
+    fold, held_out = folds(rows)
     paths = paths_of(rows)
-    trials = _trials(
-        (rows, fold), terms, paths, lambda train: None if drive is None else fit_rows(train, drive, seed, sign)
+    trials = tried(
+        (rows, fold),
+        terms,
+        paths,
+        lambda train: None if whole is None or drive is None else model_of(train, drive, seed, whole.sign),
     )
-    before = _centred(rows.error, rows, fold)
-    nested, method = _choose(trials, fold)
-    found = _candidates(rows, whole, terms, paths)[method]
+    before = centred(rows.error, rows, fold)
+    nested, method = choose(trials, fold)
+    found, off = candidates(rows, whole, terms, paths)[method]
     worth, evidence = _worth(before, nested, rows)
     # Parts of one recording are extrapolated in angle when held out; a fresh run over the same angles is not.
-    again = _centred(rows.error - said_of(found, rows), rows, np.zeros_like(fold))
+    again = centred(rows.error - said_of(found, rows), rows, np.zeros_like(fold))
     left = again if rows.records == 1 else trials[method]
     rng = np.random.default_rng(seed)
     each = [peak_to_peak_again(left[rows.record == n], rows.block[rows.record == n], rng) for n in range(rows.records)]
@@ -242,131 +247,8 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
         {NONE: float(np.std(before))} | {name: float(np.std(left)) for name, left in trials.items()},
         homing_arcmin(found, rows.ratio),
         rows.ratio,
-        _warnings(rows, held_out, moving),
+        (*_warnings(rows, held_out, moving), *_too_few(len(found), terms, off, float(np.ptp(again)))),
     )
-
-
-def _trials(
-    split: tuple[Rows, Index],
-    terms: int | None,
-    paths: Mapping[float, Array],
-    fit: Callable[[Rows], WaveformFit | None],
-) -> dict[str, Array]:
-    """What each way leaves (n,) on every part, fitted to the others; `split` is the rows and the part of each."""
-    rows, fold = split
-    trials: dict[str, Array] = {}
-    for k in range(int(fold.max()) + 1):
-        train, test = _rows(rows, fold != k), fold == k
-        for name, found in _candidates(train, fit(train), terms, some_of(paths, fold != k)).items():
-            left = trials.setdefault(name, np.full(len(rows), np.nan))
-            left[test] = rows.error[test] - said_of(found, rows)[test]
-    return {name: _centred(left, rows, fold) for name, left in trials.items()}
-
-
-def neighbours_of(recordings: Sequence[Recording]) -> int:
-    """How many neighbouring samples of these `recordings` make a row: fewer than elsewhere, where a record of no more
-    than `MOST_ROWS` rows can so show single teeth."""
-    samples = sum(len(recording) for recording in recordings)
-    turns = sum(float(np.abs(np.diff(recording.input_angle)).sum()) / TURN for recording in recordings)
-    usual = neighbours_for(recordings)
-    fewer = max(1, min(usual, int(samples / max(turns, 1.0) / ROWS_PER_TURN)))
-    return fewer if samples / fewer <= MOST_ROWS else usual
-
-
-def _folds(rows: Rows) -> tuple[Index, str]:
-    """The part that each row belongs to, and what the parts are: recordings, output turns, passes, or stretches."""
-    if rows.records >= 2:
-        return np.asarray(rows.record % max(FOLDS, 2), np.int64), "recordings"
-    beat = np.floor((rows.theta - rows.theta.min()) / (TURN * rows.ratio)).astype(np.int64)
-    if beat.max() >= 1 and (beat == 1).sum() > 0.5 * (beat == 0).sum():
-        return np.asarray(beat % FOLDS, np.int64), "output turns"
-    passes = np.r_[0, np.cumsum(np.diff(rows.direction) != 0)]
-    if passes.max() >= 3:
-        # By length, so that no part holds all that reaches round the output.
-        rank = np.argsort(np.argsort(-np.bincount(passes), kind="stable"), kind="stable")
-        return np.asarray(rank[passes] % FOLDS, np.int64), "reversals"
-    order = (rows.theta - rows.theta.min()) / max(float(np.ptp(rows.theta)), 1e-9)
-    return np.asarray(np.minimum((order * FOLDS).astype(int), FOLDS - 1), np.int64), STRETCHES
-
-
-def _rows(rows: Rows, mask: Mask) -> Rows:
-    """Some rows, their recordings numbered anew."""
-    part = rows.rows(mask)
-    return replace(part, record=np.unique(part.record, return_inverse=True)[1])
-
-
-def _candidates(
-    rows: Rows, fit: WaveformFit | None, terms: int | None, paths: Mapping[float, Array]
-) -> dict[str, Found]:
-    """Every way to compensate, fitted to `rows`, in the form that will be written; `paths` are those that the return
-    error may take along them."""
-    angles = (rows.theta, rows.theta / rows.ratio)
-    zeros = (rows.record[:, None] == np.arange(rows.records)).astype(float)
-    if rows.span_turns >= 0.5 * rows.ratio:
-        zeros = np.column_stack([zeros, (rows.theta - rows.theta.mean()) / TURN])
-    pairs = dictionary(rows.span_turns / rows.ratio)
-    most = terms or MOST_TERMS
-    alone = pursue(angles, rows.error, zeros, paths.get(AT_ONCE), pairs, most)
-    crossing = _crossing(rows.error - alone.at(*angles), zeros, paths)
-    path = paths.get(crossing)
-    if crossing:
-        alone = replace(pursue(angles, rows.error, zeros, path, pairs, most), crossing_deg=crossing)
-    made: dict[str, Found] = {"harmonics": surface_of([alone], None, alone.back, crossing) if terms == 0 else alone}
-    if fit is None:
-        return made
-    free = zeros if path is None else np.column_stack([zeros, path])
-    bare = Teeth.bare(fit.model, fit.errors, fit.sign)
-    teeth = fit_teeth(rows, free, bare, np.diag(fit.covariance))
-    count = round(rows.averaged)
-    for name, one in {"model": bare, "model and harmonics": bare, "model, teeth and harmonics": teeth}.items():
-        left = rows.error - one.at(rows.theta)
-        rest = nothing(0.0 if path is None else half_return(left, zeros, path))
-        if name != "model":
-            rest = pursue(angles, left, zeros, path, pairs, most // 2)
-        rest = replace(rest, crossing_deg=crossing)
-        made[name] = formed(
-            one.sharpened(TURN / rows.rows_per_turn, count), rest, terms, float(np.ptp(left - rest.at(*angles)))
-        )
-    return made
-
-
-def _crossing(left: Array, zeros: Array, paths: Mapping[float, Array]) -> float:
-    """The output's travel (deg) over which the return error in what is `left` crosses after a reversal."""
-    if not paths:
-        return AT_ONCE
-    columns = np.column_stack([zeros, paths[AT_ONCE]])
-    rest = left - columns @ np.linalg.lstsq(columns, left, rcond=1e-8)[0]
-    return crossing_of(left, zeros, paths, independent_share(rest))
-
-
-def said_of(found: Found, rows: Rows) -> Array:
-    """What `found` says of all `rows` (n,), means of samples as they are: the path since a reversal needs those
-    before."""
-    count = max(1, round(rows.averaged))
-    apart = TURN / rows.rows_per_turn / count
-    value = found.back * path_of(rows, found.crossing_deg)
-    for place in range(count):
-        theta = rows.theta + (place - (count - 1) / 2) * apart
-        value = value + found.at(theta, theta / rows.ratio) / count
-    return value
-
-
-def _centred(values: Array, rows: Rows, fold: Index) -> Array:
-    """Values less the mean of their recording within their fold: a zero is nobody's error."""
-    key = rows.record * (int(fold.max()) + 1) + fold
-    _, inverse = np.unique(key, return_inverse=True)
-    return np.asarray(values - (np.bincount(inverse, values) / np.bincount(inverse))[inverse], float)
-
-
-def _choose(trials: dict[str, Array], fold: Index) -> tuple[Array, str]:
-    """What is left where each part is scored by the choice of the others, and the choice of all parts."""
-    names = list(trials)
-    squares = np.array([[float(np.sum(trials[n][fold == k] ** 2)) for k in range(int(fold.max()) + 1)] for n in names])
-    nested = np.empty(len(fold))
-    for k in range(squares.shape[1]):
-        others = np.delete(squares, k, axis=1).sum(axis=1)
-        nested[fold == k] = trials[names[int(np.argmin(others))]][fold == k]
-    return nested, names[int(np.argmin(squares.sum(axis=1)))]
 
 
 def _worth(before: Array, after: Array, rows: Rows) -> tuple[bool, float]:
@@ -399,6 +281,13 @@ def _per_recording(
         before, after = (float(np.ptp(left[mask])) for left in held_out)
         found.append(PerRecording(recording.name, speed, before, after, each[number][0]))
     return tuple(found)
+
+
+def _too_few(count: int, terms: int | None, off: float, left: float) -> tuple[str, ...]:
+    """What is said where `count` coefficients are `off` (arcmin, peak-to-peak) what was fitted, of what is `left`."""
+    if not terms or off < SMALL * left:
+        return ()
+    return (f"{count} coefficients are {off:.3g} arcmin peak-to-peak off what was fitted; --terms 0 writes a table",)
 
 
 def _warnings(rows: Rows, held_out: str, recordings: Sequence[Recording]) -> tuple[str, ...]:

@@ -5,14 +5,16 @@ import itertools
 import json
 import shutil
 import subprocess
+from inspect import signature
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from hdopt.cli import main
+from hdopt.cli.compensate import Terms, command
 from hdopt.compensation.path import crossing_of, path_of, paths_of
-from hdopt.compensation.surface import Harmonics, surface_of
+from hdopt.compensation.surface import AT_ONCE, Crossing, Harmonics, surface_of
 from hdopt.compensation.writers import written
 from hdopt.drive.errors import DriveErrors
 from hdopt.errors import HdoptError
@@ -20,7 +22,8 @@ from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.rows import gather
 from hdopt.study import load_study
-from hdopt.workflow.compensate import _folds, _worth, compensate
+from hdopt.workflow.compensate import _too_few, _worth, compensate
+from hdopt.workflow.compensation_trials import folds
 
 RATIO, TURN, NOISE = 80.0, 2 * np.pi, 0.01
 ERRORS = DriveErrors(
@@ -150,15 +153,15 @@ def test_command_writes_every_form(tmp_path, capsys, form):
     assert "home both shafts" in capsys.readouterr().out
 
 
-def swinging(seed, crossing_deg, half=0.1, strokes=30):
+def swinging(seed, crossing_deg, half=0.1, strokes=30, start=1.0):
     """Strokes of 8 to 24 input turns there and back; friction's state lags by `crossing_deg` of output, stepped here
-    sample by sample, the noise a tenth of it."""
+    sample by sample from `start` times the side of the first motion, the noise a tenth of it."""
     rng = np.random.default_rng(seed)
     ends = np.cumsum(np.resize([1, -1], strokes) * rng.uniform(8, 24, strokes)) * TURN
     theta = np.concatenate([np.arange(a, b, np.sign(b - a) * TURN / 40) for a, b in itertools.pairwise([0, *ends])])
     moved = np.diff(theta, prepend=theta[0] - 1e-3) / RATIO
     state = np.empty(len(theta))
-    last = np.sign(moved[0])
+    last = start * np.sign(moved[0])
     for n, step in enumerate(moved):
         side = np.sign(step)
         last = side + (last - side) * np.exp(-abs(np.degrees(step)) / crossing_deg) if crossing_deg else side
@@ -174,29 +177,44 @@ def test_the_path_after_a_reversal_is_compensated():
     """Friction that crosses over 20 deg of output, on strokes of 36 to 108: a table by direction alone leaves half the
     loop near each reversal. The crossings tried lie up to 1.7 apart."""
     made = compensate([swinging(seed, 20.0) for seed in (1, 2)])
-    assert made.found.crossing_deg == pytest.approx(20.0, rel=0.35)
+    assert made.found.crossing.deg == pytest.approx(20.0, rel=0.35)
     assert made.found.back == pytest.approx(0.1, rel=0.1)
     fresh = gather([swinging(3, 20.0)])
-    left = fresh.error - made.found.at(fresh.theta, fresh.theta / RATIO, path_of(fresh, made.found.crossing_deg))
+    left = fresh.error - made.found.at(fresh.theta, fresh.theta / RATIO, path_of(fresh, made.found.crossing))
     plain = fresh.error - made.found.at(fresh.theta, fresh.theta / RATIO, fresh.direction)
     assert np.std(left) < 1.3 * NOISE < 0.5 * np.std(plain)
+
+
+@pytest.mark.parametrize("start", [1.0, 0.0, -1.0])
+def test_where_the_path_stood_at_the_start_is_found(start):
+    """A drive that rested between both sides, or came from the other one: a path that begins on the side of the motion
+    is half the loop off there, or all of it, and that is what is left peak-to-peak."""
+    runs = [gather([swinging(seed, 20.0, start=start)]) for seed in (1, 2)]
+    paths = paths_of(runs[0])
+    known = 0.3 * np.sin(2 * runs[0].theta)
+    found = crossing_of(runs[0].error - known, np.ones((len(runs[0]), 1)), paths, 1.0)
+    assert found.start == start
+    fresh = runs[1]
+    left = fresh.error - 0.3 * np.sin(2 * fresh.theta) - 0.1 * path_of(fresh, found)
+    begin = slice(0, int(np.argmax(fresh.travel > 10.0)))
+    assert np.abs(left[begin].mean()) < 0.02
 
 
 def test_play_crosses_at_once():
     """Would catch a crossing that is named where there is none."""
     made = compensate([swinging(seed, 0.0) for seed in (1, 2)])
-    assert made.found.crossing_deg == 0
+    assert made.found.crossing.deg == 0
     assert made.found.back == pytest.approx(0.1, abs=0.002)
 
 
 def test_noise_has_no_crossing():
-    """Would catch the crossing that fits best taken without asking whether it fits better than chance: of 12 tried on
+    """Would catch the crossing that fits best taken without asking whether it fits better than chance: of 36 tried on
     noise one always does."""
     rows = gather([swinging(7, 0.0)])
     paths, zeros = paths_of(rows), np.ones((len(rows), 1))
-    assert len(paths) == 13
+    assert len(paths) == 1 + 12 * 3
     noise = np.random.default_rng(8).normal(size=(20, len(rows)))
-    assert {crossing_of(one, zeros, paths, 1.0) for one in noise} == {0.0}
+    assert {crossing_of(one, zeros, paths, 1.0) for one in noise} == {AT_ONCE}
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -205,7 +223,7 @@ def test_the_controllers_path_is_ours(tmp_path, crossing_deg):
     """The state that the C code keeps, move by move both ways, is the path along a recording: to 0.02, as rows at a
     turning point are means of both ways and their travel is so far off."""
     rows = gather([swinging(5, 20.0)])
-    found = Harmonics(np.array([2]), np.array([0]), np.array([0.3]), np.array([0.0]), 0.1, crossing_deg)
+    found = Harmonics(np.array([2]), np.array([0]), np.array([0.3]), np.array([0.0]), 0.1, Crossing(crossing_deg))
     (tmp_path / "c.c").write_text(written(found, "c", {}))
     subprocess.run(["cc", "-shared", "-fPIC", "-o", "c.so", "c.c", "-lm"], cwd=tmp_path, check=True)
     step = ctypes.CDLL(str(tmp_path / "c.so")).hdopt_path
@@ -215,13 +233,25 @@ def test_the_controllers_path_is_ours(tmp_path, crossing_deg):
     for moved in np.diff(reach):
         state = step(state, moved)
         kept.append(state)
-    ours = path_of(rows, crossing_deg)
+    ours = path_of(rows, Crossing(crossing_deg))
     inside = np.r_[False, np.diff(rows.direction) == 0]  # a row at a turning point is the mean of both ways
     np.testing.assert_allclose(np.array(kept)[inside], ours[inside], atol=0.02)
 
 
+def test_a_table_is_written_only_where_it_is_asked_for():
+    """The command's default is 64 coefficients; what they leave out is said."""
+    default = {option.name: option.default for option in command.params}["terms"]
+    assert (
+        command.params
+        and Terms().convert(default, None, None) == 64 == signature(compensate).parameters["terms"].default
+    )
+    assert Terms().convert("auto", None, None) is None
+    assert "--terms 0 writes a table" in _too_few(64, 64, 0.03, 0.5)[0]
+    assert _too_few(64, 64, 0.02, 0.5) == _too_few(70_000, 0, 0.1, 0.5) == ()
+
+
 def test_terms_out_of_range(drive):
-    with pytest.raises(HdoptError, match="--terms is 65; give 1 to 64 coefficients, or 0 for a table"):
+    with pytest.raises(HdoptError, match="--terms is 65; give 1 to 64 coefficients, 0 for a table, or auto"):
         compensate([recorded(lambda t: np.sin(t), 5)], drive, 65)
 
 
@@ -244,7 +274,7 @@ def test_no_part_holds_all_that_reaches_round_the_output():
     theta = np.concatenate([np.arange(a, b, np.sign(b - a) * TURN / 40) for a, b in itertools.pairwise(ends)])
     frame = pd.DataFrame({"input_angle_deg": np.degrees(theta), "output_angle_deg": np.degrees(theta) / RATIO})
     rows = gather([recording_from_table(frame, RATIO)])
-    fold, name = _folds(rows)
+    fold, name = folds(rows)
     assert name == "reversals"
     for k in range(fold.max() + 1):
         assert np.ptp(rows.theta[fold != k]) > 59 * TURN

@@ -16,6 +16,7 @@ from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.rows import gather
 from hdopt.study import load_study
+from hdopt.workflow.compensation_trials import model_of
 
 RATIO, TURN, NOISE, PER_TURN = 80.0, 2 * np.pi, 0.01, 150
 HEIGHT = 2.5e-3 * load_study(drive="csf-25-80").drive.geometry.arcmin_per_mm
@@ -95,12 +96,28 @@ def test_a_form_is_as_good_as_what_is_left_asks_for(kind, table):
     """64 terms for lobes, off by no more than a twentieth of what is left; a tooth needs the finer table. Halfway
     between its points 0.9 and 1.9 deg apart the tip of a tooth 4.5 deg to either side is off by 0.31 of its height."""
     teeth = truth(kind)
-    found = formed(teeth, nothing(), None, 0.4)
+    found, said = formed(teeth, nothing(), None, 0.4)
     theta = np.arange(80 * 170) * TURN / 170
     off = found.at(theta, theta / RATIO) - teeth.at(theta)
     assert np.ptp(off) < (0.31 * HEIGHT if table else 0.06 * 0.4)
     assert hasattr(found, "values") == table
-    assert len(formed(teeth, nothing(), 20, 0.4)) <= 20
+    assert said < 0.05 * 0.4
+    few, off = formed(teeth, nothing(), 20, 0.4)
+    assert len(few) <= 20
+    assert off == pytest.approx(np.ptp(few.at(theta, theta / RATIO) - teeth.at(theta)), rel=0.2)
+
+
+def test_lobes_that_make_the_wrong_sign_fit_better_do_not_decide_it():
+    """Five lobes as large as the drive's own errors: the model alone leaves less of the mirrored error."""
+    teeth = replace(truth("none"), cs=1.5e-3 * np.sin(5 * ROUND + 1), fs=np.zeros(CELLS))
+    theta = np.arange(82 * 30) * TURN / 30
+    error = teeth.at(theta) + np.random.default_rng(1).normal(0, NOISE, len(theta))
+    frame = {"input_angle_deg": np.degrees(theta), "output_angle_deg": np.degrees(theta) / RATIO - error / 60}
+    rows = gather([recording_from_table(pd.DataFrame(frame), RATIO)])
+    drive = load_study(drive="csf-25-80").drive
+    right, wrong = (model_of(rows, drive, 1, sign).rms_arcmin for sign in (1.0, -1.0))
+    assert right > 1.2 * wrong
+    assert model_of(rows, drive, 1).sign == 1
 
 
 def test_a_long_record_is_fitted_on_some_of_its_rows(monkeypatch):

@@ -1,0 +1,184 @@
+"""The ways to compensate, each fitted to parts of the recordings and tried on the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hdopt.arrays import Array, Index, Mask
+from hdopt.compensation.path import Paths, crossing_of, half_return, path_of, some_of
+from hdopt.compensation.pursuit import dictionary, independent_share, pursue
+from hdopt.compensation.surface import AT_ONCE, Crossing, Harmonics, Surface, nothing, surface_of
+from hdopt.compensation.teeth import Teeth, fit_teeth
+from hdopt.compensation.zones import MOST_TERMS, Zones, formed
+from hdopt.drive.geometry import Drive
+from hdopt.recordings.recording import TURN, Recording
+from hdopt.recordings.rows import Rows, neighbours_for
+from hdopt.workflow.waveform_fit import WaveformFit, fit_rows, offset_columns
+
+Found = Harmonics | Zones | Surface
+
+FOLDS = 4
+FIT_ROWS = 10_000
+"""Rows that the twelve errors are fitted to, evenly spread."""
+PLAIN_SIGN = 2.0
+"""How many times as much the wrong sign of the error must leave for the sign to be plain."""
+ROWS_PER_TURN, MOST_ROWS = 128, 40_000
+"""Rows an input turn that show single teeth, and how many rows there may be for their sake."""
+STRETCHES = "stretches of the one output turn"
+
+
+def neighbours_of(recordings: Sequence[Recording]) -> int:
+    """How many neighbouring samples of these `recordings` make a row: fewer than elsewhere, where a record of no more
+    than `MOST_ROWS` rows can so show single teeth."""
+    samples = sum(len(recording) for recording in recordings)
+    turns = sum(float(np.abs(np.diff(recording.input_angle)).sum()) / TURN for recording in recordings)
+    usual = neighbours_for(recordings)
+    fewer = max(1, min(usual, int(samples / max(turns, 1.0) / ROWS_PER_TURN)))
+    return fewer if samples / fewer <= MOST_ROWS else usual
+
+
+def folds(rows: Rows) -> tuple[Index, str]:
+    """The part (n,) that each of `rows` belongs to, and what the parts are: recordings, output turns, passes, or
+    stretches."""
+    if rows.records >= 2:
+        return np.asarray(rows.record % max(FOLDS, 2), np.int64), "recordings"
+    beat = np.floor((rows.theta - rows.theta.min()) / (TURN * rows.ratio)).astype(np.int64)
+    if beat.max() >= 1 and (beat == 1).sum() > 0.5 * (beat == 0).sum():
+        return np.asarray(beat % FOLDS, np.int64), "output turns"
+    passes = np.r_[0, np.cumsum(np.diff(rows.direction) != 0)]
+    if passes.max() >= 3:
+        # By length, so that no part holds all that reaches round the output.
+        rank = np.argsort(np.argsort(-np.bincount(passes), kind="stable"), kind="stable")
+        return np.asarray(rank[passes] % FOLDS, np.int64), "reversals"
+    order = (rows.theta - rows.theta.min()) / max(float(np.ptp(rows.theta)), 1e-9)
+    return np.asarray(np.minimum((order * FOLDS).astype(int), FOLDS - 1), np.int64), STRETCHES
+
+
+def tried(
+    split: tuple[Rows, Index],
+    terms: int | None,
+    paths: Paths,
+    fit: Callable[[Rows], WaveformFit | None],
+) -> dict[str, Array]:
+    """What each way leaves (n,) arcmin on every part, fitted to the others; `split` is the rows and the part of each.
+
+    `terms`, `paths` as for `candidates`; `fit` gives the model fitted to some rows, None for harmonics alone.
+    """
+    rows, fold = split
+    trials: dict[str, Array] = {}
+    for k in range(int(fold.max()) + 1):
+        train, test = part_of(rows, fold != k), fold == k
+        for name, (found, _) in candidates(train, fit(train), terms, some_of(paths, fold != k)).items():
+            left = trials.setdefault(name, np.full(len(rows), np.nan))
+            left[test] = rows.error[test] - said_of(found, rows)[test]
+    return {name: centred(left, rows, fold) for name, left in trials.items()}
+
+
+def model_of(rows: Rows, drive: Drive, seed: int, sign: float | None = None) -> WaveformFit:
+    """The model of `drive` fitted to `rows` from `seed`, with the error's `sign`; None for the one that fits better.
+
+    What stands on the splines may be as large as the drive's own errors and make the wrong sign fit better without it:
+    where neither leaves far more than the other, the signs are compared with its waves.
+    """
+    some = rows.rows(np.arange(0, len(rows), -(-len(rows) // FIT_ROWS)))
+    if sign is not None:
+        return fit_rows(some, drive, seed, (sign,))
+    first, second = sorted((fit_rows(some, drive, seed, (s,)) for s in (1.0, -1.0)), key=lambda fit: fit.rms_arcmin)
+    if second.rms_arcmin > PLAIN_SIGN * first.rms_arcmin:
+        return first
+    columns = offset_columns(some)
+    return min((first, second), key=lambda fit: _left_with_teeth(some, columns, fit))
+
+
+def _left_with_teeth(rows: Rows, free: Array, fit: WaveformFit) -> float:
+    """Rms (arcmin) that a `fit` leaves in `rows` beside `free` columns (n, q), with waves on both splines."""
+    found = fit_teeth(rows, free, Teeth.bare(fit.model, fit.errors, fit.sign), np.diag(fit.covariance))
+    left = rows.error - found.at(rows.theta)
+    return float(np.std(left - free @ np.linalg.lstsq(free, left, rcond=1e-8)[0]))
+
+
+def part_of(rows: Rows, mask: Mask) -> Rows:
+    """Those of `rows` in `mask` (n,), their recordings numbered anew."""
+    part = rows.rows(mask)
+    return replace(part, record=np.unique(part.record, return_inverse=True)[1])
+
+
+def candidates(rows: Rows, fit: WaveformFit | None, terms: int | None, paths: Paths) -> dict[str, tuple[Found, float]]:
+    """Every way to compensate, fitted to `rows`, in the form that will be written, and how far that form is off what
+    was fitted (arcmin, peak-to-peak).
+
+    `fit` is the model fitted to them, None for harmonics alone; `terms` coefficients at most, 0 a table, None what is
+    needed; `paths` are those that the return error may take along the rows.
+    """
+    angles = (rows.theta, rows.theta / rows.ratio)
+    zeros = (rows.record[:, None] == np.arange(rows.records)).astype(float)
+    if rows.span_turns >= 0.5 * rows.ratio:
+        zeros = np.column_stack([zeros, (rows.theta - rows.theta.mean()) / TURN])
+    pairs = dictionary(rows.span_turns / rows.ratio)
+    most = terms or MOST_TERMS
+    alone = pursue(angles, rows.error, zeros, paths.get(AT_ONCE), pairs, most)
+    crossing = _crossing(rows.error - alone.at(*angles), zeros, paths)
+    path = paths.get(crossing)
+    if crossing != AT_ONCE:
+        alone = replace(pursue(angles, rows.error, zeros, path, pairs, most), crossing=crossing)
+    table = surface_of([alone], None, alone.back, crossing)
+    made: dict[str, tuple[Found, float]] = {"harmonics": (table if terms == 0 else alone, 0.0)}
+    if fit is None:
+        return made
+    free = zeros if path is None else np.column_stack([zeros, path])
+    bare = Teeth.bare(fit.model, fit.errors, fit.sign)
+    teeth = fit_teeth(rows, free, bare, np.diag(fit.covariance))
+    count = round(rows.averaged)
+    for name, one in {"model": bare, "model and harmonics": bare, "model, teeth and harmonics": teeth}.items():
+        left = rows.error - one.at(rows.theta)
+        rest = nothing(0.0 if path is None else half_return(left, zeros, path))
+        if name != "model":
+            rest = pursue(angles, left, zeros, path, pairs, most // 2)
+        rest = replace(rest, crossing=crossing)
+        made[name] = formed(
+            one.sharpened(TURN / rows.rows_per_turn, count), rest, terms, float(np.ptp(left - rest.at(*angles)))
+        )
+    return made
+
+
+def _crossing(left: Array, zeros: Array, paths: Paths) -> Crossing:
+    """How the return error in what is `left` crosses after a reversal."""
+    if not paths:
+        return AT_ONCE
+    columns = np.column_stack([zeros, paths[AT_ONCE]])
+    rest = left - columns @ np.linalg.lstsq(columns, left, rcond=1e-8)[0]
+    return crossing_of(left, zeros, paths, independent_share(rest))
+
+
+def said_of(found: Found, rows: Rows) -> Array:
+    """What `found` says of all `rows` (n,), means of samples as they are: the path since a reversal needs those
+    before."""
+    count = max(1, round(rows.averaged))
+    apart = TURN / rows.rows_per_turn / count
+    value = found.back * path_of(rows, found.crossing)
+    for place in range(count):
+        theta = rows.theta + (place - (count - 1) / 2) * apart
+        value = value + found.at(theta, theta / rows.ratio) / count
+    return value
+
+
+def centred(values: Array, rows: Rows, fold: Index) -> Array:
+    """`values` (n,) less the mean of their recording of `rows` within their `fold` (n,): a zero is nobody's error."""
+    key = rows.record * (int(fold.max()) + 1) + fold
+    _, inverse = np.unique(key, return_inverse=True)
+    return np.asarray(values - (np.bincount(inverse, values) / np.bincount(inverse))[inverse], float)
+
+
+def choose(trials: dict[str, Array], fold: Index) -> tuple[Array, str]:
+    """What of `trials`, (n,) each, is left where each part of `fold` (n,) is scored by the choice of the others, and
+    the choice of all parts."""
+    names = list(trials)
+    squares = np.array([[float(np.sum(trials[n][fold == k] ** 2)) for k in range(int(fold.max()) + 1)] for n in names])
+    nested = np.empty(len(fold))
+    for k in range(squares.shape[1]):
+        others = np.delete(squares, k, axis=1).sum(axis=1)
+        nested[fold == k] = trials[names[int(np.argmin(others))]][fold == k]
+    return nested, names[int(np.argmin(squares.sum(axis=1)))]
