@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from hdopt.arrays import Array
+from hdopt.arrays import Array, Index
 from hdopt.drive.errors import ERROR_NAMES, DriveErrors
 from hdopt.drive.geometry import Drive, Structure
 from hdopt.errors import HdoptError, MissingValue, unknown_name
@@ -37,6 +37,7 @@ from hdopt.optimize.design_space import Combination, Design, DesignSpace
 
 if TYPE_CHECKING:
     from hdopt.optimize.design_effects import DesignEffects
+    from hdopt.optimize.sampled_teeth import SampledTeeth
 
 
 NOMINAL, ROBUST = "peak_to_peak_arcmin", "peak_to_peak_quantile_arcmin"
@@ -72,6 +73,8 @@ class DesignConditions:
     mean_stress_sensitivity: float = 0.2
     k_b: float = 1.0
     sample: Array | None = None
+    teeth: SampledTeeth | None = None
+    """Teeth of the sample's drives where they are drawn from tolerances of pitch."""
     quantile: float = 0.9973
     added: DesignEffects | None = None
     """Effects that count beside the errors."""
@@ -299,15 +302,20 @@ class PeakToPeakQuantile:
     """Quantile of the converged peak-to-peak under the tolerances, from a fixed sample (common random numbers).
 
     A weighted mean of the sample's upper order statistics, so that it moves smoothly; its slopes are the same mean of
-    the drives' own.
+    the drives' own. Teeth that are known one by one, measured or drawn, have no slopes in closed form: those of the
+    drives that count are central differences.
     """
 
     title: str = "Peak-to-peak quantile"
     unit: str = "arcmin"
     small_is_good: bool = True
 
-    def _sample(self, trade: DesignConditions, design: Design) -> Array:
-        return matrix_peak_to_peak_arcmin(design.drive, trade.of(trade.drawn(), design))
+    def _sample(self, trade: DesignConditions, design: Design, chosen: Index | None = None) -> Array:
+        """Peak-to-peak of the sample's drives, or of the `chosen`, built as `design`, arcmin, (n,)."""
+        rows = trade.of(trade.drawn() if chosen is None else trade.drawn()[chosen], design)
+        if trade.teeth is not None:
+            return trade.teeth.peak_to_peak_arcmin(design.drive, rows, chosen)
+        return matrix_peak_to_peak_arcmin(design.drive, rows)
 
     def value(self, trade: DesignConditions, design: Design) -> float:
         weights = trade.weights
@@ -323,8 +331,8 @@ class PeakToPeakQuantile:
         counts = weights > 2e-3 * weights.max()
         chosen, share = order[counts], weights[counts]
         value, rows = float(weights @ values[order]), trade.drawn()[chosen]
-        if point.design.drive.has_measured_teeth:
-            each = point.slopes(lambda design: matrix_peak_to_peak_arcmin(design.drive, trade.of(rows, design))).T
+        if point.design.drive.has_measured_teeth or trade.teeth is not None:
+            each = point.slopes(lambda design: self._sample(trade, design, chosen)).T
             return np.array([value]), (share @ each / share.sum())[None, :]
         found, features = _envelope(point.design, trade.of(rows, point.design)), point.slopes(tip_features)
         n = np.arange(len(chosen))

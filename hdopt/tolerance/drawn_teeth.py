@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,6 +98,22 @@ def drawn_peak_to_peak_arcmin(
     `inputs` (n, d) hold the numbers that pick the `teeth`; what is measured of `drive` stays beside them.
     `misalignment` and `sine_share` as in `beat_extremes_arcmin`.
     """
+
+    def deviations(rows: slice) -> dict[str, Array]:
+        return {one.spline: one.field.drawn(inputs[rows, one.column]) for one in teeth}
+
+    return peak_to_peak_of_teeth_arcmin(drive, matrix, deviations, misalignment, sine_share)
+
+
+def peak_to_peak_of_teeth_arcmin(
+    drive: Drive,
+    matrix: Array,
+    deviations: Callable[[slice], Mapping[str, Array]],
+    misalignment: float = 1.0,
+    sine_share: float = 1.0,
+) -> Array:
+    """The same of drives whose teeth have the cumulative pitch `deviations` of a slice of rows, by spline, (k, Z), mm
+    of arc. `drive`, `matrix`, `misalignment` and `sine_share` as in `drawn_peak_to_peak_arcmin`."""
     from hdopt.kinematics.teeth_kernel import whole_tables
 
     sharing = LoadSharing.of(drive)
@@ -106,8 +122,8 @@ def drawn_peak_to_peak_arcmin(
 
     def fill(rows: slice) -> None:
         tables = dict(zip(SPLINES, whole, strict=True))
-        for one in teeth:
-            tables[one.spline] = tables[one.spline] + sharing.tables(one.field.drawn(inputs[rows, one.column]))
+        for spline, values in deviations(rows).items():
+            tables[spline] = tables[spline] + sharing.tables(values)
         cs, fs = (tables[spline] for spline in SPLINES)
         low, high = beat_extremes_arcmin(drive, matrix[rows], (cs, fs), misalignment, sine_share).T
         out[rows] = high - low

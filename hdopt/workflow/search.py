@@ -14,10 +14,11 @@ from hdopt.optimize.region_maps import find_regions
 from hdopt.optimize.search import search_designs
 from hdopt.study import AnyStudy, Study, as_study
 from hdopt.study.search import SearchSection
+from hdopt.study.tolerances import TolerancesBase
 from hdopt.workflow.output_files import Files, checked_files, write_table_files
 from hdopt.workflow.placed import numbers_named
 from hdopt.workflow.search_setup import setup_of
-from hdopt.workflow.stack import PILOT_MEASURED, PILOT_N
+from hdopt.workflow.stack import PILOT_MEASURED, PILOT_N, drive_problem_of, words_on_graded_teeth
 from hdopt.workflow.write_design import chosen_study_toml
 
 FILES = ("csv", "xlsx", "study")
@@ -89,9 +90,10 @@ def words_on_model(result: SearchResult) -> tuple[str, ...]:
 
 
 def _notes(study: Study) -> tuple[str, ...]:
-    """What is to be said of the study's effects."""
+    """What is to be said of the study's teeth that are drawn, and of its effects."""
+    notes = _on_drawn_teeth(study)
     if not study.effects:
-        return ()
+        return notes
     from hdopt.workflow.effect_selection import inclusion
 
     chosen = inclusion(study, "drive")
@@ -99,4 +101,16 @@ def _notes(study: Study) -> tuple[str, ...]:
         "the effects found on the study's drive are carried over to every design: a radial one follows the pressure "
         "angle, the others stay; the lag is without them"
     )
-    return (*chosen.says, carried) if chosen.counted else chosen.says
+    return (*notes, *chosen.says, carried) if chosen.counted else (*notes, *chosen.says)
+
+
+def _on_drawn_teeth(study: Study) -> tuple[str, ...]:
+    """What teeth that are drawn from tolerances of pitch rest on, and what of them stays in every design."""
+    tolerances = study.find("tolerances", TolerancesBase)
+    if tolerances is None or not tolerances.graded(study.drive.geometry):
+        return ()
+    stays = (
+        "quantiles draw teeth from tolerances of pitch, the same teeth in every design, as large as the "
+        "study's own module makes them; the nominal figures are those of [errors], without them"
+    )
+    return (*words_on_graded_teeth(drive_problem_of(study)), stays)

@@ -24,9 +24,11 @@ from hdopt.study.search import (
     SearchSection,
     VariableSection,
 )
+from hdopt.study.tolerances import TolerancesBase
 
 if TYPE_CHECKING:
     from hdopt.optimize.design_effects import DesignEffects
+    from hdopt.optimize.sampled_teeth import SampledTeeth
 
 RPM = 2 * math.pi / 60
 DEFAULT_WRAP_DEG = 60.0
@@ -42,6 +44,12 @@ def setup_of(study: Study, seed: int) -> Setup:
         raise HdoptError(
             f"search.size is {section.size!r}, which changes the number of teeth, and these were measured one by one; "
             "set search.size=fixed_tooth_counts, or leave [cs_teeth] and [fs_teeth] out"
+        )
+    tolerances = study.find("tolerances", TolerancesBase)
+    if tolerances is not None and section.size != "fixed_tooth_counts" and tolerances.graded(drive.geometry):
+        raise HdoptError(
+            f"search.size is {section.size!r}, which changes the number of teeth, and their tolerances of pitch are "
+            "drawn for one number; set search.size=fixed_tooth_counts, or give tooth amplitudes in [tolerances]"
         )
     if not drive.wave_generator.profile.tip_is_smooth:
         raise HdoptError(
@@ -110,6 +118,7 @@ def _trade(study: Study, section: SearchSection, seed: int) -> DesignConditions:
         given.friction,
     )
     needs_sample = section.robust or "quantile" in section.objective
+    sample, teeth = sample_of(study, section.samples, seed) if needs_sample else (None, None)
     return DesignConditions(
         errors=study.errors,
         reference=drive,
@@ -120,7 +129,8 @@ def _trade(study: Study, section: SearchSection, seed: int) -> DesignConditions:
         backlash=drive.clearances.backlash,
         notch_factor=given.notch_factor,
         mean_stress_sensitivity=given.mean_stress_sensitivity,
-        sample=sample_rows(study, section.samples, seed) if needs_sample else None,
+        sample=sample,
+        teeth=teeth,
         quantile=section.quantile,
         added=_effects(study, section, needs_sample),
         structure_costs=tuple((Structure(name), cost / 100) for name, cost in given.structure_cost_percent.items()),
@@ -152,17 +162,16 @@ def _effects(study: Study, section: SearchSection, needs_sample: bool) -> Design
     return DesignEffects.of(study.drive, chosen, study.operation)
 
 
-def sample_rows(study: Study, n: int, seed: int) -> Array:
-    """`n` drives of the study's tolerances as rows of `DriveErrors.to_matrix`: one scrambling, by `seed`, of Sobol'
-    points."""
+def sample_of(study: Study, n: int, seed: int) -> tuple[Array, SampledTeeth | None]:
+    """`n` drives of the study's tolerances as rows of `DriveErrors.to_matrix`, and their teeth where those are drawn
+    from tolerances of pitch: one scrambling, by `seed`, of Sobol' points."""
+    from hdopt.optimize.sampled_teeth import SampledTeeth
     from hdopt.tolerance.sampling import ScrambledSobol
     from hdopt.workflow.stack import drive_problem_of
 
     problem = drive_problem_of(study)
-    if problem.graded:
-        raise HdoptError(
-            f"a search does not draw the teeth of {', '.join(problem.graded)} from tolerances of pitch; give tooth "
-            "amplitudes in [tolerances] instead, or search the nominal error (search.robust=false)"
-        )
+    response = problem.response
     points = np.concatenate(list(ScrambledSobol(1).blocks(seed, 0, n, problem.space.dimension)))
-    return problem.response.errors(problem.space.sample(points)).to_matrix()
+    inputs = problem.space.sample(points)
+    teeth = SampledTeeth.of(response.teeth, inputs) if response.teeth else None
+    return response.errors(inputs).to_matrix(), teeth

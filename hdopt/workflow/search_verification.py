@@ -50,6 +50,7 @@ def quantile_blocks(study: Study, design: Design, quantile: float, seed: int, tr
     independent scramblings of `seed`: shape (16,). `trade` says which tilts follow the width, and which effects
     count."""
     from hdopt.kinematics import peak_to_peak_arcmin
+    from hdopt.tolerance.drawn_teeth import drawn_peak_to_peak_arcmin
     from hdopt.tolerance.sampling import ScrambledSobol
 
     problem, drive = drive_problem_of(study), design.drive
@@ -58,8 +59,11 @@ def quantile_blocks(study: Study, design: Design, quantile: float, seed: int, tr
     values = []
     for replicate in range(BLOCKS):
         points = np.concatenate(list(sampling.blocks(seed, replicate, VERIFICATION // BLOCKS, space.dimension)))
-        rows = trade.of(response.errors(space.sample(points)).to_matrix(), design)
-        if trade.added is None:
+        inputs = space.sample(points)
+        rows = trade.of(response.errors(inputs).to_matrix(), design)
+        if response.teeth:
+            spans = drawn_peak_to_peak_arcmin(drive, rows, inputs, response.teeth, 1.0, 1.0)
+        elif trade.added is None:
             spans = peak_to_peak_arcmin(drive, DriveErrors.from_matrix(rows))
         else:
             from hdopt.simulation.batch import matrix_peak_to_peak_arcmin

@@ -282,6 +282,8 @@ def _exact_response(problem: ToleranceProblem, n: int, distance: ModelError | No
     too_far = distance is not None and distance.says is not None
     if asked == CLOSED_FORM or (asked != EXACT and (n > MOST_DRIVES or not too_far)):
         return None
+    if isinstance(response, DriveResponse) and not response.drive.wave_generator.profile.tip_is_smooth:
+        return None  # a measured cam has no other geometry than the exact one
     if not isinstance(response, DriveResponse) or response.teeth or response.drive.has_measured_teeth:
         if asked != EXACT:
             return None

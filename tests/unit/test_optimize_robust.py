@@ -12,7 +12,7 @@ from hdopt.report import Figure, Table, Text
 from hdopt.report.sections.search import NOT_FOLLOWED
 from hdopt.study import load_study
 from hdopt.workflow.search import search, words_on_model
-from hdopt.workflow.search_setup import sample_rows
+from hdopt.workflow.search_setup import sample_of
 from hdopt.workflow.search_verification import verify
 from hdopt.workflow.stack import drive_problem_of
 from hdopt.workflow.steps import Context, find_step
@@ -54,7 +54,7 @@ def test_slopes_of_the_quantile_agree_with_wide_differences(result):
 def test_the_quantile_is_that_of_the_sample(study, result):
     rows = result.setup.trade.sample
     assert rows.shape == (512, 12)
-    assert np.array_equal(rows, sample_rows(study, 512, 1))
+    assert np.array_equal(rows, sample_of(study, 512, 1)[0])
     response = drive_problem_of(study).response
     drive = result.setup.space.design(result.chosen.combination, result.chosen.values).drive
     values = np.sort(peak_to_peak_arcmin(drive, type(response.held).from_matrix(rows)))

@@ -24,7 +24,6 @@ from hdopt.tolerance.screening import run_screening
 from hdopt.tolerance.space import InputSpace, Tolerance
 from hdopt.tolerance.tooth_field import CALIBRATION_SEED, ToothField, _normal_pairs, largest_single, tooth_field
 from hdopt.tolerance.worst_case import Unbounded, check_bounded
-from hdopt.workflow.search_setup import sample_rows
 from hdopt.workflow.stack import study_problem
 
 Z = 162
@@ -186,8 +185,6 @@ def test_what_needs_bounds_or_neighbours_says_that_drawn_teeth_have_none():
         run_screening(problem.response, problem.space, "delta")
     lower, upper = problem.space.box
     assert problem.response.upper_bound(lower, upper) is None
-    with pytest.raises(HdoptError, match="a search does not draw the teeth of cs_teeth"):
-        sample_rows(study(), 8, 1)
 
 
 @pytest.mark.parametrize(

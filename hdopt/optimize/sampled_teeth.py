@@ -1,0 +1,39 @@
+"""The teeth of the drives that make a search's quantile: drawn once, the same in every design."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdopt.arrays import Array, Index
+from hdopt.drive.geometry import Drive
+from hdopt.tolerance.drawn_teeth import DrawnTeeth, peak_to_peak_of_teeth_arcmin
+
+
+@dataclass(frozen=True)
+class SampledTeeth:
+    """Cumulative pitch `deviations` (n, Z) of n drives by spline ('cs_teeth', 'fs_teeth'), mm of arc.
+
+    Every design meets the same teeth (common random numbers), so that a quantile over them moves as smoothly as each
+    drive's own peak-to-peak does. What evens them out is the design's own contact angle.
+    """
+
+    deviations: Mapping[str, Array]
+
+    @classmethod
+    def of(cls, teeth: Sequence[DrawnTeeth], inputs: Array) -> SampledTeeth:
+        """Those of the `teeth` that a sample of `inputs` (n, d) picks."""
+        return cls({one.spline: one.field.drawn(inputs[:, one.column]) for one in teeth})
+
+    def peak_to_peak_arcmin(self, drive: Drive, rows: Array, chosen: Index | None = None) -> Array:
+        """Converged peak-to-peak (arcmin, k_e = 1) of drives that are built as `drive` with errors as `rows` (n, 12) of
+        `DriveErrors.to_matrix`, each with its own teeth; (n,). `rows` are those of all drives, or of the `chosen`."""
+        own = {
+            spline: np.ascontiguousarray(values if chosen is None else values[chosen])
+            for spline, values in self.deviations.items()
+        }
+        return peak_to_peak_of_teeth_arcmin(
+            drive, rows, lambda block: {spline: values[block] for spline, values in own.items()}
+        )
