@@ -9,7 +9,7 @@ import numpy as np
 
 from hdopt.arrays import Array, Index
 from hdopt.drive.geometry import Drive
-from hdopt.tolerance.drawn_teeth import DrawnTeeth, peak_to_peak_of_teeth_arcmin
+from hdopt.tolerance.drawn_teeth import DrawnTeeth, deviations_of, peak_to_peak_of_teeth_arcmin
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class SampledTeeth:
     @classmethod
     def of(cls, teeth: Sequence[DrawnTeeth], inputs: Array) -> SampledTeeth:
         """Those of the `teeth` that a sample of `inputs` (n, d) picks."""
-        return cls({one.spline: one.field.drawn(inputs[:, one.column]) for one in teeth})
+        return cls(deviations_of(teeth, inputs))
 
     def peak_to_peak_arcmin(self, drive: Drive, rows: Array, chosen: Index | None = None) -> Array:
         """Converged peak-to-peak (arcmin, k_e = 1) of drives that are built as `drive` with errors as `rows` (n, 12) of

@@ -98,11 +98,14 @@ def drawn_peak_to_peak_arcmin(
     `inputs` (n, d) hold the numbers that pick the `teeth`; what is measured of `drive` stays beside them.
     `misalignment` and `sine_share` as in `beat_extremes_arcmin`.
     """
+    return peak_to_peak_of_teeth_arcmin(
+        drive, matrix, lambda rows: deviations_of(teeth, inputs[rows]), misalignment, sine_share
+    )
 
-    def deviations(rows: slice) -> dict[str, Array]:
-        return {one.spline: one.field.drawn(inputs[rows, one.column]) for one in teeth}
 
-    return peak_to_peak_of_teeth_arcmin(drive, matrix, deviations, misalignment, sine_share)
+def deviations_of(teeth: Sequence[DrawnTeeth], inputs: Array) -> dict[str, Array]:
+    """Cumulative pitch deviations (mm, (n, Z)) of the `teeth` that `inputs` (n, d) pick, by spline."""
+    return {one.spline: one.field.drawn(inputs[:, one.column]) for one in teeth}
 
 
 def peak_to_peak_of_teeth_arcmin(
@@ -114,19 +117,32 @@ def peak_to_peak_of_teeth_arcmin(
 ) -> Array:
     """The same of drives whose teeth have the cumulative pitch `deviations` of a slice of rows, by spline, (k, Z), mm
     of arc. `drive`, `matrix`, `misalignment` and `sine_share` as in `drawn_peak_to_peak_arcmin`."""
-    from hdopt.kinematics.teeth_kernel import whole_tables
-
-    sharing = LoadSharing.of(drive)
-    whole = whole_tables(drive, mesh_tables(drive))
+    tables = tables_of_teeth(drive, deviations)
     out = np.empty(len(matrix))
 
     def fill(rows: slice) -> None:
-        tables = dict(zip(SPLINES, whole, strict=True))
-        for spline, values in deviations(rows).items():
-            tables[spline] = tables[spline] + sharing.tables(values)
-        cs, fs = (tables[spline] for spline in SPLINES)
-        low, high = beat_extremes_arcmin(drive, matrix[rows], (cs, fs), misalignment, sine_share).T
+        low, high = beat_extremes_arcmin(drive, matrix[rows], tables(rows), misalignment, sine_share).T
         out[rows] = high - low
 
     in_blocks(len(matrix), DRIVES, fill)
     return out
+
+
+def tables_of_teeth(
+    drive: Drive, deviations: Callable[[slice], Mapping[str, Array]]
+) -> Callable[[slice], tuple[Array, Array]]:
+    """What teeth in contact make of `deviations` (as in `peak_to_peak_of_teeth_arcmin`) and of the measured teeth of
+    `drive`, for a slice of rows: tables of CS and FS over one turn, mm of arc, (k, 12 Z), or (1, 12 Z) where all drives
+    have the same."""
+    from hdopt.kinematics.teeth_kernel import whole_tables
+
+    sharing = LoadSharing.of(drive)
+    whole = whole_tables(drive, mesh_tables(drive))
+
+    def tables(rows: slice) -> tuple[Array, Array]:
+        found = dict(zip(SPLINES, whole, strict=True))
+        for spline, values in deviations(rows).items():
+            found[spline] = found[spline] + sharing.tables(values)
+        return found[SPLINES[0]], found[SPLINES[1]]
+
+    return tables

@@ -22,6 +22,7 @@ from hdopt.tolerance.drawn_teeth import (
     DrawnTeeth,
     GradedTeeth,
     check_graded,
+    deviations_of,
     drawn_peak_to_peak_arcmin,
 )
 from hdopt.tolerance.space import InputSpace, Tolerance
@@ -156,7 +157,7 @@ class DriveResponse:
         from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin
 
         if self.teeth:
-            return drawn_peak_to_peak_arcmin(self.drive, self.matrix(inputs), inputs, self.teeth, *self._shares)
+            return drawn_peak_to_peak_arcmin(self.drive, self.matrix(inputs), inputs, self.teeth, *self.shares)
         if self.drive.has_measured_teeth and self.homogenization != 1:
             return self._shared(inputs)
         return self.homogenization * matrix_peak_to_peak_arcmin(self.drive, self.matrix(inputs))
@@ -166,11 +167,15 @@ class DriveResponse:
         mean, measured teeth by theirs; arcmin, (n,)."""
         from hdopt.kinematics.peak_to_peak import beat_extremes_arcmin
 
-        low, high = beat_extremes_arcmin(self.drive, self.matrix(inputs), None, *self._shares).T
+        low, high = beat_extremes_arcmin(self.drive, self.matrix(inputs), None, *self.shares).T
         return np.asarray(high - low)
 
+    def deviations(self, inputs: Array) -> dict[str, Array]:
+        """Cumulative pitch deviations (mm, (n, Z)) of the teeth that `inputs` (n, d) draw, by spline."""
+        return deviations_of(self.teeth, inputs)
+
     @property
-    def _shares(self) -> tuple[float, float]:
+    def shares(self) -> tuple[float, float]:
         """What is left of misalignment and of sines where the teeth in contact share them; all for a single pair."""
         from hdopt.kinematics.load_sharing import misalignment_share
 

@@ -181,15 +181,11 @@ def with_effects(study: Study, response: DriveResponse) -> tuple[Response, tuple
     chosen = inclusion(study, "drive")
     if not chosen.counted:
         return response, chosen.says
-    if response.teeth:
-        raise HdoptError(
-            "effects and teeth drawn from tolerances of pitch do not go together; leave either out, as with "
-            "operation.include=none"
-        )
     from hdopt.simulation.batch import tabulate
     from hdopt.tolerance.drive_effects import ExtendedResponse
 
-    extended = ExtendedResponse(response, tabulate(study.drive, chosen.counted, study.operation))
+    bare = replace(study.drive, cs_teeth=None, fs_teeth=None, cs_roundness=None)
+    extended = ExtendedResponse(response, tabulate(bare, chosen.counted, study.operation))
     return extended, (*chosen.says, "the effects are the same in every drive: they have no tolerance")
 
 
@@ -294,14 +290,22 @@ def _exact_response(problem: ToleranceProblem, n: int, distance: ModelError | No
 
 
 def _directions(problem: ToleranceProblem, n: int) -> int:
-    """Directions that the straight line of `problem` is averaged over, where its sample has `n` drives. On a measured
-    cam each drive takes the exact geometry, some thousand times as long as the closed form: the line then takes no more
-    drives than the sample, or 128 directions."""
-    response = problem.response
-    if not isinstance(response, DriveResponse) or response.drive.wave_generator.profile.tip_is_smooth:
+    """Directions that the straight line of `problem` is averaged over, where its sample has `n` drives: where each
+    drive is dear, the line takes no more drives than the sample, or 128 directions."""
+    if not _is_dear(problem.response):
         return DIRECTIONS
     most = n // (2 * len(problem.space.names) + 1)
     return min(DIRECTIONS, max(FEWEST_DIRECTIONS, 1 << max(most, 1).bit_length() - 1))
+
+
+def _is_dear(response: Response) -> bool:
+    """Whether a drive takes some thousand times as long as the closed form: on a measured cam, or with effects where
+    every drive has teeth of its own."""
+    if isinstance(response, DriveResponse | LinearResponse):
+        return isinstance(response, DriveResponse) and not response.drive.wave_generator.profile.tip_is_smooth
+    from hdopt.tolerance.drive_effects import ExtendedResponse
+
+    return isinstance(response, ExtendedResponse) and response.has_own_teeth
 
 
 def _method(problem: ToleranceProblem, seed: int) -> tuple[str | None, ModelError | None]:
