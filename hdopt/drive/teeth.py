@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +11,8 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.drive.values import DriveError, require
+from hdopt.errors import HdoptError, shown
+from hdopt.files import cells_of, read_text
 
 KINDS = ("cumulative", "single")
 
@@ -67,14 +69,15 @@ class MeasuredTeeth:
 def read_teeth(path: str | Path, teeth: int, flank: str | None = None) -> Array:
     """Deviations (mm) of teeth 1 to `teeth` from the CSV file `path` of rows tooth, flank, fp_um.
 
-    A header line is optional, `#` starts a comment. `flank` picks one where the file has several. Raises `DriveError`
-    with file and line for a row that is none, a tooth that is missing, twice there, or beyond `teeth`.
+    A header line is optional, `#` starts a comment; between semicolons or tabs, numbers may have a decimal comma.
+    `flank` picks one where the file has several. Raises `DriveError` with file and line for a row that is none, a
+    header that says mm, a tooth that is missing, twice there, or beyond `teeth`.
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DriveError(f"measured teeth {path}: cannot be read ({error}); give a CSV text file") from error
+        text = read_text(path, "a CSV text file", foreign=True)
+    except HdoptError as error:
+        raise DriveError(f"measured teeth {path}: cannot be read ({error})") from error
     rows = _rows(text, path)
     flanks = sorted({row[1] for row in rows})
     named = ", ".join(flanks) or "none"
@@ -100,16 +103,25 @@ def read_teeth(path: str | Path, teeth: int, flank: str | None = None) -> Array:
 def _rows(text: str, path: Path) -> list[tuple[int, str, float]]:
     rows = []
     header_allowed = True
-    for number, row in enumerate(csv.reader(text.splitlines()), 1):
-        if not row or row[0].lstrip().startswith("#"):
+    for number, line in enumerate(text.splitlines(), 1):
+        if not line.strip(" ;,\t") or line.lstrip().startswith("#"):
             continue
+        cells = [cell.strip() for cell in cells_of(line)]
         try:
-            tooth, side, value = (cell.strip() for cell in row)
+            tooth, side, value = cells
             rows.append((int(tooth), side, float(value)))
         except ValueError:
+            where = f"measured teeth {path}, line {number}: {shown(line)}"
+            require(header_allowed, f"{where}; each line must hold tooth, flank, fp_um{_on_commas(line, cells)}")
+            in_mm = re.search(r"(?<![a-zA-Z])mm\b", cells[-1])
             require(
-                header_allowed,
-                f"measured teeth {path}, line {number}: {','.join(row)!r}; each line must hold tooth, flank, fp_um",
+                in_mm is None, f"{where}; deviations must be in um: give them times 1000, and name the column fp_um"
             )
         header_allowed = False
     return rows
+
+
+def _on_commas(line: str, cells: list[str]) -> str:
+    """What to do about a `line` that decimal commas may have cut into too many `cells`."""
+    several = len(cells) > 3 and not set(";\t") & set(line)
+    return "; between decimal commas, semicolons must part the cells" if several else ""

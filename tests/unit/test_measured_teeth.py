@@ -186,9 +186,23 @@ def test_a_stack_evens_out_term_by_term_as_ke_does(study_with_teeth):
         ("9,left,0\n", "tooth 9; this spline has teeth 1 to 8"),
         ("1,left,0\n1,right,0\n", "has the flanks left, right; say which one carries"),
         ("tooth,flank,fp_um\n1,left\n", "line 2: '1,left'; each line must hold tooth, flank, fp_um"),
+        ("tooth,flank,fp_um\n1,left,0,5\n", "line 2: '1,left,0,5'; .*between decimal commas, semicolons must part"),
+        ("Zahn;Flanke;fp [mm]\n1;links;0,004\n", "line 1: .*deviations must be in um: give them times 1000"),
     ],
 )
 def test_a_table_that_is_none_is_refused(tmp_path, text, message):
     (tmp_path / "t.csv").write_text(text)
     with pytest.raises(DriveError, match=message):
         read_teeth(tmp_path / "t.csv", 8)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "cp1252", "utf-16"])
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_a_table_of_a_german_spreadsheet(tmp_path, encoding, mark):
+    """Semicolons or tabs, decimal commas, Windows' encodings, and a last line of empty cells."""
+    rows = [f"{i}{mark}links{mark}{value}" for i, value in enumerate(["0", "1,5", "-0,25", *5 * ["3,0E-1"]], 1)]
+    text = "\r\n".join([f"Zahn{mark}Flanke{mark}Teilungsabweichung fp in \u00b5m", *rows, 2 * mark, ""])
+    (tmp_path / "t.csv").write_bytes(text.encode(encoding))
+    assert read_teeth(tmp_path / "t.csv", 8).tolist() == pytest.approx(
+        [0.0, 0.0015, -0.00025, *5 * [0.0003]], abs=1e-15
+    )
