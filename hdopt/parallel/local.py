@@ -103,7 +103,14 @@ class Processes:
 
         import cloudpickle  # type: ignore[import-untyped]  # ships no types
 
-        pool = ProcessPoolExecutor(self.workers, get_context("spawn"), initializer=_start_process)
+        try:
+            pool = ProcessPoolExecutor(self.workers, get_context("spawn"), initializer=_start_process)
+        except (OSError, ImportError, NotImplementedError) as error:
+            why = getattr(error, "strerror", None) or error
+            raise EngineFailed(
+                f"processes need semaphores, which this machine does not give ({why}); see whether /dev/shm can be "
+                "written, or use --engine threads"
+            ) from error
 
         def submit(item: T) -> Future[R]:
             return pool.submit(_call, cloudpickle.dumps((function, item)))

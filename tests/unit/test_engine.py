@@ -1,5 +1,6 @@
 """The one executor: order kept, memory bounded, the same bytes on every engine, a cluster's faults told in time."""
 
+import errno
 import json
 import os
 import socket
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 import hdopt.parallel.cluster
-from hdopt.errors import HdoptError
+from hdopt.errors import EngineFailed, HdoptError
 from hdopt.parallel.cluster import Dask
 from hdopt.parallel.engine import engine_from, engine_in_force
 from hdopt.parallel.local import Processes, ThisProcess, Threads
@@ -22,6 +23,7 @@ from hdopt.tolerance.distributions import Normal
 from hdopt.tolerance.space import InputSpace, Tolerance
 from hdopt.tolerance.stack import StackRequest, run_stack
 from hdopt.tolerance.tail import tail_probability
+from tests.machine import gives_semaphores, needs_semaphores
 
 
 def total(x):
@@ -50,10 +52,23 @@ def test_results_come_in_order(engine):
     assert list(engine.map(slowest_first, range(50))) == [i * i for i in range(50)]
 
 
+@needs_semaphores
 def test_processes_keep_order_and_bytes():
     assert list(Processes(2).map(lambda i: i * i, range(20))) == [i * i for i in range(20)]
     assert stacked(Processes(2)) == stacked("process")
     assert tail(Processes(2)) == tail("process") == tail("threads:3")
+
+
+def test_a_machine_without_semaphores_is_told_to_use_threads(monkeypatch):
+    """As on one whose /dev/shm cannot be written."""
+
+    def no_lock(*_, **__):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr("multiprocessing.synchronize.SemLock.__init__", no_lock)
+    with pytest.raises(EngineFailed, match=r"semaphores.*\(Read-only file system\).*/dev/shm.*--engine threads"):
+        list(Processes(2).map(abs, [1, 2]))
+    assert not gives_semaphores()
 
 
 def test_threads_give_the_bytes_of_one_process():
@@ -278,6 +293,7 @@ def cluster():
         yield cluster
 
 
+@needs_semaphores
 @pytest.mark.slow
 def test_a_killed_worker_changes_nothing(cluster):
     engine = Dask(cluster.scheduler_address.removeprefix("tcp://"))
@@ -288,6 +304,7 @@ def test_a_killed_worker_changes_nothing(cluster):
     assert first + list(found) == [i * i for i in range(40)]
 
 
+@needs_semaphores
 @pytest.mark.slow
 def test_work_that_kills_every_worker_is_one_message(cluster):
     engine = Dask(cluster.scheduler_address.removeprefix("tcp://"))
@@ -295,6 +312,7 @@ def test_work_that_kills_every_worker_is_one_message(cluster):
         list(engine.map(exits, range(2)))
 
 
+@needs_semaphores
 @pytest.mark.slow
 def test_a_scheduler_without_workers_or_with_others_is_told_within_the_time_out(monkeypatch):
     distributed = pytest.importorskip("distributed")
@@ -313,6 +331,7 @@ def test_a_scheduler_without_workers_or_with_others_is_told_within_the_time_out(
             list(engine.map(abs, [1]))
 
 
+@needs_semaphores
 @pytest.mark.slow
 def test_a_scheduler_that_goes_away_is_told():
     distributed = pytest.importorskip("distributed")

@@ -33,6 +33,7 @@ from hdopt.tolerance.fused import fused_pass
 from hdopt.tolerance.quantile_table import ROUNDING, SMALLEST, quantile_table
 from hdopt.tolerance.sampling import BLOCK, PlainMonteCarlo, ScrambledSobol
 from hdopt.tolerance.stack import StackRequest, run_stack
+from tests.machine import needs_semaphores
 
 MAGNITUDES: dict[str, Distribution] = {
     "truncated rayleigh": Rayleigh(scale=0.005, upper=0.015),
@@ -156,7 +157,7 @@ def test_figures_are_those_of_the_general_path(sampling):
         assert estimate.value == pytest.approx(two.quantiles[q].value, abs=50 * OFF_ARCMIN)
 
 
-@pytest.mark.parametrize("engine", [Threads(3), pytest.param(Processes(2), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("engine", [Threads(3), pytest.param(Processes(2), marks=[pytest.mark.slow, needs_semaphores])])
 def test_same_bytes_on_every_engine(engine):
     problem = shipped()
     one, two = (
