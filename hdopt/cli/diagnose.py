@@ -8,16 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import (
-    OutputFile,
-    answer_options,
-    emit,
-    engine_option,
-    finished_parts_kept,
-    resume_option,
-    table_options,
-    watched,
-)
+from hdopt.cli.common import OutputFile, answer_options, engine_option, table_options
+from hdopt.cli.each import EachOptions, each_options, emit_written
 from hdopt.cli.log import looked_at
 from hdopt.cli.recorded import RecordingOptions, recording_options
 
@@ -43,8 +35,7 @@ MOST_LISTED = 12
     type=OutputFile(),
     help="Write a study with the drive's fitted errors and the effects found.",
 )
-@click.option("--each", is_flag=True, help="Each file is a drive of its own: one table, --engine takes them.")
-@resume_option
+@each_options("Each file is a drive of its own: one table, --engine takes them.")
 @engine_option
 @answer_options
 def command(
@@ -52,8 +43,7 @@ def command(
     nuisance: str,
     report_file: Path | None,
     study_file: Path | None,
-    each: bool,
-    resume: bool,
+    batch: EachOptions,
     json_file: Path | None,
     seed: int,
 ) -> None:
@@ -65,15 +55,9 @@ def command(
     asked = tuple(name.strip() for name in nuisance.split(",") if name.strip())
     wanted = {"report": report_file, "study": study_file}
     files = {kind: path for kind, path in wanted.items() if path is not None}
-    if not each:
-        if resume:
-            raise click.UsageError("--resume goes on with many drives; give it with --each")
-        _one(given, asked, files, json_file, seed)
-        return
-    if study_file is not None:
-        raise click.UsageError("--write-study: said of one drive; leave it out with --each")
-    with finished_parts_kept(given.fingerprint(), resume):
-        _each(given, asked, files, json_file, seed)
+    options = (given, asked, files, json_file, seed)
+    of_one = ("--write-study",) if study_file is not None else ()
+    batch.work(given, lambda: _one(*options), lambda: _each(*options), of_one)
 
 
 def _one(
@@ -90,26 +74,18 @@ def _one(
     label = f"diagnosis of {len(read)} recording{'s' if len(read) > 1 else ''}"
     with looked_at(label, DiagnosisWatch(get_ident()).words):
         diagnosis = diagnose(read, source, seed=seed, nuisance=nuisance)
-    try:
-        write_diagnosis(diagnosis, files, [recording.name for recording in read], source)
-    finally:
-        # A file that cannot be written after minutes of work must not take the answer with it.
-        emit(diagnosis.to_dict(), json_file, _lines(diagnosis), tables=diagnosis)
+    names = [recording.name for recording in read]
+    emit_written(diagnosis, json_file, _lines(diagnosis), lambda: write_diagnosis(diagnosis, files, names, source))
 
 
 def _each(
     given: RecordingOptions, nuisance: tuple[str, ...], files: dict[str, Path], json_file: Path | None, seed: int
 ) -> None:
     """The diagnoses of many drives, said and written."""
-    from hdopt.parallel.engine import engine_in_force
     from hdopt.workflow.diagnose_many import diagnose_many, write_diagnoses
 
-    with engine_in_force(watched("drives")):
-        batch = diagnose_many(given.recordings, given.source(), seed, nuisance)
-    try:
-        write_diagnoses(batch, files)
-    finally:
-        emit(batch.to_dict(), json_file, _batch_lines(batch), tables=batch)
+    batch = diagnose_many(given.recordings, given.source(), seed, nuisance)
+    emit_written(batch, json_file, _batch_lines(batch), lambda: write_diagnoses(batch, files))
 
 
 def _batch_lines(batch: DiagnosedBatch) -> Iterator[str]:

@@ -10,15 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar  # Any: what the command's other 
 
 import click
 
-from hdopt.cli.common import (
-    OutputFile,
-    answer_options,
-    emit,
-    engine_option,
-    finished_parts_kept,
-    resume_option,
-    table_options,
-)
+from hdopt.cli.common import OutputFile, answer_options, engine_option, table_options
+from hdopt.cli.each import EachOptions, each_options, emit_written
 from hdopt.cli.recorded import RecordingOptions, recording_options
 
 if TYPE_CHECKING:
@@ -108,17 +101,15 @@ def sheet_options(command: Callable[..., R]) -> Callable[..., R]:
 @table_options
 @recording_options
 @sheet_options
-@click.option("--each", is_flag=True, help="Each file is a drive of its own: one table, one plot, Ppk.")
+@each_options("Each file is a drive of its own: one table, one plot, Ppk.")
 @click.option("--check", is_flag=True, help="End with status 1 where a limit is missed (not where it is undecided).")
-@resume_option
 @engine_option
 @answer_options
 def command(
     given: RecordingOptions,
     asked: SheetOptions,
-    each: bool,
+    batch: EachOptions,
     check: bool,
-    resume: bool,
     json_file: Path | None,
     seed: int,
 ) -> int:
@@ -127,13 +118,8 @@ def command(
     REC are files of one drive (with --each, of one drive each): .csv and other text, .parquet, .mat, .h5, .tdms, .mcap,
     ROS bags, PHD2 guide logs, .mf4. Exit status 1 with --check where a limit is missed.
     """
-    if not each:
-        if resume:
-            raise click.UsageError("--resume goes on with many drives; give it with --each")
-        missed = _one(given, asked, json_file, seed)
-    else:
-        with finished_parts_kept(given.fingerprint(), resume):
-            missed = _each(given, asked, json_file, seed)
+    options = (given, asked, json_file, seed)
+    missed = batch.work(given, lambda: _one(*options), lambda: _each(*options), asked.of_one_drive())
     return 1 if check and missed else 0
 
 
@@ -152,10 +138,8 @@ def _one(given: RecordingOptions, asked: SheetOptions, json_file: Path | None, s
         label=SheetLabel(asked.serial, asked.conditions),
         seed=seed,
     )
-    try:
-        write_inspection(found, asked.files, given.recordings, source)
-    finally:
-        emit(found.to_dict(), json_file, _lines(found), tables=found)
+    files, names = asked.files, given.recordings
+    emit_written(found, json_file, _lines(found), lambda: write_inspection(found, files, names, source))
     return found.missed
 
 
@@ -163,13 +147,8 @@ def _each(given: RecordingOptions, asked: SheetOptions, json_file: Path | None, 
     """The table of many drives, said and written; whether one of them misses a limit."""
     from hdopt.workflow.inspect_many import inspect_many, write_batch
 
-    if names := asked.of_one_drive():
-        raise click.UsageError(f"{', '.join(names)}: said of one drive; leave it out with --each")
     batch = inspect_many(given.recordings, given.source(), asked.limits, seed)
-    try:
-        write_batch(batch, asked.files)
-    finally:
-        emit(batch.to_dict(), json_file, _batch_lines(batch), tables=batch)
+    emit_written(batch, json_file, _batch_lines(batch), lambda: write_batch(batch, asked.files))
     return batch.missed
 
 
