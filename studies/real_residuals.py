@@ -13,7 +13,7 @@ import pandas as pd
 from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
-from hdopt.report import Points, Section, Table, Text
+from hdopt.report import Points, Section, Table
 from hdopt.report.sections.words import label
 from hdopt.studies.sections import ResidualsSection
 from hdopt.study import Study
@@ -74,6 +74,11 @@ def real_residuals(study: Study, context: Context) -> StepResult:
 
 
 MISSED = "Every case not answered exactly"
+SUMMARY = "Answered exactly, among the explanations offered, unknown, or named wrongly"
+SEVERITY = (
+    "Severity is the hidden rms in units of the real residual's (real motion) or of the drive's own error; none where "
+    "nothing was hidden."
+)
 
 
 def residuals_section(cases: pd.DataFrame, table: pd.DataFrame) -> Section:
@@ -86,31 +91,38 @@ def residuals_section(cases: pd.DataFrame, table: pd.DataFrame) -> Section:
         f"{int(hidden.among.sum())} were among the explanations offered, and {int(hidden.wrong.sum())} got a wrong "
         "name.",
     ]
-    rows = cases.assign(hidden=cases.hidden.map(label), said=cases.said.map(_in_words))
-    rows = (
-        rows[~cases.exact]
-        .reset_index(drop=True)
-        .drop(columns="exact")
-        .rename(columns={"among": "among the offered", "wrong": "wrong name"})
+    missed = cases[~cases.exact]
+    rows = pd.DataFrame(
+        {
+            "hidden": missed.hidden.map(lambda name: label(name) if name != "nothing" else "nothing"),
+            "in the noise of": missed.noise,
+            "severity": missed.severity.where(missed.severity > 0),
+            "verdict": missed.verdict,
+            "said": missed.said.map(_in_words),
+            "came out as": missed.apply(_outcome, axis=1) if len(missed) else [],
+        }
+    ).reset_index(drop=True)
+    counts = table.assign(severity=table.severity.where(table.severity > 0)).rename(
+        columns={"noise": "in the noise of", "among": "among the offered", "wrong": "wrong name"}
     )
     return Section(
         "real-residuals",
         "Known physics in real noise",
         (
             Points(tuple(says)),
-            Table(
-                "residuals-summary",
-                "Answered exactly, among the explanations offered, unknown, or named wrongly",
-                table,
-                "",
-                {"severity": "g"},
-            ),
+            Table("residuals-summary", SUMMARY, counts, SEVERITY, {"severity": "g"}),
             *((Table("residuals-missed", MISSED, rows, "", {"severity": "g"}),) if len(rows) else ()),
-            Text(
-                "Severity is the hidden rms in units of the real residual's (real motion) or of the drive's own error."
-            ),
         ),
     )
+
+
+def _outcome(case: pd.Series) -> str:
+    """How a case that was not answered exactly came out, in words."""
+    if case.wrong:
+        return "a wrong name"
+    if case.unknown:
+        return "the right name, said beside more that is unknown" if case.among else "unknown"
+    return "among the explanations offered" if case.among else "not found"
 
 
 def _in_words(effects: str) -> str:

@@ -8,7 +8,7 @@ import pytest
 from hdopt.errors import HdoptError
 from hdopt.report import Report, Ruling, Table
 from hdopt.report.html import render
-from hdopt.studies.concealed_physics import proof_section
+from hdopt.studies.concealed_physics import gate_frame, proof_section, without_empty
 from hdopt.study import load_study
 from hdopt.study.schema import SECTIONS, step_sections
 from hdopt.workflow.steps import Context, find_step
@@ -35,18 +35,56 @@ def test_its_section_comes_with_the_step_and_not_with_the_general_schema():
 
 def test_its_page_begins_with_the_verdict_and_speaks_in_words():
     """Would catch a figure 'nan (limit 0.93)', an empty table of confidences, and keys of the catalogue on the page."""
-    gate = [SimpleNamespace(name="exact sets", value=float("nan"), limit=0.95, passed=False, detail="0 of 0")]
+    gate = [
+        SimpleNamespace(name="exact sets, 2 hidden", value=float("nan"), limit=0.9, passed=False, detail="0 of 0"),
+        SimpleNamespace(name="false-alarm rate", value=0.527, limit=0.01, passed=False, detail="0 of 4"),
+        SimpleNamespace(name="unknown physics recognised", value=1.0, limit=0.95, passed=True, detail="3 of 3"),
+        SimpleNamespace(name="enough cases", value=0.0, limit=1.0, passed=False, detail="1 cases"),
+    ]
     case = SimpleNamespace(
         id="case-1", family="pair", severity=1.0, truth=("cs_tooth_harmonics",), outside="", hidden="lobes",
         verdict="named", said=("torsional_windup", "resonance"), reason="another name",
     )  # fmt: skip
     scores = SimpleNamespace(
-        gate=lambda: gate, passed=False, cases=(case,), failed=(case,), reliability_frame=lambda: pd.DataFrame()
-    )
+        gate=lambda: gate, passed=False, cases=(case,), failed=(case,), reliability_frame=lambda: pd.DataFrame(),
+        families={"pair": SimpleNamespace(hits=0, n=1)},
+    )  # fmt: skip
     section = proof_section(scores, SimpleNamespace(seed=1, share=0.02))
     ruling, *rest = section.items
-    assert isinstance(ruling, Ruling) and ruling.met is False and ruling.text.startswith("0 of 1 criteria")
-    assert [item.key for item in rest if isinstance(item, Table)] == ["concealed-gate", "concealed-failed"]
+    assert isinstance(ruling, Ruling) and ruling.met is False and ruling.text.startswith("1 of 3 criteria")
+    points, *_ = rest
+    assert points.sentences == (
+        "Missed: false-alarm rate 0.527, at most 0.01 is asked (0 of 4).",
+        "No case of this run bears on 1 criteria: exact sets, 2 hidden.",
+        "1 cases are too few for the gate, whatever they say: it is that of the full proof, and this is 2 % of it or a "
+        "part of its families.",
+    )
+    tables = {item.key: item.frame for item in rest if isinstance(item, Table)}
+    assert list(tables) == ["concealed-gate", "concealed-families", "concealed-failed"]
+    assert tables["concealed-gate"]["kept"].tolist() == ["not asked", "no", "yes", "no"]
+    assert tables["concealed-gate"]["limit"].tolist() == ["at least 0.9", "at most 0.01", "at least 0.95", ""]
     page = render(Report("Title", "", (section,)))
     assert ">nan" not in page and "(limit" not in page
     assert "CS tooth harmonics" in page and "Torsional windup, Resonance" in page and "cs_tooth_harmonics" not in page
+
+
+def test_every_criterion_of_the_real_gate_has_its_side():
+    """Would catch a criterion whose limit the page turns round: the side must be the one that decides `passed`."""
+    from hdopt.bench.score import score
+
+    gate = score({}, [], {}).gate()
+    sides = dict(zip(gate_frame(gate)["criterion"], gate_frame(gate)["limit"], strict=True))
+    for one in gate:
+        asked = sides[one.name].split(" ")[:2]
+        assert one.name in ("enough cases", "log score of confidences, over the best constant") or asked in (
+            ["at", "most"], ["at", "least"],
+        )  # fmt: skip
+    assert {name for name, side in sides.items() if side.startswith("at most")} == {
+        "false-alarm rate, upper bound", "unknown physics named", "effects whose intervals do not",
+        "calibration error of confidences", "cases that cannot be told apart",
+    }  # fmt: skip
+
+
+def test_a_summary_without_its_empty_blocks():
+    blocks = ["gate\n  a 1", "right by effect\n", "reliability\nEmpty DataFrame\nColumns: []", "redrawn: 0"]
+    assert list(without_empty(blocks)) == ["gate", "  a 1", "", "redrawn: 0", ""]

@@ -75,11 +75,31 @@ def test_its_page_says_what_came_out_and_names_effects_in_words():
         judged("trails", "cs_tooth_harmonics", 0.5, diagnosis("named", ["cs_tooth_harmonics"])),
         judged("trails", "hysteresis", 0.5, diagnosis("unknown", ["torsional_windup"])),
     ]
-    points, _, missed, _ = residuals_section(pd.DataFrame(answers), pd.DataFrame({"cases": [4]})).items
+    summary = pd.DataFrame({"noise": ["trails"], "severity": [0.0], "cases": [4], "among": [1], "wrong": [2]})
+    points, counts, missed = residuals_section(pd.DataFrame(answers), summary).items
     assert points.sentences == (
         "With nothing put there, a name was given in 1 of 2 records, and 0 were called unknown.",
         "With physics put there, 1 of 2 were named exactly, 1 were among the explanations offered, and 1 got a wrong "
         "name.",
     )
     assert missed.frame["said"].tolist() == ["Hysteresis", "Torsional windup"]
-    assert missed.frame["hidden"].tolist() == ["Nothing", "Hysteresis"]
+    assert missed.frame["hidden"].tolist() == ["nothing", "Hysteresis"]
+    assert missed.frame["came out as"].tolist() == ["a wrong name", "a wrong name"]
+    assert missed.frame["severity"].isna().tolist() == [True, False]
+    assert list(counts.frame) == ["in the noise of", "severity", "cases", "among the offered", "wrong name"]
+
+
+@pytest.mark.parametrize(
+    ("hidden", "answer", "says"),
+    [
+        ("", diagnosis("unknown"), "unknown"),
+        ("", diagnosis("named", ["hysteresis"]), "a wrong name"),
+        ("hysteresis", diagnosis("ambiguous", ["lost_motion"], (("hysteresis",),)), "among the explanations offered"),
+        ("hysteresis", diagnosis("unknown", ["hysteresis"]), "the right name, said beside more that is unknown"),
+        ("hysteresis", diagnosis("adequate"), "not found"),
+    ],
+)
+def test_how_a_case_came_out_is_said_in_words(hidden, answer, says):
+    case = pd.DataFrame([judged("trails", hidden, 0.5, answer)])
+    *_, missed = residuals_section(case, pd.DataFrame({"severity": [0.5], "noise": ["trails"]})).items
+    assert missed.frame["came out as"].tolist() == [says]

@@ -16,7 +16,7 @@ from hdopt.errors import HdoptError, MissingLibrary
 from hdopt.kinematics import peak_to_peak_arcmin
 from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin
 from hdopt.report.sections.words import percent
-from hdopt.study import load_study
+from hdopt.study import load_study, shipped_studies
 from hdopt.workflow.requirement import of_run
 from hdopt.workflow.run import run_study, steps_of
 from hdopt.workflow.run_verdict import section_of_run
@@ -245,3 +245,14 @@ def test_a_trade_page_begins_with_a_verdict_too():
     )
     other = study.with_({"requirement.yield": 0.99})
     assert of_run(other, {"search": search}) is None, "the quantile of another share of drives proves nothing"
+
+
+@pytest.mark.parametrize("name", shipped_studies())
+def test_the_inputs_hold_every_section_of_a_study(name):
+    """Would catch a section, of a step that brings its own or of measured teeth, that the page is silent about."""
+    from hdopt.report.sections.inputs import inputs_section
+
+    teeth = {"cs_teeth": {"file": "teeth.csv", "deviation": "single"}}
+    data = {**load_study(name).data, **teeth}
+    keys = {getattr(item, "key", "") for item in inputs_section(data, "", name).items}
+    assert {f"inputs-{section.replace('_', '-')}" for section in data if section != "study" and data[section]} <= keys

@@ -25,7 +25,9 @@ SHOWN = {
     "export": "Wave generator as files",
     "search": "Search",
 }
-"""Sections of a study whose keys are shown as they are, with their headings."""
+"""Sections of a study whose keys are shown as they are, with their headings; of any other its name is the heading."""
+NOT_SHOWN = ("study",)
+"""What the page has at its head."""
 SPREAD = {"tolerances": "Tolerances", "contributors": "Callouts"}
 """Sections with a distribution a key."""
 
@@ -52,7 +54,8 @@ def inputs_section(
     """
     items: list[Item] = []
     key, said = "inputs", comments or {}
-    for section, title in SHOWN.items():
+    others = {one: _words(heading(one)[0]) for one in data if one not in {*SHOWN, *SPREAD, *NOT_SHOWN}}
+    for section, title in (others | SHOWN).items():
         rows = list(_leaves(data.get(section, {})))
         if rows:
             frame = pd.DataFrame(rows, columns=["what", "value", "unit", "key in the study file"])
