@@ -253,7 +253,7 @@ def _eccentricity_of(joint: Joint, fit: Fit) -> Share:
 
 def _tilt_of(joint: Joint, fit: Fit) -> Share:
     play = fit.largest_play + joint.play
-    text = f"{_fit_text(fit, play)} over {joint.length:g}"
+    text = f"{_fit_text(fit, play)} over {joint.length:.4g}"
     return Share(joint.outer, f"{joint.name} in {joint.outer}", text, math.atan(play / joint.length))
 
 
@@ -287,6 +287,8 @@ def _oriented(part: Part) -> list[tuple[str, str, float]]:
     }.get(part.name)
     if name is None:
         return []
+    if part.name == "cam" and part.bolts is None and part.bore is not None and not part.clearance_hole:
+        name = "parallelism of the profile to the bore"
     length = part.top - part.bottom if part.name == "cam" else span
     return [(part.name, name, 1 / length)]
 

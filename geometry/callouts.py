@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from hdopt.geometry.contour import Circle, ParallelCurve
+from hdopt.geometry.digits import plain, rounded
 from hdopt.geometry.din471 import ring_of
 from hdopt.geometry.features import BoltCircle, DBore, KeywayBore, polar
 from hdopt.geometry.iso286 import deviations
@@ -25,6 +26,9 @@ from hdopt.geometry.undercut import AT_SHOULDER, Undercut
 GENERAL_POSITION = 0.1
 """Diameter of the position zone of bolt holes, mm: half the play of a bolt in a medium clearance hole (ISO 273)."""
 
+FLAT_ZONE = 0.05
+"""Width of the position zone of a bore's flat, mm: what its shaft's flat keeps clear of (no standard has one)."""
+
 LETTERS = "ABCDEFGHJKLMNPRSTUVWXYZ"
 """Letters for datums; I, O and Q are left out (ISO 5459)."""
 
@@ -37,6 +41,8 @@ class Frame:
     zone: float
     diameter: bool = False
     datums: str = ""
+    usual: bool = False
+    """Whether the zone is a usual one, which follows from no budget and no slide."""
 
     @property
     def value(self) -> str:
@@ -166,7 +172,7 @@ def _profile(part: Part, model: WaveGeneratorModel) -> Callout | None:
     lines = (
         f"profile: parallel curve, {contour_name(part)}",
         "its points: the CSV of the cam and the STEP file of this revision",
-        f"perimeter {contour.perimeter:.4f} ±{math.pi * zone:.4g}",
+        f"perimeter {plain(rounded(contour.perimeter, (-math.pi * zone, math.pi * zone)))} ±{math.pi * zone:.4g}",
         "Ra 0.4",
     )
     point = polar(contour.least_radius, math.radians(52))
@@ -232,6 +238,7 @@ def _limits(limits: tuple[float, float]) -> str:
 
 
 def _keyway(part: Part) -> Callout | None:
+    """What holds the part against turning: its middle plane, or its flat, has its place to the bore."""
     bore = part.bore
     if isinstance(bore, KeywayBore):
         radii = bore.key.corner_radii
@@ -242,15 +249,27 @@ def _keyway(part: Part) -> Callout | None:
         )
         sides = (Flank(bore.key.width / 2, bore.direction + math.pi / 2),)
         size = (bore.key.width, *deviations("JS9", bore.key.width))
-        return Callout(polar(bore.bottom, bore.direction), lines, datum="B", faces=sides, size=size)
+        frames = (Frame("symmetry", keyway_symmetry(bore), False, "A", usual=True),)
+        return Callout(polar(bore.bottom, bore.direction), lines, frames, datum="B", faces=sides, size=size)
     if isinstance(bore, DBore):
         return Callout(
             polar(bore.flat, bore.direction),
-            (f"flat {bore.radius + bore.flat:.4g} +0.05/0 across",),
+            ("flat",),
+            (Frame("position", FLAT_ZONE, False, "A", usual=True),),
+            (f"{bore.flat:g} from the axis",),
             datum="B",
             faces=(Flank(bore.flat, bore.direction),),
         )
     return None
+
+
+def keyway_symmetry(bore: KeywayBore) -> float:
+    """Zone of a keyway's middle plane about the axis of its `bore`, mm: as wide as the tolerance of its width.
+
+    DIN 6885-1 leaves it open. Off the axis by half of it, the keyway turns the part on its shaft once and for all.
+    """
+    lower, upper = deviations("JS9", bore.key.width)
+    return upper - lower
 
 
 def _bolts(part: Part, model: WaveGeneratorModel) -> Callout | None:
@@ -259,7 +278,7 @@ def _bolts(part: Part, model: WaveGeneratorModel) -> Callout | None:
         return None
     lines = (hole_note(part, model),)
     datum = "B" if secondary(part) == "bolts" else ""
-    frame = Frame("position", GENERAL_POSITION, True, "A" if datum else _datums(part))
+    frame = Frame("position", GENERAL_POSITION, True, "A" if datum else _datums(part), usual=True)
     at = outer_point(bolts)
     holes = tuple(Cylinder(bolts.hole / 2, centre) for centre in bolts.centres)
     return Callout(at, lines, (frame,), (f"{360 / bolts.count:g}°", f"Ø{2 * bolts.radius:g}"), datum, holes)
@@ -289,7 +308,11 @@ def _slot(part: Part, model: WaveGeneratorModel) -> Callout | None:
     slide = next((slide for slide in slides_of(model.parts) if slide.above is part), None)
     if slot is None or slide is None:
         return None
-    ends = f"ends R{slot.width / 2:.5g}, {2 * slot.reach:.4g} long" if slot.closed else "open at both ends"
+    ends = (
+        f"ends R{plain(rounded(slot.width / 2))}, {plain(rounded(2 * slot.reach))} long"
+        if slot.closed
+        else "open at both ends"
+    )
     lines = (
         f"slot {slot.width:g} {_limits((0.0, slide.zone))}, {slot.depth:g} {_limits(slide.depth_limits)} deep",
         f"from the back, {ends}; Ra 0.8",
@@ -333,7 +356,7 @@ def _upright(part: Part, model: WaveGeneratorModel, slide: Slide) -> tuple[Frame
     first = Frame("symmetry", centred, False, "A") if centred else Frame("parallelism", slide.zone, False, "A")
     # A keyway lies across the block, and so its flat along it. They only say how the block stands on the shaft.
     turned = {"keyway": "perpendicularity", "flat": "parallelism"}.get(secondary(part) or "")
-    return (first, Frame(turned, GENERAL_POSITION, False, "B")) if turned else (first,)
+    return (first, Frame(turned, GENERAL_POSITION, False, "B", usual=True)) if turned else (first,)
 
 
 def _seat(part: Part, model: WaveGeneratorModel) -> Callout | None:
@@ -379,7 +402,10 @@ def _face(part: Part, model: WaveGeneratorModel) -> Callout | None:
     at = polar(0.96 * part.box[3], math.radians(97))
     back = (Level(part.bottom),)
     if part.contour is not None and not isinstance(part.contour, Circle):
-        # The profile stands square to the back, which is the datum that carries the cam.
+        if primary(part) == "bore" and part.bolts is None:
+            frames = (Frame("parallelism", zone, False, "A"),) if zone else ()
+            return Callout(at, ("profile to the bore; faces: Ra 0.8",), frames, faces=(Profile(),), on_face=True)
+        # Screwed on, the profile stands square to the back, which is the datum that carries the cam.
         letter = "A" if primary(part) == "back" else "C"
         frames = (Frame("perpendicularity", zone, False, letter),) if zone else ()
         lines = ("profile to the back face; back: Ra 0.8",)

@@ -11,7 +11,9 @@ from hdopt.drive.errors import AMPLITUDE_NAMES, STUDY_KEYS
 from hdopt.drive.geometry import Structure
 from hdopt.files import JsonReady
 from hdopt.geometry.budget import CalloutTables
+from hdopt.geometry.callouts import FLAT_ZONE, keyway_symmetry
 from hdopt.geometry.contour import Circle
+from hdopt.geometry.digits import general_limits, rounded
 from hdopt.geometry.din471 import ring_of
 from hdopt.geometry.features import DBore, KeywayBore
 from hdopt.geometry.iso286 import deviations
@@ -81,10 +83,14 @@ class _Rows:
     def add(self, name: str, nominal: float, tolerance: str, source: str) -> None:
         self._keep(Dimension(self.part, name, nominal, tolerance, source))
 
+    def zone(self, name: str, tolerance: str, source: str) -> None:
+        self._keep(Dimension(self.part, name, None, tolerance, source))
+
     def limits(self, name: str, nominal: float, limits: tuple[float, float], label: str, source: str) -> None:
         """A dimension with its lower and upper deviation, mm; `label` is the tolerance class, '' without one."""
         lower, upper = limits
         text = f"±{upper:.4g}" if math.isclose(-lower, upper) else f"{_signed(upper)}/{_signed(lower)}"
+        nominal = rounded(nominal, limits)
         self._keep(Dimension(self.part, name, nominal, f"{label} {text}".strip(), source, lower, upper))
 
     def _keep(self, row: Dimension) -> None:
@@ -116,12 +122,13 @@ def _sizes(part: Part, model: WaveGeneratorModel) -> list[Dimension]:
             rows.limits("width", heights, general_limits(heights), "", "ISO 2768-m")
     _fitted(rows, part, model)
     key = part.bore.key if isinstance(part.bore, KeywayBore) else None
-    if key is not None and part.bore is not None:
+    if key is not None and isinstance(part.bore, KeywayBore):
+        rows.zone("keyway, to the axis of the bore", f"symmetry {keyway_symmetry(part.bore):.4g}", "IT9 of its width")
         rows.limits("keyway, width", key.width, deviations("JS9", key.width), "JS9", "DIN 6885-1")
         depth = 2 * part.bore.radius + key.hub_depth
         rows.limits("keyway, d + t2", depth, (0.0, key.hub_depth_tolerance), "", "DIN 6885-1")
     if isinstance(part.bore, DBore):
-        rows.limits("flat to the far side of the bore", part.bore.radius + part.bore.flat, (0.0, 0.05), "", "fit")
+        rows.add("flat, from the axis of the bore", part.bore.flat, f"position {FLAT_ZONE:g}", "fit")
     if part.bolts:
         name = f"circle of {part.bolts.count} holes of {part.bolts.hole:g}"
         rows.add(name, 2 * part.bolts.radius, "position 0.1", "fit")
@@ -161,17 +168,6 @@ def _fitted(rows: _Rows, part: Part, model: WaveGeneratorModel) -> None:
         rows.limits("clearance hole", diameter, deviations("H11", diameter), "H11", "fit")
     elif hole is not None:
         rows.limits("bore", diameter, hole.hole_limits, hole.hole, "budget")
-
-
-GENERAL = ((3.0, 0.1), (6.0, 0.1), (30.0, 0.2), (120.0, 0.3), (400.0, 0.5), (1000.0, 0.8))
-"""Upper end of a range of sizes and permissible deviation of class m, mm; ISO 2768-1:1989, Table 1."""
-
-
-def general_limits(nominal: float) -> tuple[float, float]:
-    """Deviations, mm, that ISO 2768-1, class m, permits a length of `nominal` mm without a tolerance of its own; beyond
-    the table, those of its last row."""
-    permitted = next((value for limit, value in GENERAL if nominal <= limit), GENERAL[-1][1])
-    return -permitted, permitted
 
 
 def _slides(parts: tuple[Part, ...]) -> list[Dimension]:

@@ -21,6 +21,7 @@ from hdopt.files import JsonReady
 from hdopt.geometry.arcs import outline_of_slot, sample
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.contour import Circle
+from hdopt.geometry.digits import drawn
 from hdopt.geometry.features import DBore, KeywayBore, polar
 from hdopt.geometry.part import Part, Prism, ProfiledPart
 from hdopt.geometry.sheet import SMALL, TEXT, Point, Sheet
@@ -245,9 +246,9 @@ def _section(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], job
     bottom = boxes[:, 1].min()
     line = place.point(0, bottom)[1]
     sheet.text((place.point((low + high) / 2, 0)[0], place.point(0, top)[1] - 16), "A – A", 5, "middle", bold=True)
-    sheet.dimension(place.point(-half, bottom), place.point(half, bottom), line + 9, f"{2 * half:g}", False)
+    sheet.dimension(place.point(-half, bottom), place.point(half, bottom), line + 9, drawn(2 * half, ()), False)
     if high - low > 2 * half + 1e-6:
-        sheet.dimension(place.point(low, bottom), place.point(high, bottom), line + 18, f"{high - low:g}", False)
+        sheet.dimension(place.point(low, bottom), place.point(high, bottom), line + 18, drawn(high - low, ()), False)
     _edge_callouts(sheet, place, made, top)
     _seat_dimension(sheet, place, job, high)
     _holding_bore(sheet, place, job, low)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -98,11 +99,12 @@ def inspection_plan(job: Job) -> tuple[Check, ...]:
         add(slide.below.name, "block upright", None, slide.zone, "clearances")
         if slide.below.slot is not None:
             add(slide.below.name, "block square to the slot", None, slide.squareness, "clearances")
+    planned = Counter((row.part, row.zone_mm) for row in found)
     for part in job.model.parts:
         for callout in callouts_of(part, job.model) if not part.context else ():
             for frame in callout.frames:
-                # Holes and keyways: what no budget and no slide has brought in.
-                if not any(row.part == part.name and row.zone_mm == frame.zone for row in found):
+                planned[part.name, frame.zone] -= not frame.usual
+                if frame.usual or planned[part.name, frame.zone] < 0:  # what no budget and no slide has brought in
                     add(part.name, f"{frame.symbol} of {callout.lines[0]}", None, frame.zone, "ISO 1101")
     return tuple(found)
 

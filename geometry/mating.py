@@ -14,7 +14,8 @@ from dataclasses import asdict, dataclass
 from hdopt.drive.geometry import Drive
 from hdopt.files import JsonReady
 from hdopt.geometry.budget import CalloutTables
-from hdopt.geometry.features import KeywayBore
+from hdopt.geometry.callouts import FLAT_ZONE, keyway_symmetry
+from hdopt.geometry.features import DBore, KeywayBore
 from hdopt.geometry.iso286 import deviations
 from hdopt.geometry.model import WaveGeneratorModel
 from hdopt.geometry.slides import slides_of
@@ -69,11 +70,20 @@ def _shaft(model: WaveGeneratorModel) -> list[MatingRow]:
         MatingRow("shaft", "seat of the wave generator", size, fit.nominal, joint.length, "wg_eccentricity", play, "mm")
     ]
     holder = model.part(joint.outer)
-    if isinstance(holder.bore, KeywayBore):
-        key = holder.bore.key
+    bore = holder.bore
+    if isinstance(bore, KeywayBore):
+        key = bore.key
         width = deviations("h9", key.width)
         text = f"key {key.name}, groove {key.width:g} N9, t1 = {key.shaft_depth:g}; key {width[0] * 1e3:.3g} um to 0"
         rows.append(MatingRow("shaft", "key", text, key.width, None, "", None, ""))
+        zone = keyway_symmetry(bore)
+        text = f"symmetry; with the hub's, turns the profile by {math.degrees(zone / bore.radius):.2g} deg at most"
+        rows.append(MatingRow("shaft", "groove of the key to the axis", text, zone, None, "", None, ""))
+    if isinstance(bore, DBore):
+        clear = bore.flat - FLAT_ZONE / 2
+        play = math.degrees(2 * FLAT_ZONE / math.sqrt(bore.radius**2 - bore.flat**2))
+        text = f"at most this from the axis, at least {FLAT_ZONE:g} less; lets the profile turn by {play:.2g} deg"
+        rows.append(MatingRow("shaft", "flat", text, clear, None, "", None, ""))
     return rows
 
 

@@ -12,6 +12,7 @@ from hdopt.geometry.assembly_sheet import assembly_sheet, draw_section
 from hdopt.geometry.balloons import draw_balloon, places_around, point_out
 from hdopt.geometry.callouts import Callout, callouts_of
 from hdopt.geometry.contour import Circle
+from hdopt.geometry.digits import drawn, plain
 from hdopt.geometry.drawing import FRONT, SCALES, Placed, draw_view
 from hdopt.geometry.materials import material
 from hdopt.geometry.mating_drawing import fill_mating_sheet
@@ -26,6 +27,7 @@ from hdopt.geometry.views import seen_from
 if TYPE_CHECKING:
     import cadquery as cq
 
+    from hdopt.geometry.dimensions import Dimension
     from hdopt.geometry.job import Job
 
 FRONT_CENTRE, FRONT_ROOM = (92.0, 98.0), 116.0
@@ -69,7 +71,7 @@ def _part_sheet(job: Job, part: Part, solid: cq.Solid, number: int) -> Sheet:
     section = Placed((SECTION_CENTRE[0] - scale * middle, SECTION_CENTRE[1] + raised), scale)
     draw_border(sheet)
     _front(sheet, front, part, solid)
-    _section(sheet, section, part, solid)
+    _section(sheet, section, part, solid, [row for row in job.dimensions if row.part == part.name])
     _column(sheet, front, callouts_of(part, job.model))
     _limits(sheet, job, part)
     draw_title(sheet, job, part.name.replace("_", " "), number, scale, part)
@@ -125,20 +127,20 @@ def _boxed_dimension(
     sheet.polyline([(left, top), (right, top), (right, low), (left, low)], "thin", closed=True)
 
 
-def _section(sheet: Sheet, place: Placed, part: Part, solid: cq.Solid) -> None:
+def _section(sheet: Sheet, place: Placed, part: Part, solid: cq.Solid, rows: Sequence[Dimension]) -> None:
     draw_section(sheet, place, [(part, solid)])
     box, over, axis = part.box, 5 / place.scale, axis_of(part)
     sheet.line(place.point(part.bottom - over, axis), place.point(part.top + over, axis), "axis")
     top, bottom = place.point(0, box[4])[1], place.point(0, box[1])[1]
     middle = place.point((part.bottom + part.top) / 2, 0)[0]
     sheet.text((middle, top - 14), "A – A", 5, "middle", bold=True)
-    draw_lengths(sheet, axial_spans(part), place.point(0, 0)[0], place.scale, bottom)
-    _diameters(sheet, place, part)
+    draw_lengths(sheet, axial_spans(part), (place.point(0, 0)[0], bottom), place.scale, rows)
+    _diameters(sheet, place, part, rows)
     mark_details(sheet, part, place.point(0, 0), place.scale)
     draw_details(sheet, part, DETAILS)
 
 
-def _diameters(sheet: Sheet, place: Placed, part: Part) -> None:
+def _diameters(sheet: Sheet, place: Placed, part: Part, rows: Sequence[Dimension]) -> None:
     """Diameters, a line each: holes on the left, rims on the right."""
     left, right = place.point(part.bottom, 0)[0], place.point(part.top, 0)[0]
     first = part.body[0]
@@ -152,15 +154,10 @@ def _diameters(sheet: Sheet, place: Placed, part: Part) -> None:
             rims.append((piece.outline.radius, piece.outline.offset, piece.bottom, piece.top))
     for row, (radius, offset) in enumerate(holes):
         start, end = (place.point(part.bottom, offset + sign * radius) for sign in (-1, 1))
-        sheet.dimension(start, end, left - 12 - STACK * row, f"Ø{_size(2 * radius)}", True)
+        sheet.dimension(start, end, left - 12 - STACK * row, f"Ø{drawn(2 * radius, rows)}", True)
     for row, (radius, offset, _, top) in enumerate(dict.fromkeys(rims)):
         start, end = (place.point(top, offset + sign * radius) for sign in (-1, 1))
-        sheet.dimension(start, end, right + 12 + STACK * row, f"Ø{_size(2 * radius)}", True)
-
-
-def _size(value: float) -> str:
-    """A size to a tenth of a micrometre, as the limits have it, without noughts at its end."""
-    return f"{value:.4f}".rstrip("0").rstrip(".")
+        sheet.dimension(start, end, right + 12 + STACK * row, f"Ø{drawn(2 * radius, rows)}", True)
 
 
 def _column(sheet: Sheet, place: Placed, callouts: Sequence[Callout]) -> None:
@@ -206,8 +203,8 @@ def _limits(sheet: Sheet, job: Job, part: Part) -> None:
             continue
         limits = ("", "")
         if row.lower is not None and row.upper is not None:
-            limits = (f"{row.nominal + row.lower:.4f}", f"{row.nominal + row.upper:.4f}")
-        rows.append((row.name, f"{row.nominal:.4f}", row.tolerance, *limits))
+            limits = (plain(row.nominal + row.lower), plain(row.nominal + row.upper))
+        rows.append((row.name, plain(row.nominal), row.tolerance, *limits))
     top = TITLE_TOP + 2
     sheet.text((BORDER + 4, top - 2), "Limits", TEXT, bold=True)
     sheet.table((BORDER + 4, top), (62, 22, 70, 24, 24), rows, min(4.7, 66.0 / len(rows)))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
+from hdopt.geometry.digits import Sized, drawn
 from hdopt.geometry.part import Part, Prism
 from hdopt.geometry.sheet import TEXT, Sheet, text_width
 
@@ -27,14 +28,18 @@ def axial_spans(part: Part) -> list[Span]:
     return sorted(dict.fromkeys(spans), key=lambda span: (span[1] - span[0], span[0]))
 
 
-def draw_lengths(sheet: Sheet, spans: Sequence[Span], left: float, scale: float, edge: float) -> None:
-    """Draw `spans` on the `sheet` below y = `edge`, mm, where z = 0 lies at x = `left`, enlarged by `scale`.
+def draw_lengths(
+    sheet: Sheet, spans: Sequence[Span], at: tuple[float, float], scale: float, rows: Iterable[Sized]
+) -> None:
+    """Draw `spans` on the `sheet` where z = 0 lies at x and below y of `at`, mm, enlarged by `scale`; `rows` are the
+    part's dimensions with limits.
 
     A longer one's extension lines run past all that are shorter: a number stands where none of them does.
     """
+    left, edge = at
     ends = [(left + scale * low, left + scale * high) for low, high in spans]
     for row, ((low, high), (start, end)) in enumerate(zip(spans, ends, strict=True)):
-        text, y = f"{high - low:.6g}", edge + STACK * (row + 1)
+        text, y = drawn(high - low, rows), edge + STACK * (row + 1)
         lines = [x for span in ends[row:] for x in span]
         half = text_width(text, TEXT) / 2 + 0.5
         far = (min(lines) - half - 6.0, max(lines) + half + 6.0)

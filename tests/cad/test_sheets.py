@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -16,7 +17,9 @@ from hdopt.drive.geometry import Structure
 from hdopt.geometry.assembly_sheet import uncrossed
 from hdopt.geometry.balloons import RADIUS
 from hdopt.geometry.callouts import callouts_of
+from hdopt.geometry.digits import rounded
 from hdopt.geometry.export import export_drive
+from hdopt.geometry.inspection import inspection_plan
 from hdopt.geometry.job import make_job
 from hdopt.geometry.mating_drawing import fill_mating_sheet
 from hdopt.geometry.options import ExportOptions
@@ -129,6 +132,84 @@ def test_every_datum_is_drawn_once_and_used(profile, structure):
             assert callout.frames or not callout.boxed, callout.lines
             if part.name == "cam":
                 assert all(frame.symbol != "coaxiality" for frame in callout.frames)
+
+
+@pytest.mark.parametrize("mount", ["keyway", "d_bore"])
+@pytest.mark.parametrize("structure", list(Structure))
+@pytest.mark.parametrize("profile", ["ellipse", "two_disk"])
+def test_what_locks_the_rotation_has_its_place_to_the_datum_before_it(profile, structure, mount):
+    """A keyway, a flat, a slot or bolt holes that are a datum: general tolerances would leave them 0.1 mm and more."""
+    job = make_job(drive(profile, structure), ExportOptions(mount=mount), "csf-25-80", BOUNDS | AXIS)
+    plan = Counter((row.part, row.zone_mm) for row in inspection_plan(job))
+    for part in job.model.parts:
+        callouts = callouts_of(part, job.model)
+        first = next((c.datum for c in callouts if c.datum), "")
+        for callout in callouts:
+            if callout.datum not in ("", first) and not callout.datum_faces:
+                assert any(frame.datums == first and frame.zone <= 0.1 for frame in callout.frames), callout.lines
+        measured = Counter((part.name, frame.zone) for callout in callouts for frame in callout.frames)
+        assert measured <= plan, part.name
+
+
+def test_a_keyway_lies_within_the_tolerance_of_its_width_and_turns_the_profile_by_little():
+    """JS9 of 5 mm is +-15 um (ISO 286-2): two grooves half of 30 um off, 7 mm from the axis, turn by 30 um / 7 mm."""
+    job = job_of("ellipse", Structure.INTEGRAL, 1.0)
+    (keyway,) = (c for c in callouts_of(job.model.part("hub"), job.model) if "keyway" in c.lines[0])
+    assert [(f.symbol, f.zone, f.datums) for f in keyway.frames] == [("symmetry", pytest.approx(0.03), "A")]
+    (groove,) = (row for row in job.mating if "groove" in row.feature)
+    assert groove.value_mm == pytest.approx(0.03)
+    assert f"by {math.degrees(0.03 / 7):.2g} deg" in groove.requirement
+
+
+@pytest.mark.parametrize(("radius", "flat"), [(1.5, 1.2), (7.0, 5.6)])
+def test_flats_of_bore_and_shaft_never_meet(radius, flat):
+    """Position 0.05 leaves the bore's flat up to 0.025 mm nearer to the axis, where the shaft's ends."""
+    made = drive("ellipse", Structure.INTEGRAL)
+    options = ExportOptions(mount="d_bore", bore_mm=2 * radius, d_flat_mm=flat)
+    job = make_job(made, options, "csf-25-80", BOUNDS | AXIS)
+    (row,) = (row for row in job.mating if row.feature == "flat")
+    assert row.value_mm == pytest.approx(flat - 0.025)
+    # Worst: the bore's flat 0.025 farther, the shaft's 0.075 nearer; the edge of the flat closes the gap.
+    turn = math.degrees(0.1 / math.sqrt(radius**2 - flat**2))
+    assert f"turn by {turn:.2g} deg" in row.requirement
+
+
+@pytest.mark.parametrize(
+    ("nominal", "limits", "said"),
+    [
+        (17.6184, None, 17.62),  # general: 0.2 to either side (ISO 2768-m)
+        (1.9622, (0.0, 0.04), 1.963),  # a least size is rounded up, a largest one down: both on the safe side
+        (0.7819, (-0.04, 0.0), 0.781),
+        (105.48053, (-0.0025, 0.0025), 105.4805),
+        (6.0, (0.0, 0.1), 6.0),
+    ],
+)
+def test_sizes_are_rounded_to_their_safe_side(nominal, limits, said):
+    assert rounded(nominal, limits) == said
+
+
+@pytest.mark.parametrize(("profile", "structure", "scale"), [CASES[4], CASES[7], CASES[11]])
+def test_no_dimension_has_digits_that_its_tolerance_makes_meaningless(profile, structure, scale):
+    """A last digit is worth a twentieth of the tolerance's width at most, and a hundredth at least (but 1 um)."""
+    job = job_of(profile, structure, scale)
+    for row in job.dimensions:
+        if row.nominal is None or row.lower is None or row.upper is None:
+            continue
+        wide = row.upper - row.lower
+        needed = max(0, math.ceil(math.log10(20 / wide) - 1e-9))
+        assert row.nominal == round(row.nominal, min(needed, 4)), row.name
+    ends = [
+        (row.nominal, row.nominal + (row.lower or 0), row.nominal + (row.upper or 0))
+        for row in job.dimensions
+        if row.nominal
+    ]
+    boxes = [part.contour.box for part in job.model.parts if part.contour is not None]
+    exact = [size for box in boxes for size in (box[3] - box[1], box[2] - box[0])]
+    known = {f"{size:.4f}" for size in [*itertools.chain.from_iterable(ends), *exact]}
+    for sheet in sheets(job)[1:-1]:
+        lengths = [label.content for label in sheet.labels if re.fullmatch(r"Ø?[1-9]\d*\.\d{3,}", label.content)]
+        # A cam 17.6184 mm wide, with 0.2 to either side, stands there as 17.62.
+        assert {f"{float(length.strip('Ø')):.4f}" for length in lengths} <= known, sheet.title
 
 
 def test_frames_take_their_zones_from_the_budget():

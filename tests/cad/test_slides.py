@@ -84,7 +84,8 @@ def test_ring_goes_into_its_groove_over_the_thickest_discs(structure, scale):
     assert limits(job, "eccentric_hub", "flange to ring groove")[0] >= thickest
     hub = job.model.part("eccentric_hub")
     held = hub.body[2].groove.bottom - hub.body[0].top
-    assert limits(job, "eccentric_hub", "flange to ring groove")[0] == pytest.approx(held)
+    # On the sheet to three decimals at least, rounded up.
+    assert 0 <= limits(job, "eccentric_hub", "flange to ring groove")[0] - held < 1e-3
 
 
 def test_offset_of_the_journals_has_one_tolerance():
