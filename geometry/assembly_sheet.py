@@ -131,11 +131,8 @@ def _screw(sheet: Sheet, place: Placed, screws: Screws) -> Point:
 
 
 def _ring(sheet: Sheet, place: Placed, held: HeldRing) -> Point:
-    """Both cuts through a retaining ring, filled, as thin sections are; returns a point of the upper one.
-
-    DIN 471's rings are about a tenth of the shaft and 0.7 mm wide, which is for the picture alone.
-    """
-    ring, wide = held.ring, held.ring.shaft / 10 + 0.7
+    """Both cuts through a retaining ring, filled, as thin sections are; returns a point of the upper one."""
+    ring, wide = held.ring, held.ring.width
     for side in (-1, 1):
         low, high = held.offset + side * ring.groove / 2, held.offset + side * (ring.groove / 2 + wide)
         corners = [(held.bottom, low), (held.bottom + ring.thickness, low), (held.bottom + ring.thickness, high)]

@@ -7,25 +7,25 @@ from typing import TYPE_CHECKING
 
 from hdopt.geometry.din471 import Ring, ring_of
 from hdopt.geometry.part import Prism
+from hdopt.geometry.screws import longest_screw
 from hdopt.geometry.threads import THREADS
 
 if TYPE_CHECKING:
     from hdopt.geometry.job import Job
 
-LENGTHS = (3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 30, 35, 40, 45, 50, 55, 60, 65, 70, 80, 90, 100, 110, 120)
-"""Of screws, mm (ISO 4762)."""
-
 
 @dataclass(frozen=True)
 class Screws:
-    """`count` screws with a `thread`, `length` mm, whose axes lie `radius` mm from that of the wave generator.
+    """`count` screws with a `thread`, `length` mm, `engaged` mm of it in the hub's thread.
 
-    They stand with their heads on the cam's front, at z = `top`, and reach down to z = `bottom` at most.
+    Their axes lie `radius` mm from that of the wave generator. They stand with their heads on the cam's front,
+    at z = `top`, and reach down to z = `bottom` at most.
     """
 
     count: int
     thread: str
     length: int
+    engaged: float
     radius: float
     bottom: float
     top: float
@@ -33,7 +33,8 @@ class Screws:
     @property
     def words(self) -> tuple[str, str, str]:
         """Name, number and material in the parts list."""
-        return f"screw, {self.count} off", f"ISO 4762 - {self.thread} × {self.length}", "steel 8.8"
+        name = f"screw, {self.count} off, {self.engaged:.4g} mm in thread"
+        return name, f"ISO 4762 - {self.thread} × {self.length}", "steel 8.8"
 
 
 @dataclass(frozen=True)
@@ -57,9 +58,11 @@ def bought(job: Job) -> list[Screws | HeldRing]:
     hub, cam = by_name.get("hub"), by_name.get("cam")
     if hub is not None and cam is not None and hub.bolts is not None and cam.bolts is not None:
         room = cam.top - hub.bottom
-        length = max(length for length in LENGTHS if length <= max(room, LENGTHS[0]))
         thread = next(name for name, (hole, _) in THREADS.items() if abs(hole - cam.bolts.hole) < 1e-9)
-        found.append(Screws(hub.bolts.count, thread, length, hub.bolts.radius, hub.bottom, cam.top))
+        length = longest_screw(thread, room)
+        assert length is not None  # the flange is thick enough for one
+        engaged = length - (cam.top - cam.bottom)
+        found.append(Screws(hub.bolts.count, thread, length, engaged, hub.bolts.radius, hub.bottom, cam.top))
     for part, _ in job.made:
         for piece in part.body:
             if isinstance(piece, Prism) and piece.groove is not None:

@@ -12,6 +12,7 @@ from hdopt.geometry.colours import DARK_STEEL, STEEL
 from hdopt.geometry.contour import Circle, ParallelCurve
 from hdopt.geometry.features import BoltCircle, Bore, PlainBore
 from hdopt.geometry.part import Part, Prism, ProfiledPart
+from hdopt.geometry.screws import flange_for, least_engagement, require_engagement
 from hdopt.geometry.slide_features import Slot
 from hdopt.geometry.threads import THREAD_FOR_RADIUS, THREADS
 from hdopt.geometry.undercut import AT_SHOULDER, IN_CORNER, SMALL, Undercut
@@ -64,7 +65,7 @@ class Cam(Carrier):
         self._require_hub_room(seat)
         bolts = self._bolts(seat, clearance, 6)
         flange = seat + self.wall if bolts is None else bolts.radius + bolts.hole / 2 + self.wall
-        thickness = self.take("hub_flange_thickness_mm", lambda: max(1.0, round(0.8 * self.width) / 2))
+        thickness = self._flange_thickness(bolts)
         half, edge = self.width / 2, self.chamfer()
         body = (
             Prism(Circle(flange), -half - thickness, -half, bottom_edge=edge),
@@ -74,6 +75,19 @@ class Cam(Carrier):
         faces = ((-half - thickness, -1), (half, 1))
         hub = Part("hub", DARK_STEEL, body, bore, self.countersink(bore), faces, bolts=tapped)
         return (hub, *self.parts(PlainBore(seat), bolts))
+
+    def _flange_thickness(self, bolts: BoltCircle | None) -> float:
+        """Thickness of the hub's flange, mm, whose thread takes the screws of `bolts`."""
+        usual, thread, material = max(1.0, round(0.8 * self.width) / 2), self._thread(), self.options.hub_material
+        least = least_engagement(thread, material)
+
+        def rule() -> float:
+            return usual if bolts is None else flange_for(thread, self.width, least, usual)
+
+        thickness = self.take("hub_flange_thickness_mm", rule)
+        if bolts is not None:
+            require_engagement(thread, self.width, thickness, material)
+        return thickness
 
     def _seat_for(self, bore: Bore) -> float:
         """Radius of the hub's seat that leaves a wall around the bore, a whole number of mm."""

@@ -75,7 +75,7 @@ RULES: dict[str, str] = {
     "d_flat_mm": "flat 0.8 bore radii from the axis",
     "hub": "integral type: the cam is screwed to a flanged hub on the shaft, where there is room",
     "hub_seat_mm": "bore or keyway plus twice the least wall, next even number",
-    "hub_flange_thickness_mm": "0.4 of the width, to 0.5 mm",
+    "hub_flange_thickness_mm": "0.4 of the width, to 0.5 mm, or what its screws need",
     "bolt_count": "six with a hub, none without",
     "bolt_thread": "by the size of the cam; holes ISO 273 medium, tap drills ISO 2306",
     "bolt_circle_mm": "diameter that leaves 1.2 holes beside the seat or bore",

@@ -160,10 +160,16 @@ def test_rings_follow_the_standard():
     assert ring_of(16).depth == pytest.approx(0.4)
     assert (ring_of(10).groove, ring_of(10).groove_class) == (9.6, "h10")
     assert (ring_of(20).groove, ring_of(20).groove_class) == (19.0, "h11")
-    assert ring_of(26.6) is None
+    assert [ring_of(size).width for size in (16, 19, 45, 70)] == [2.2, 2.5, 4.7, 6.6]
+    assert (ring_of(45).groove, ring_of(45).groove_width) == (42.5, 1.85)
+    assert (ring_of(70).groove, ring_of(70).groove_width) == (67.0, 2.65)
+    assert ring_of(26.6) is None and ring_of(52) is None
     assert smallest_ring(22.1, 0).shaft == 24 and smallest_ring(20, 20.9).shaft == 22
     for ring in RINGS:
-        assert ring.groove < ring.shaft and 0.1 - 1e-9 <= ring.groove_width - ring.thickness <= 0.15 + 1e-9
+        assert ring.groove < ring.shaft and ring.land == pytest.approx(3 * ring.depth, abs=0.051)
+        assert (
+            ring.depth < ring.width < ring.shaft / 3 and 0.1 - 1e-9 <= ring.groove_width - ring.thickness <= 0.15 + 1e-9
+        )
     # ISO 286-1: h12 at 28.6 mm and H13 at 1.6 mm, the groove of a ring of 30 mm.
     assert deviations("h12", 28.6) == (-0.21, 0.0) and deviations("H13", 1.6) == (0.0, 0.14)
     assert [ring.shaft for ring in RINGS] == sorted({ring.shaft for ring in RINGS})
