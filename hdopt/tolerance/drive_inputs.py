@@ -291,7 +291,11 @@ def _add_teeth(
     drawn = []
     for spline, teeth in zip(SPLINES, numbers, strict=True):
         if spline in graded:
-            drawn.append(DrawnTeeth(len(inputs), spline, graded[spline].field(teeth)))
+            try:
+                random_field = graded[spline].field(teeth)
+            except HdoptError as error:
+                raise HdoptError(f"[tolerances] {spline}: {error}") from error
+            drawn.append(DrawnTeeth(len(inputs), spline, random_field))
             inputs[spline] = WHICH_SPLINE
             groups[_group_of(SINE_OF[spline])].append(spline)
     return tuple(drawn)

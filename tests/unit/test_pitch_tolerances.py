@@ -200,6 +200,13 @@ def test_half_a_tolerance_is_refused(given, message):
         study_problem(load_study("csf-25-80", [f"tolerances.cs_teeth={given}"]))
 
 
+def test_tolerances_that_no_teeth_meet_are_named():
+    """The number of teeth in the message once led to drive.circular_spline_teeth."""
+    changed = "tolerances.cs_teeth={single_pitch_um=6, cumulative_pitch_um=5}"
+    with pytest.raises(HdoptError, match=r"--set tolerances.cs_teeth: \[tolerances\] cs_teeth: a cumulative pitch of"):
+        study_problem(load_study("csf-25-80", [changed]))
+
+
 def test_teeth_that_were_measured_are_not_drawn(tmp_path):
     rows = "\n".join(f"{tooth},left,0.0" for tooth in range(1, Z + 1))
     (tmp_path / "cs.csv").write_text(rows, encoding="utf-8")
