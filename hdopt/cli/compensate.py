@@ -83,7 +83,7 @@ def _lines(found: Compensated, output: Path) -> Iterator[str]:
         from hdopt.workflow.compensate import VOID, homing_words
 
         yield homing_words(found.homing)
-        yield VOID
+        yield f"void {VOID}"
         yield f"written: {output}"
     else:
         yield (

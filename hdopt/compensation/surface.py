@@ -52,6 +52,11 @@ class Harmonics:
     def __len__(self) -> int:
         return len(self.k)
 
+    def __add__(self, more: Harmonics) -> Harmonics:
+        """These terms and those of `more`; the return error is that of these."""
+        orders = np.r_[self.k, more.k], np.r_[self.j, more.j]
+        return Harmonics(*orders, np.r_[self.cos, more.cos], np.r_[self.sin, more.sin], self.back, self.crossing)
+
     def at(self, inputs: Array, outputs: Array, direction: Array | float = 0.0) -> Array:
         """Error (arcmin, n) at input and output angles `inputs`, `outputs` (n,) rad and `direction` +1, -1, 0 or the
         path between (`path_of`)."""

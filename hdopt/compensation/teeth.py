@@ -110,13 +110,18 @@ def fit_teeth(rows: Rows, free: Array, start: Teeth, variance: Array) -> Teeth:
     found = start
     some = slice(None, None, -(-len(rows) // MOST_ROWS))
     for most in (min(LONE, longest), longest):
-        found = _fitted(found, (rows.theta[some], rows.error[some]), free[some], variance, np.arange(2, most + 1))
+        found = refit_waves(found, (rows.theta[some], rows.error[some]), free[some], variance, np.arange(2, most + 1))
     return found
 
 
-def _fitted(found: Teeth, seen: tuple[Array, Array], free: Array, variance: Array, waves: Index) -> Teeth:
-    """`found` with `waves` (w,) fitted anew to `seen`, the angles (n,) rad and errors (n,) arcmin, as `fit_teeth` says;
-    a step that would leave more is shortened."""
+def refit_waves(
+    found: Teeth, seen: tuple[Array, Array], free: Array, variance: Array, waves: Index, rounds: int = ROUNDS
+) -> Teeth:
+    """`found` with `waves` (w,) and its errors fitted anew to `seen`, the angles (n,) rad and errors (n,) arcmin, in at
+    most so many `rounds`; what else stands on its splines stays.
+
+    `free` (n, q) and `variance` (12,) as in `fit_teeth`. A step that would leave more is shortened.
+    """
     theta, error = seen
     both = [Waves(spline, tuple(int(w) for w in waves)) for spline in Spline]
     band = np.repeat(_bands(waves), 2)
@@ -125,14 +130,15 @@ def _fitted(found: Teeth, seen: tuple[Array, Array], free: Array, variance: Arra
     around = np.asarray(np.arange(CELLS) * (2 * np.pi / CELLS), float)
     here = np.r_[_coefficients(found.cs, waves), _coefficients(found.fs, waves), found.errors]
     p = len(band)
+    stays = [beyond_waves(table, waves) for table in (found.cs, found.fs)]
 
     def at(state: Array) -> Teeth:
         parts = state[: p // 2], state[p // 2 : p]
-        tables = [w.added(around, 0, part)[0] for w, part in zip(both, parts, strict=True)]
+        tables = [w.added(around, 0, part)[0] + kept for w, part, kept in zip(both, parts, stays, strict=True)]
         return Teeth(found.model, state[p:], found.sense, *tables)
 
     left = _left(found, theta, error, free)
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         now = at(here)
         columns, slopes, value = _linear(now, both, theta)
         target = now.sense * error - value + columns @ here[:p]
@@ -140,9 +146,11 @@ def _fitted(found: Teeth, seen: tuple[Array, Array], free: Array, variance: Arra
         step = np.r_[solution[:p] - here[:p], solution[p : p + PARAMETERS]]
         tried = [(_left(at(here + share * step), theta, error, free), share) for share in STEPS]
         least, share = min(tried)
-        if least > (1 - ENOUGH) * left:
+        if least >= left:
             break
-        here, left = here + share * step, least
+        here, left, before = here + share * step, least, left
+        if least > (1 - ENOUGH) * before:
+            break
     return at(here)
 
 
@@ -151,6 +159,14 @@ def _left(found: Teeth, theta: Array, error: Array, free: Array) -> float:
     rest = error - found.at(theta)
     rest = rest - free @ np.linalg.lstsq(free, rest, rcond=1e-8)[0]
     return float(rest @ rest)
+
+
+def beyond_waves(table: Array, waves: Index) -> Array:
+    """A `table` round one turn at `CELLS` steps, (CELLS,), without `waves` (w,) and its mean."""
+    spectrum = np.fft.rfft(np.broadcast_to(table, CELLS))
+    spectrum[0] = 0
+    spectrum[waves] = 0
+    return np.asarray(np.fft.irfft(spectrum, CELLS), float)
 
 
 def _coefficients(table: Array, waves: Index) -> Array:

@@ -7,10 +7,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any  # Any: values of JSON
 
+from hdopt.compensation.mesh import Beat
 from hdopt.compensation.surface import Harmonics, Surface
 from hdopt.compensation.zones import Zones
 
-Found = Harmonics | Zones | Surface
+Found = Harmonics | Zones | Surface | Beat
 
 FORMATS = ("csv", "json", "c")
 
@@ -35,6 +36,8 @@ def _csv(found: Found, facts: Mapping[str, Any]) -> str:
         rows += [f"{k},{j},{c!r},{s!r}" for k, j, c, s, _ in _terms(found)]
         return "\n".join([*head, *rows]) + "\n"
     inputs, outputs = found.values.shape
+    if isinstance(found, Beat):
+        head.append("# columns: the input turns of a turn of the output, each by the output angle at which it begins")
     rows = ["input_deg\\output_deg," + ",".join(f"{360 * j / outputs:g}" for j in range(outputs))]
     rows += [
         f"{360 * i / inputs:g}," + ",".join(f"{value:.8f}" for value in row)
@@ -61,7 +64,8 @@ def _json(found: Found, facts: Mapping[str, Any]) -> str:
     content: dict[str, Any] = {"schema": 1, **facts, "half_return_arcmin": found.back}
     content["return_crossing_output_deg"] = found.crossing.deg
     content["return_path_at_start"] = found.crossing.start
-    if isinstance(found, Surface):
+    if isinstance(found, Surface | Beat):
+        content["table"] = "input angle by output angle" if isinstance(found, Surface) else "input angle by input turn"
         content["table_arcmin"] = found.values.tolist()
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
     if isinstance(found, Zones):
@@ -131,6 +135,29 @@ double hdopt_error_arcmin(double input_rad, double output_rad, double path)
 }}
 """
 
+_C_BEAT = """
+#define HDOPT_INPUTS {inputs}
+#define HDOPT_TURNS {outputs}
+static const double hdopt_table[HDOPT_INPUTS][HDOPT_TURNS] = {{
+{rows}
+}};
+
+double hdopt_error_arcmin(double input_rad, double output_rad, double path)
+{{
+    const double turn = 6.283185307179586476925;
+    double x = input_rad / turn, y;
+    x -= floor(x);
+    y = floor(output_rad / turn * HDOPT_TURNS - x + 0.5);
+    int n = (int)(y - HDOPT_TURNS * floor(y / HDOPT_TURNS));
+    int i = (int)floor(x * HDOPT_INPUTS);
+    double p = x * HDOPT_INPUTS - i;
+    n = (n + i / HDOPT_INPUTS) % HDOPT_TURNS;
+    i %= HDOPT_INPUTS;
+    int j = (i + 1) % HDOPT_INPUTS, m = j ? n : (n + 1) % HDOPT_TURNS;
+    return hdopt_table[i][n] * (1 - p) + hdopt_table[j][m] * p + path * ({back});
+}}
+"""
+
 
 def _c(found: Found, facts: Mapping[str, Any]) -> str:
     said = "\n".join(f"   {key}: {value}" for key, value in facts.items()).replace("*/", "* /")
@@ -138,14 +165,15 @@ def _c(found: Found, facts: Mapping[str, Any]) -> str:
     turn = math.radians(found.crossing.deg)
     remains = f"exp(-fabs(output_moved_rad) / {turn!r})" if turn > 0 else "0"
     head = _HEAD.format(facts=said, crossing=found.crossing.deg, start=found.crossing.start, remains=remains)
-    if not isinstance(found, Surface):
+    if not isinstance(found, Surface | Beat):
         columns = list(zip(*_terms(found), strict=True)) or [()] * 5
         numbers = {name: _list(column) for name, column in zip(("k", "j", "cos", "sin", "sum"), columns, strict=True)}
         larger = "fmin" if isinstance(found, Zones) and found.sense < 0 else "fmax"
         return head + _C_TERMS.format(count=len(found), back=repr(found.back), larger=larger, **numbers)
     rows = ",\n".join("{" + _list(row) + "}" for row in found.values.tolist())
     inputs, outputs = found.values.shape
-    return head + _C_TABLE.format(inputs=inputs, outputs=outputs, rows=rows, back=repr(found.back))
+    form = _C_TABLE if isinstance(found, Surface) else _C_BEAT
+    return head + form.format(inputs=inputs, outputs=outputs, rows=rows, back=repr(found.back))
 
 
 def _list(values: Sequence[float]) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.compensation.expected import NORMAL, peak_to_peak_again
 from hdopt.compensation.path import paths_of
-from hdopt.compensation.writers import FORMATS, homing_arcmin, written
+from hdopt.compensation.writers import FORMATS, Found, homing_arcmin, written
 from hdopt.compensation.zones import MOST_TERMS, SMALL
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
@@ -23,7 +23,6 @@ from hdopt.recordings.recording import TURN, Recording
 from hdopt.recordings.rows import Rows, gather
 from hdopt.workflow.compensation_trials import (
     STRETCHES,
-    Found,
     candidates,
     centred,
     choose,
@@ -159,7 +158,7 @@ class Compensated(ShownAsTable):
 
 
 VOID = (
-    "void after the wave generator, circular spline or flexspline was taken out or turned, after an encoder or its "
+    "after the wave generator, circular spline or flexspline was taken out or turned, after an encoder or its "
     "zero was changed, and at a load or temperature far from the recording's"
 )
 
@@ -247,7 +246,10 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
         {NONE: float(np.std(before))} | {name: float(np.std(left)) for name, left in trials.items()},
         homing_arcmin(found, rows.ratio),
         rows.ratio,
-        (*_warnings(rows, held_out, moving), *_too_few(len(found), terms, off, float(np.ptp(again)))),
+        (
+            *_warnings(rows, held_out, moving),
+            *(_too_few(len(found), terms, off, float(np.ptp(again))) if worth else ()),
+        ),
     )
 
 

@@ -8,17 +8,18 @@ from dataclasses import replace
 import numpy as np
 
 from hdopt.arrays import Array, Index, Mask
+from hdopt.compensation.mesh import ROWS_PER_TOOTH, fit_mesh, formed_mesh, shows_mesh
 from hdopt.compensation.path import Paths, crossing_of, half_return, path_of, some_of
 from hdopt.compensation.pursuit import dictionary, independent_share, pursue
-from hdopt.compensation.surface import AT_ONCE, Crossing, Harmonics, Surface, nothing, surface_of
+from hdopt.compensation.surface import AT_ONCE, Crossing, nothing, surface_of
 from hdopt.compensation.teeth import Teeth, fit_teeth
-from hdopt.compensation.zones import MOST_TERMS, Zones, formed
+from hdopt.compensation.writers import Found
+from hdopt.compensation.zones import MOST_TERMS, formed
 from hdopt.drive.geometry import Drive
+from hdopt.effects.tooth_mesh import mesh_order
 from hdopt.recordings.recording import TURN, Recording
 from hdopt.recordings.rows import Rows, neighbours_for
 from hdopt.workflow.waveform_fit import WaveformFit, fit_rows, offset_columns
-
-Found = Harmonics | Zones | Surface
 
 FOLDS = 4
 FIT_ROWS = 10_000
@@ -32,10 +33,12 @@ STRETCHES = "stretches of the one output turn"
 
 def neighbours_of(recordings: Sequence[Recording]) -> int:
     """How many neighbouring samples of these `recordings` make a row: fewer than elsewhere, where a record of no more
-    than `MOST_ROWS` rows can so show single teeth."""
+    than `MOST_ROWS` rows can so show single teeth; none are averaged where it shows the teeth's mesh."""
     samples = sum(len(recording) for recording in recordings)
     turns = sum(float(np.abs(np.diff(recording.input_angle)).sum()) / TURN for recording in recordings)
     usual = neighbours_for(recordings)
+    if samples <= MOST_ROWS and samples > turns * ROWS_PER_TOOTH * mesh_order(recordings[0].ratio):
+        return 1
     fewer = max(1, min(usual, int(samples / max(turns, 1.0) / ROWS_PER_TURN)))
     return fewer if samples / fewer <= MOST_ROWS else usual
 
@@ -141,6 +144,12 @@ def candidates(rows: Rows, fit: WaveformFit | None, terms: int | None, paths: Pa
         made[name] = formed(
             one.sharpened(TURN / rows.rows_per_turn, count), rest, terms, float(np.ptp(left - rest.at(*angles)))
         )
+    if shows_mesh(rows):
+        mesh = fit_mesh(rows, free, bare)
+        left = rows.error - mesh.at(rows.theta)
+        rest = replace(pursue(angles, left, zeros, path, pairs, most // 2), crossing=crossing)
+        spread = float(np.ptp(left - rest.at(*angles)))
+        made["model, teeth, their mesh and harmonics"] = formed_mesh(mesh, rest, terms, spread, rows.ratio)
     return made
 
 
