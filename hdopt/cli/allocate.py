@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -67,10 +68,15 @@ def _lines(result: AllocateResult) -> Iterator[str]:
     yield f"  verified yield {check.value:.6f} ({check.low:.6f} to {check.high:.6f}), n = {result.verify_n}"
     for outcome in result.comparison:
         share = outcome.conforming
+        if isnan(outcome.total_cost):
+            yield f"  {outcome.rule:14s} {outcome.note}"
+            continue
         yield (
             f"  {outcome.rule:14s} cost {outcome.total_cost:9.4f}  yield {share.value:.5f} "
             f"({share.low:.5f} to {share.high:.5f}) {outcome.note}"
         )
+    if result.cost_curve:
+        yield "  least cost over the limit, before the correction by a larger sample that the total has:"
     for limit, cost in result.cost_curve:
         yield f"  limit {limit:9.5g} {result.unit}: cost {cost:.4f}"
     for note in result.notes:

@@ -50,5 +50,7 @@ def _lines(found: StudyCheck) -> Iterator[str]:
             yield f"  no   {one.what}" + (f": give {', '.join(besides)}" if besides else "")
         else:
             yield f"  no   {one.what}: {one.why}"
+    for doubt in found.doubts:
+        yield f"doubt: {doubt}"
     for said in found.defaults:
         yield f"default: {said}"

@@ -39,11 +39,13 @@ class Capability:
 
 @dataclass(frozen=True)
 class StudyCheck(ShownAsTable):
-    """What a study allows. `defaults` says, a line a section, what holds where it says nothing."""
+    """What a study allows. `defaults` says, a line a section, what holds where it says nothing; `doubts` which sizes of
+    the drive hardly belong together."""
 
     study: str
     capabilities: tuple[Capability, ...]
     defaults: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -51,13 +53,14 @@ class StudyCheck(ShownAsTable):
         return any(one.can for one in self.capabilities)
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-ready: `can`, names; `missing`, name -> keys; `why`, name -> another reason; `defaults`."""
+        """JSON-ready: `can`, names; `missing`, name -> keys; `why`, name -> another reason; `defaults`; `doubts`."""
         return {
             "study": self.study,
             "can": [one.what for one in self.capabilities if one.can],
             "missing": {one.what: list(one.missing) for one in self.capabilities if one.missing},
             "why": {one.what: one.why for one in self.capabilities if one.why},
             "defaults": list(self.defaults),
+            "doubts": list(self.doubts),
         }
 
     def to_frame(self) -> pd.DataFrame:
@@ -83,7 +86,20 @@ def check_study(study: AnyStudy = None) -> StudyCheck:
     found = [_tried(replace(one, missing=lacking), probe, loaded) for one, probe in PROBES]
     found = [_judged(one, found) for one in found]
     names = tuple(dict.fromkeys(name for sections in USED.values() for name in sections if name in loaded.sections))
-    return StudyCheck(loaded.name, tuple(found), defaults_taken(loaded.sections, names))
+    return StudyCheck(loaded.name, tuple(found), defaults_taken(loaded.sections, names), _doubts(loaded, lacking))
+
+
+def _doubts(study: Study, lacking: tuple[str, ...]) -> tuple[str, ...]:
+    """Sizes of the drive of the `study` that hardly belong together; none of one that has the shipped drive's for what
+    is `lacking`, or that cannot be made."""
+    from hdopt.mechanics.sizes import doubts
+
+    if lacking:
+        return ()
+    try:
+        return doubts(study.drive)
+    except HdoptError:
+        return ()
 
 
 def _judged(one: Capability, found: Sequence[Capability]) -> Capability:

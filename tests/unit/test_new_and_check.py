@@ -11,11 +11,11 @@ import pytest
 import hdopt
 from hdopt.cli import main
 from hdopt.errors import HdoptError, IncompleteStudy, MissingValue
-from hdopt.study import shipped_drives, shipped_studies
+from hdopt.study import load_study, shipped_drives, shipped_studies
 from hdopt.study.defaults import defaults_taken, used_by
 from hdopt.study.nearest import near_keys
 from hdopt.study.schema import SECTIONS, section_model
-from hdopt.workflow.check_study import PROBES
+from hdopt.workflow.check_study import PROBES, check_study
 from hdopt.workflow.study_reference import section_reference, study_reference
 
 OWN = """[drive]
@@ -367,3 +367,37 @@ def test_orders_that_are_nil_are_counted_not_listed(capsys):
     out = capsys.readouterr().out
     assert "   0.0000  " not in out and "E1, CS teeth" in out
     assert "orders below 5e-05 arcmin are left out" in out
+
+
+@pytest.mark.parametrize("name", [*shipped_drives(), *shipped_studies()])
+def test_no_size_of_what_ships_is_in_doubt(name):
+    study = load_study(drive=name) if name in shipped_drives() else load_study(name)
+    if "drive" in study.sections:
+        assert check_study(study).doubts == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (
+            {"flexspline_teeth": 200, "circular_spline_teeth": 202},
+            r"200 / 2 = 39\.6 mm, lies 20\.7 modules beyond its wall",
+        ),
+        ({"module_mm": 0.317}, r"deflects the flexspline by 0\.396 mm, 1\.25 modules, where about one is usual"),
+        ({"module_mm": 0.317}, r"160 / 2 = 25\.36 mm, lies 19 modules inside its wall, which ends at 31\.39 mm"),
+        ({"flexspline_wall_mm": 2.0}, r"lies 2\.45 modules inside its wall, which ends at 32\.65 mm"),
+    ],
+)
+def test_a_number_left_over_from_another_drive_is_doubted(changes, said):
+    """By hand: 0.396 mm x 200/2 = 39.6 mm; the wall ends at 30.65 + 0.74 = 31.39 mm."""
+    study = load_study("csf-25-80").with_(changes)
+    (doubt,) = [one for one in check_study(study).doubts if re.search(said, one)]
+    assert doubt in check_study(study).to_dict()["doubts"]
+
+
+def test_another_drive_whose_sizes_belong_together_is_not_doubted():
+    """100:1 on the same pitch circle, with its own deflection."""
+    study = load_study("csf-25-80").with_(
+        flexspline_teeth=200, circular_spline_teeth=202, module_mm=0.317, semi_major_mm=30.967, semi_minor_mm=30.33
+    )
+    assert check_study(study).doubts == ()

@@ -380,7 +380,8 @@ def allocate_section(result: AllocateResult, key: str = "allocate") -> Section:
                 f"{key}-curve",
                 "What tightening the requirement costs",
                 _curve(result),
-                "Least cost over the requirement; the point is the requirement as it stands.",
+                "Least cost over the requirement, before the correction by a larger sample that the cost above has "
+                "(within about 1 % of the limit); the point is the requirement as it stands.",
             )
         )
     items.append(Text(f"Optimality gap: {result.optimality_gap_reason}."))
