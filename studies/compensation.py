@@ -38,8 +38,9 @@ class Case:
     predicted: float
 
 
-def run_case(seed: int, effect: str, severity: float, drive: Drive) -> Case | None:
-    """The case of `seed` with `effect` ("" for none) at `severity` (rms in units of the base's), on `drive`.
+def run_case(seed: int, effect: str, severity: float, drive: Drive, terms: int | None = 64) -> Case | None:
+    """The case of `seed` with `effect` ("" for none) at `severity` (rms in units of the base's), on `drive`, with at
+    most so many `terms` of the compensation (0: a table, None: as `--terms auto`).
 
     None where the bench cannot make the effect so large in this draw.
     """
@@ -56,7 +57,7 @@ def run_case(seed: int, effect: str, severity: float, drive: Drive) -> Case | No
     if drawn is None:
         return None
     seen = [recording_from_table(table, drive.geometry.ratio, name=f"run {k}") for k, table in enumerate(drawn.tables)]
-    made = compensate(seen, drive, seed=seed)
+    made = compensate(seen, drive, terms, seed)
     setup, last = drawn.setups[-1], len(drawn.plans) - 1
     rng = np.random.default_rng([seed, 8])
     angles = read_angles(setup, drawn.hidden)
@@ -121,6 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--cases", type=int, default=60)
     parser.add_argument("--skip", type=int, default=0, help="Leave out so many cases of the list's beginning.")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--terms", default="64", help="As of hdopt compensate.")
     parser.add_argument("--out", default="compensation.csv", help="One line a case; cases that stand there are kept.")
     options = parser.parse_args(arguments)
     drive = load_study(drive="csf-25-80").drive
@@ -128,12 +130,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         kept = pd.read_csv(options.out, keep_default_na=False)
     except FileNotFoundError:
         kept = pd.DataFrame()
+    terms = None if options.terms == "auto" else int(options.terms)
     rows = kept.to_dict("records")
     done = {int(row["seed"]) for row in rows}
     for seed, effect, severity in plan(options.seed, options.skip + options.cases)[options.skip :]:
         if seed in done:
             continue
-        case = run_case(seed, effect, severity, drive)
+        case = run_case(seed, effect, severity, drive, terms)
         if case is not None:
             rows.append({str(key): value for key, value in asdict(case).items()})
             write_text(Path(options.out), to_csv(pd.DataFrame(rows)))
