@@ -22,6 +22,8 @@ from hdopt.recordings.rows import Rows, neighbours_for
 from hdopt.workflow.waveform_fit import WaveformFit, fit_rows, offset_columns
 
 FOLDS = 4
+PIECES = 3
+"""Stretches of a single pass that each part holds: one long gap asks a fit to guess a quarter of the output's turn."""
 FIT_ROWS = 10_000
 """Rows that the twelve errors are fitted to, evenly spread."""
 PLAIN_SIGN = 2.0
@@ -57,7 +59,8 @@ def folds(rows: Rows) -> tuple[Index, str]:
         rank = np.argsort(np.argsort(-np.bincount(passes), kind="stable"), kind="stable")
         return np.asarray(rank[passes] % FOLDS, np.int64), "reversals"
     order = (rows.theta - rows.theta.min()) / max(float(np.ptp(rows.theta)), 1e-9)
-    return np.asarray(np.minimum((order * FOLDS).astype(int), FOLDS - 1), np.int64), STRETCHES
+    pieces = FOLDS * PIECES
+    return np.asarray(np.minimum((order * pieces).astype(int), pieces - 1) % FOLDS, np.int64), STRETCHES
 
 
 def tried(

@@ -267,6 +267,17 @@ def test_a_fall_within_chance_is_not_worth_a_file():
     assert _worth(before, steady, rows)[0]
 
 
+def test_a_single_pass_is_held_out_in_stretches_that_neither_leak_nor_leave_a_quarter_to_guess():
+    """An output encoder's eccentricity, one wave over the pass, was refused with a quarter of it held out at once."""
+    rows = gather([recorded(lambda t: 0 * t, 80, per_turn=40)])
+    fold, name = folds(rows)
+    assert name == "stretches of the one output turn"
+    turns = [sum(1 for _ in stretch) / 40 for _, stretch in itertools.groupby(fold.tolist())]
+    assert set(fold.tolist()) == {0, 1, 2, 3}
+    assert min(turns) > 5
+    assert max(turns) < 0.1 * 80
+
+
 def test_no_part_holds_all_that_reaches_round_the_output():
     """Three short strokes, then a long one there and back: with the long ones held out together the fit would know a
     tenth of the output's turn, and the model would lose against harmonics for that alone."""
