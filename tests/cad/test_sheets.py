@@ -15,7 +15,7 @@ from wave_generators import drive, scaled
 
 from hdopt.drive.geometry import Structure
 from hdopt.geometry.assembly_sheet import uncrossed
-from hdopt.geometry.balloons import RADIUS
+from hdopt.geometry.balloons import APART, RADIUS, places_around
 from hdopt.geometry.callouts import callouts_of
 from hdopt.geometry.digits import rounded
 from hdopt.geometry.export import export_drive
@@ -349,6 +349,30 @@ def test_lines_to_numbers_do_not_cross(points):
         x = np.linspace(low, high, 50)
         apart = np.interp(x, other[:, 0], other[:, 1]) - np.interp(x, one[:, 0], one[:, 1])
         assert apart.min() > -1e-6 or apart.max() < 1e-6
+
+
+@given(st.lists(st.tuples(st.floats(-40, 40), st.floats(-40, 40)), min_size=1, max_size=8))
+@settings(max_examples=60, deadline=None)
+def test_numbers_round_a_view_keep_apart_and_off_what_is_drawn(tips):
+    """A ring apart from every other, from letters and dimension, and from a line; near its own direction if that is
+    free."""
+    sheet, start, end = Sheet(400, 300, "", ""), np.array([160.0, 60.0]), np.array([160.0, 140.0])
+    sheet.line(tuple(start), tuple(end))
+    centre = (100.0, 100.0)
+    places = np.array(places_around(sheet, [(100 + x, 100 + y) for x, y in tips], centre, 60.0))
+    rays = places - centre
+    assert np.hypot(*rays.T) == pytest.approx(np.full(len(tips), 60.0))
+    angles = [*np.arctan2(rays[:, 1], rays[:, 0]), *np.radians([-90, 90, 180])]
+    for one, other in itertools.combinations(angles[: len(tips)], 2):
+        assert abs(math.remainder(one - other, 2 * math.pi)) > APART - 1e-9
+    for one, fixed in itertools.product(angles[: len(tips)], angles[len(tips) :]):
+        assert abs(math.remainder(one - fixed, 2 * math.pi)) > APART - 1e-9
+    share = np.clip((places - start) @ (end - start) / 80.0**2, 0, 1)[:, None]
+    assert (np.hypot(*(places - start - share * (end - start)).T) > RADIUS).all()
+    wanted = math.atan2(tips[0][1], tips[0][0]) if math.hypot(*tips[0]) > 1e-6 else 0.0
+    nearest = min(abs(math.remainder(wanted - angle, 2 * math.pi)) for angle in angles[-3:])
+    blocked = abs(wanted) < math.radians(10) or nearest < APART
+    assert blocked or math.remainder(angles[0] - wanted, 2 * math.pi) == pytest.approx(0, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["disc 1", "disc 2"])
