@@ -5,9 +5,12 @@ Skips are listed at the end of every run; where CI is set, one that is not on th
 
 from __future__ import annotations
 
+import json
 import os
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,7 +18,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from hdopt.parallel.engine import engine_in_force
-from tests.slow import slow_tests  # the path comes first
+from tests.regression.golden import hdopt  # the path comes first
+from tests.slow import slow_tests
 
 ALLOWED_SKIPS = ("no recordings", "this machine has OSMesa", "asammdf is an extra of its own")
 """What a skip's reason may start with in CI: the recordings belong to others and are not part of the project."""
@@ -55,6 +59,31 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         for test, reason in refused:
             print(f"\nskipped, which CI does not allow: {test}: {reason}")
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+@dataclass(frozen=True)
+class ShippedRun:
+    """What `hdopt run csf-25-80 --json -` left: its `folder`, exit `status` and JSON."""
+
+    folder: Path
+    status: int
+    result: dict[str, Any]
+
+
+@pytest.fixture(scope="session")
+def shipped_run(tmp_path_factory: pytest.TempPathFactory) -> ShippedRun:
+    """The whole run of a shipped study, done once for all workers: who asks first does it, others wait for it."""
+    import fcntl
+
+    base = tmp_path_factory.getbasetemp()
+    base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    folder, said = base / "csf-25-80", base / "csf-25-80.json"
+    with open(base / "csf-25-80.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not said.exists():
+            status, result = hdopt("run", "csf-25-80", "-o", str(folder))
+            said.write_text(json.dumps([status, result]))
+    return ShippedRun(folder, *json.loads(said.read_text()))
 
 
 @pytest.fixture(scope="session")

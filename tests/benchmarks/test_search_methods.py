@@ -33,23 +33,26 @@ def problem(profile: str):
     return setup.problem(Combination(profile, Structure.AUTOMATIC), "peak_to_peak_arcmin")
 
 
-def test_the_local_method_misses_nothing_and_needs_the_fewest_evaluations():
-    table = {}
-    for algorithm in LOCALS:
+def test_the_local_method_misses_nothing_and_needs_the_fewest_evaluations(request):
+    """In the test suite the others end soon after the local method's median: it is the least all the same."""
+    in_a_run = not request.config.getoption("benchmark_disable")
+    table, most = {}, 400
+    for algorithm in (LOCAL, *(name for name in LOCALS if name != LOCAL)):
         evaluations, missed = [], 0
         for profile in PROFILES:
             at = problem(profile)
             best = minimise(at, at.place(at.space.baseline_values)).evaluation.objective
             for start in np.random.default_rng(1).random((STARTS, at.n)):
-                outcome = minimise(at, start, algorithm, Effort(evaluations=400))
+                outcome = minimise(at, start, algorithm, Effort(evaluations=most))
                 evaluations.append(outcome.evaluations)
                 missed += not (outcome.feasible and outcome.evaluation.objective <= best * (1 + REACHED))
         table[algorithm] = (float(np.median(evaluations)), missed)
+        most = 400 if in_a_run else int(1.5 * table[LOCAL][0])
     print()
     for algorithm, (median, missed) in table.items():
         print(f"{algorithm:10s} median {median:5.0f} evaluations, missed {missed} of {STARTS * len(PROFILES)}")
     assert table[LOCAL][1] == 0
-    assert table[LOCAL][0] == min(median for median, _ in table.values())
+    assert table[LOCAL][0] < min(median for name, (median, _) in table.items() if name != LOCAL)
 
 
 @pytest.mark.xfail(

@@ -8,8 +8,8 @@ from hdopt.study import load_study
 from hdopt.workflow.run import run_study
 
 
-def test_the_report_of_the_csf_25_80(look_at, tmp_path):
-    findings = look_at(run_study(load_study("csf-25-80"), tmp_path).report)
+def test_the_report_of_the_csf_25_80(look_at, shipped_run):
+    findings = look_at(shipped_run.folder / "report.html")
     assert len(findings.figures) >= 13
 
 

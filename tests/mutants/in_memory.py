@@ -56,9 +56,10 @@ def mark_calls(path: Path, text: str, names: Set[str], number: int) -> None:
     tree = ast.parse(text)
     _insert(tree, "", names, ast.parse(f'__import__("sys")._fault_called({number})').body[0])
     marked = dict(_functions(compile(ast.fix_missing_locations(tree), str(path), "exec")))
+    plain = names - _compiled_functions(path)
     for function in [one for one in gc.get_objects() if isinstance(one, FunctionType) and _is_from(one, path)]:
         code = marked.get(function.__code__.co_qualname)
-        if code is not None and function.__code__.co_qualname in names - _compiled_functions(path):
+        if code is not None and function.__code__.co_qualname in plain:
             if code.co_freevars == function.__code__.co_freevars:
                 function.__code__ = code
 

@@ -16,7 +16,7 @@ from hdopt.workflow.steps import Context, find_step
 
 @pytest.mark.slow
 def test_small_part_of_the_blind_proof(tmp_path):
-    size = ("concealed.share=0.003", 'concealed.families=["nothing", "single"]', "concealed.seed=2001")
+    size = ("concealed.share=0.003", 'concealed.families=["nothing", "single"]', "concealed.seed=2009")
     study = load_study("concealed-physics", size)
     result = find_step("concealed_physics")(study, Context(tmp_path))
     assert result.results["cases"] == 2

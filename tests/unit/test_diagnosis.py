@@ -191,7 +191,7 @@ def test_without_a_drive_model(study):
 
 @pytest.mark.slow
 def test_same_seed_same_answer(study, drive):
-    records = bench(study, HIDDEN["output_coupling"])
+    records = bench(study, HIDDEN["output_coupling"], turns=20, rate=60)
     assert diagnose(records, drive, seed=0).to_dict() == diagnose(records, drive, seed=0).to_dict()
 
 

@@ -53,16 +53,16 @@ def minimal(tmp_path):
     return load_study(tmp_path / "minimal.toml")
 
 
-def test_a_run_leaves_a_page_its_numbers_and_the_results_of_each_step(study, tmp_path):
-    result = run_study(study, tmp_path)
-    assert result.report == tmp_path / "report.html"
-    results = json.loads((tmp_path / "results.json").read_text())
+def test_a_run_leaves_a_page_its_numbers_and_the_results_of_each_step(study, shipped_run):
+    folder = shipped_run.folder
+    assert shipped_run.result["report"] == str(folder / "report.html")
+    results = json.loads((folder / "results.json").read_text())
     assert list(results["steps"]) == list(steps_of(study)[1])
     assert results["steps"]["waveform"]["peak_to_peak_arcmin"] == pytest.approx(
         converged_peak_to_peak_arcmin(study.drive, study.errors)
     )
-    assert (tmp_path / "orders-table.csv").is_file()
-    assert study.title in result.report.read_text()
+    assert (folder / "orders-table.csv").is_file()
+    assert study.title in (folder / "report.html").read_text()
 
 
 def headings(page: str) -> list[str]:

@@ -17,13 +17,14 @@ CASES = (Case("one", None, (NAMED,)), Case("two", None, (NAMED,)))
 @pytest.mark.slow
 def test_kept_evidence_is_judged_by_the_settings_of_the_move():
     """Would catch evidence that brings its own settings along, so that no move of the verdict's thresholds shows."""
-    case = next(case for case in study.cases(nothing=0) if case.name == "fs_tooth_harmonics")
+    case = next(case for case in study.cases(nothing=0) if case.name == "encoder_input_eccentricity")
     diagnosis = study.diagnosed(case, DEFAULT)
-    assert study.answer_of(diagnosis) == ("named", ("fs_tooth_harmonics",))
+    named = ("named", (case.name,))
+    assert study.answer_of(diagnosis) == named
     evidence = study.kept(diagnosis)
     assert study.redrawn(evidence, DEFAULT) == study.answer_of(diagnosis)
     strict = moved(DEFAULT, "verdict.significance", 1e-9)
-    assert study.redrawn(evidence, strict) == study.answer_of(study.diagnosed(case, strict)) != NAMED
+    assert study.redrawn(evidence, strict) == study.answer_of(study.diagnosed(case, strict)) != named
 
 
 @pytest.fixture
