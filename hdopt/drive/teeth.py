@@ -79,6 +79,7 @@ def read_teeth(path: str | Path, teeth: int, flank: str | None = None) -> Array:
     except HdoptError as error:
         raise DriveError(f"measured teeth {path}: cannot be read ({error})") from error
     rows = _rows(text, path)
+    require(bool(rows), f"measured teeth {path} holds no row of tooth, flank, fp_um; give a CSV text file of them")
     flanks = sorted({row[1] for row in rows})
     named = ", ".join(flanks) or "none"
     if flank is None:
@@ -113,10 +114,8 @@ def _rows(text: str, path: Path) -> list[tuple[int, str, float]]:
         except ValueError:
             where = f"measured teeth {path}, line {number}: {shown(line)}"
             require(header_allowed, f"{where}; each line must hold tooth, flank, fp_um{_on_commas(line, cells)}")
-            in_mm = re.search(r"(?<![a-zA-Z])mm\b", cells[-1])
-            require(
-                in_mm is None, f"{where}; deviations must be in um: give them times 1000, and name the column fp_um"
-            )
+            in_mm = len(cells) == 3 and re.search(r"(?<![a-zA-Z])mm\b", cells[-1])
+            require(not in_mm, f"{where}; deviations must be in um: give them times 1000, and name the column fp_um")
         header_allowed = False
     return rows
 

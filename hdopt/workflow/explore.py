@@ -19,7 +19,7 @@ from hdopt.recordings.orders import model_orders
 from hdopt.report.explorer import render_explorer
 from hdopt.report.sections.words import ERROR_LABELS, ERROR_SYMBOLS, label
 from hdopt.study import AnyStudy, Study, as_study
-from hdopt.study.tolerances import RequirementSection
+from hdopt.study.tolerances import RequirementSection, TolerancesBase
 from hdopt.study.write import study_toml
 from hdopt.tolerance.sampling import SAMPLINGS
 from hdopt.workflow.placed import numbers_named
@@ -159,6 +159,12 @@ def _notes(study: Study) -> tuple[str, ...]:
     if study.effects:
         left_out = ", ".join(label(effect.id) for effect in study.effects)
         notes.append(f"Left out here are the study's effects: {left_out}.")
+    tolerances = study.find("tolerances", TolerancesBase)
+    if tolerances is not None and (drawn := tolerances.graded(study.drive.geometry)):
+        notes.append(
+            f"The cloud's drives have teeth drawn from tolerances of pitch ({', '.join(drawn)}); the drive that the "
+            "sliders move has one sine a spline."
+        )
     lacking = [f"[{name}]" for name in ("tolerances", "requirement") if name not in study.sections]
     if lacking:
         notes.append(f"There is no cloud of drives: the study has no {' and no '.join(lacking)}.")

@@ -187,6 +187,8 @@ def test_a_stack_evens_out_term_by_term_as_ke_does(study_with_teeth):
         ("1,left,0\n1,right,0\n", "has the flanks left, right; say which one carries"),
         ("tooth,flank,fp_um\n1,left\n", "line 2: '1,left'; each line must hold tooth, flank, fp_um"),
         ("tooth,flank,fp_um\n1,left,0,5\n", "line 2: '1,left,0,5'; .*between decimal commas, semicolons must part"),
+        ('<?xml version="1.0"?><gde/>', "holds no row of tooth, flank, fp_um; give a CSV text file"),
+        ("angle_deg,radius_mm\n0,15\n", "line 2: '0,15'; each line must hold tooth, flank, fp_um"),
         ("Zahn;Flanke;fp [mm]\n1;links;0,004\n", "line 1: .*deviations must be in um: give them times 1000"),
     ],
 )

@@ -24,6 +24,7 @@ from hdopt.tolerance.screening import run_screening
 from hdopt.tolerance.space import InputSpace, Tolerance
 from hdopt.tolerance.tooth_field import CALIBRATION_SEED, ToothField, _normal_pairs, largest_single, tooth_field
 from hdopt.tolerance.worst_case import Unbounded, check_bounded
+from hdopt.workflow.explore import _notes
 from hdopt.workflow.stack import study_problem
 
 Z = 162
@@ -249,3 +250,10 @@ def test_the_splines_of_the_calibration_are_not_those_that_are_judged():
     judged, calibrated = _normal_pairs(u, 2), _normal_pairs(u, 2, CALIBRATION_SEED)
     together = np.corrcoef(judged.view(float).T, calibrated.view(float).T)[:4, 4:]
     assert np.abs(together).max() < 4.5 / np.sqrt(4000)  # 16 coefficients: 1e-4 of chance
+
+
+def test_an_explorer_says_whose_teeth_are_drawn():
+    """Its page shows one sine a spline, beside a cloud of drives with teeth of their own."""
+    assert any(
+        "cloud's drives have teeth drawn from tolerances of pitch (cs_teeth)" in note for note in _notes(study())
+    )
