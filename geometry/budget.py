@@ -86,6 +86,21 @@ class Budget:
     def met(self) -> bool:
         return self.spent <= self.allowed * (1 + 1e-9)
 
+    @property
+    def verdict(self) -> str:
+        """Whether it is kept; if not, what takes most, and how much of the bound is left for that."""
+        factor = math.degrees(1.0) if self.unit == "deg" else 1.0
+        sums = f"{self.spent * factor:.4g} of {self.allowed * factor:.4g} {self.unit}"
+        if self.met:
+            return f"the budget of {self.of} is kept: {sums}"
+        most = max((share for share in self.shares if share.zone is None), key=lambda share: share.takes)
+        others = (s.takes if s.zone is None else FINEST_ZONE * s.takes / s.zone for s in self.shares if s is not most)
+        left = max(0.0, self.allowed - sum(others))
+        return (
+            f"the budget of {self.of} is NOT KEPT: {sums}; {most.feature} ({most.callout}) takes "
+            f"{most.takes * factor:.4g} {self.unit}, {left * factor:.4g} {self.unit} are left for it at most"
+        )
+
     def to_dict(self) -> JsonReady:
         """The budget with its unit at the names: mm, or degrees for tilts."""
         factor = math.degrees(1.0) if self.unit == "deg" else 1.0

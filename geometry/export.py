@@ -54,6 +54,11 @@ class ExportResult(ShownAsTable):
         found = [check.get("max_profile_deviation_um") for check in self.checks.values()]
         return max((value for value in found if value is not None), default=None)
 
+    @property
+    def budgets_kept(self) -> bool:
+        """Whether fits, clearances and tolerances keep the bounds of eccentricity and tilt."""
+        return all(budget.met for budget in self.model.plan.budgets)
+
     def to_dict(self) -> JsonReady:
         step = self.checks.get("step", {})
         parts = step.get("parts") or [
@@ -71,6 +76,7 @@ class ExportResult(ShownAsTable):
             "dimensions": [dimension.to_dict() for dimension in self.dimensions],
             "mating": [row.to_dict() for row in self.mating],
             "budgets": [budget.to_dict() for budget in self.model.plan.budgets],
+            "budgets_kept": self.budgets_kept,
             "checks": dict(self.checks),
             "assumptions": {assumption.key: assumption.value for assumption in self.model.assumptions},
             "notes": list(self.model.notes),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar  # Any: what the command's other 
 
 import click
 
-from hdopt.cli.common import OutputFile, StudyOptions, answer_options, emit, study_options, table_options
+from hdopt.cli.common import CHECK, OutputFile, StudyOptions, answer_options, emit, study_options, table_options
 
 if TYPE_CHECKING:
     from hdopt.geometry.export import ExportResult
@@ -55,6 +55,13 @@ def file_options(command: Callable[..., R]) -> Callable[..., R]:
 @click.option("--structure", metavar="S", help="integral, automatic, one_way_major or one_way_minor.")
 @file_options
 @click.option("--context", is_flag=True, help="With bearing races, flexspline ring and circular spline.")
+@click.option(
+    "--check",
+    is_flag=True,
+    expose_value=False,
+    callback=lambda ctx, parameter, value: ctx.meta.__setitem__(CHECK, value),
+    help="End with status 1 where a budget is not kept.",
+)
 @click.option("--allocation", metavar="FILE", help="Tolerances from the JSON that `hdopt allocate` wrote.")
 @answer_options
 def command(
@@ -70,7 +77,9 @@ def command(
 
     STUDY is a study file or a shipped study; without one, the shipped drive csf-25-80 is taken. Every file is read back
     from disk and compared with closed-form values before it bears its name; exit status 1 says that one failed, and
-    then none is left. Without a file, the key dimensions are printed and nothing is written.
+    then none is left. Without a file, the key dimensions are printed and nothing is written. The last line says whether
+    fits, clearances and tolerances keep the bounds of eccentricity and tilt; files are written in either case, and
+    --check makes it exit status 1 where they do not.
     """
     from hdopt.geometry.check import CheckFailed
     from hdopt.workflow.export import export
@@ -84,7 +93,7 @@ def command(
         print(f"hdopt: {failed}", file=sys.stderr)
         return 1
     emit(result.to_dict(), json_file, _lines(result), tables=result)
-    return 0
+    return 0 if result.budgets_kept or not click.get_current_context().meta.get(CHECK) else 1
 
 
 def _lines(result: ExportResult) -> Iterator[str]:
@@ -116,6 +125,11 @@ def _lines(result: ExportResult) -> Iterator[str]:
         yield f"  wrote and checked {path} ({kind}){instead}"
     if not values["files"]:
         yield "  nothing written: give --step, --dxf, --svg, --cam or another option that names a file"
+    for budget in result.model.plan.budgets:
+        if not budget.met:
+            yield f"  {budget.verdict}"
+    if result.model.plan.budgets and result.budgets_kept:
+        yield "  all budgets are kept"
 
 
 def _budget_lines(budgets: Sequence[Mapping[str, Any]]) -> Iterator[str]:

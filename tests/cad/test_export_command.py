@@ -39,6 +39,26 @@ def test_nothing_is_written_without_a_file(capsys):
     assert "parallelism 0.01571 over 9  [wg_tilt_major_deg]" in out
 
 
+SLIDE = "clearances.cross_slide_clearance_mm"
+
+
+@pytest.mark.parametrize(("clearance", "code"), [(0.02, 1), (0.01, 0)])
+def test_the_last_line_says_whether_the_budgets_are_kept(capsys, clearance, code):
+    """e2 may be 0.0075 mm. Half of the slide's clearance is 0.01, and m5 in H6 lets the shaft lie 2 um aside; zones of
+    0.5 um each for block and profile leave 0.0075 - 0.002 - 0.0005 = 0.005 mm."""
+    asked = ("csf-25-80", "--structure", "one_way_major", "--set", f"{SLIDE}={clearance}")
+    said = run(capsys, *asked, "--check")
+    last = said[1].splitlines()[-1]
+    assert said[0] == code
+    if code:
+        assert "the budget of wg_eccentricity is NOT KEPT: 0.0157 of 0.0075 mm; slot and block" in last
+        assert last.endswith("takes 0.01 mm, 0.005 mm are left for it at most")
+        assert run(capsys, *asked)[0] == 0
+        assert json.loads(run(capsys, *asked, "--json", "-")[1])["budgets_kept"] is False
+    else:
+        assert last == "  all budgets are kept"
+
+
 def test_given_values_are_not_called_assumed(capsys):
     code, out = run(capsys, "--set", "bore_mm=12", "--set", "chamfer_mm=0.3", "--json", "-")
     assumed = json.loads(out)["assumptions"]

@@ -52,6 +52,8 @@ def geometry_section(
     if picture_png is not None:
         items.append(Picture(f"{key}-picture", "Parts, pulled apart along the axis", picture_png))
     items += [_parts(key, made), _dimensions(key, result), *_assumptions(key, result)]
+    unmet = [budget.verdict for budget in result.model.plan.budgets if not budget.met]
+    items += [Text(verdict[0].upper() + verdict[1:] + ".") for verdict in unmet]
     items += [Text(note[0].upper() + note[1:] + ".") for note in values["notes"]]
     return Section(key, "Wave generator to be made", tuple(items), _summary(values))
 

@@ -33,5 +33,6 @@ def geometry(study: Study, context: Context) -> StepResult:
     texts = {kind: places[kind].read_text(encoding="utf-8") for kind in ("step", "dxf", "svg")}
     section = geometry_section(result, texts, picture)
     deviation = result.profile_deviation_um
-    says = (f"wave generator: {len(result.model.parts)} parts, profile within {deviation:.2g} um in the files",)
+    unmet = (budget.verdict for budget in result.model.plan.budgets if not budget.met)
+    says = (f"wave generator: {len(result.model.parts)} parts, profile within {deviation:.2g} um in the files", *unmet)
     return StepResult((section,), result.to_dict(), tuple(places.values()), says)
