@@ -350,6 +350,14 @@ class HighOrderSettings:
 
     lines: int = threshold(12, "1", "choice: strongest lines looked at")
     strong: float = threshold(0.25, "1", "choice: power over all else there from which lines are set aside first")
+    pulse_lines: float = threshold(
+        5.0, "1", "choice: squared sum over sum of squares of the lines' powers, their effective number, of a pulse"
+    )
+    pulse_spread: float = threshold(
+        0.08,
+        "1",
+        "theorem: orders from one to two times the lowest, of falling power, spread by 0.1 to 0.2 of their middle",
+    )
     noise_lines: int = threshold(6, "1", "choice: lines taken out before the noise is measured")
     order_share: float = threshold(0.49, "1", "theorem: below half the rows a turn an order is sampled (Nyquist)")
     beside: float = threshold(
@@ -410,9 +418,14 @@ class OrientationSettings:
     """Which way the angles count."""
 
     decisive: float = threshold(
-        0.3, "1", "measured: log of the power left over the other's is above 0.4 in 15 cases of the simulated bench"
+        0.3,
+        "1",
+        "measured: log of the power left over the other's, the base alone; it prefers the wrong way in 3 of 109 "
+        "cases of the simulated bench (seed 90210), by 0.07 at most",
     )
-    base_alone: float = threshold(1.0, "1", "choice: the same from which the base alone decides")
+    base_alone: float = threshold(
+        1.0, "1", "choice: the same from which the base beside smooth columns is not asked any more"
+    )
     tie: float = threshold(5.0, "1", "paper: Kass, Raftery 1995: log evidence above 5 is 'very strong'")
     first_look: float = threshold(
         500.0,

@@ -23,7 +23,7 @@ from hdopt.effects.base import Effect, Keys
 from hdopt.effects.conditions import TURN, Conditions
 from hdopt.effects.declared import UM, Category, Quantity, needed, number
 from hdopt.effects.estimate import FitEstimate, Parameter
-from hdopt.effects.met import Pulse, Spline
+from hdopt.effects.met import Pulse, Spline, gaussian, off_centre
 from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.term import Shape, Term
 from hdopt.errors import HdoptError
@@ -179,14 +179,15 @@ class LocalToothDefect(Effect):
         kept = {**shape, "width_deg": min(max(shape["width_deg"], NARROWEST_DEG), widest)}
         sigma = math.radians(kept["width_deg"])
 
+        row = TURN / conditions.rows_per_turn if conditions.are_averages else 0.0
+
         def pulse(shift: float) -> Array:
-            off = np.mod(coordinate - kept["centre"] - shift + period / 2, period) - period / 2
-            return np.asarray(np.exp(-0.5 * (off / sigma) ** 2))
+            return gaussian(off_centre(coordinate, kept["centre"] + shift, period), sigma, row)
 
         steps = {"centre": 0.05 * sigma, "width_deg": 0.05 * kept["width_deg"]}
         trials = 60.0 * period / TURN
         if seat.in_zones:
-            return Term(self.id, kept, met=Pulse(seat.spline, kept["centre"], sigma), steps=steps, trials=trials)
+            return Term(self.id, kept, met=Pulse(seat.spline, kept["centre"], sigma, row), steps=steps, trials=trials)
         pulses = [pulse(0.0), pulse(math.pi)] if seat.twice else [pulse(0.0)]
         return Term(self.id, kept, columns=np.column_stack(pulses), steps=steps, trials=trials)
 

@@ -17,6 +17,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import erf
 
 from hdopt.arrays import Array
 from hdopt.effects.sines import sine_columns, sine_sum
@@ -90,26 +91,44 @@ class ZoneWaves:
 
 @dataclass(frozen=True)
 class Pulse:
-    """A Gaussian of standard deviation `sigma` (rad) about `centre` (rad), once round a `spline`."""
+    """A Gaussian of standard deviation `sigma` (rad) about `centre` (rad), once round a `spline`; its mean over a `row`
+    (rad) where samples were averaged over so much of a turn, a part of it that is not small beside a tooth."""
 
     spline: Spline
     centre: float
     sigma: float
+    row: float = 0.0
 
     @property
     def width(self) -> int:
         return 1
 
     def columns(self, angle: Array, zone: ArrayLike) -> Array:
-        return np.exp(-0.5 * (self._off(angle) / self.sigma) ** 2)[:, None]
+        return gaussian(off_centre(angle, self.centre, 2 * math.pi), self.sigma, self.row)[:, None]
 
     def added(self, angle: Array, zone: int, coefficients: Array) -> tuple[Array, Array]:
-        off = self._off(angle)
-        value = coefficients[0] * np.exp(-0.5 * (off / self.sigma) ** 2)
-        return value, -off / self.sigma**2 * value
+        off = off_centre(angle, self.centre, 2 * math.pi)
+        value = coefficients[0] * gaussian(off, self.sigma, self.row)
+        if not self.row:
+            return value, -off / self.sigma**2 * value
+        before, after = (gaussian(off + side * self.row / 2, self.sigma) for side in (-1, 1))
+        return value, coefficients[0] * (after - before) / self.row
 
-    def _off(self, angle: Array) -> Array:
-        return np.mod(angle - self.centre + math.pi, 2 * math.pi) - math.pi
+
+def gaussian(off: Array, sigma: float, row: float = 0.0) -> Array:
+    """exp(-off^2 / (2 sigma^2)) at distances `off` (n,) from the middle, or its mean over a length `row` about each;
+    all rad, (n,)."""
+    if not row:
+        return np.asarray(np.exp(-0.5 * (off / sigma) ** 2))
+    scale = math.sqrt(2) * sigma
+    area = erf((off + row / 2) / scale) - erf((off - row / 2) / scale)
+    return np.asarray(math.sqrt(math.pi) / 2 * scale / row * area)
+
+
+def off_centre(angle: Array, centre: float, period: float) -> Array:
+    """How far `angle` (n,) lies from the nearest repetition of `centre`, in a `period`; all rad, (n,)."""
+    off: Array = np.mod(angle - centre + period / 2, period) - period / 2
+    return off
 
 
 def met_angles(theta: Array, advance: float, beyond: Array) -> Array:

@@ -13,9 +13,10 @@ from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.search import acceptance
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import Candidate, joint_fit
-from hdopt.diagnosis.search.high_order import strong_ripple
+from hdopt.diagnosis.search.high_order import is_part_of_a_pulse, strong_ripple
 from hdopt.diagnosis.search.refinement import otherwise_acceptable, shortened, trimmed
 from hdopt.diagnosis.search.subset_search import acceptable_first
+from hdopt.diagnosis.settings import DEFAULT
 from hdopt.drive.geometry import ARCMIN
 from hdopt.effects import EFFECTS
 from hdopt.effects.bearing_pass import bearing_orders
@@ -172,6 +173,33 @@ def test_strong_ripple_waits_for_its_own_search(study, size, set_aside):
     if set_aside:
         expected = size * np.sin(101.3 * recording.input_angle)
         assert np.std(ripple - expected) < 0.2 * np.std(expected)
+
+
+def test_a_pulse_is_no_ripple(study):
+    """A pulse twice a turn, 1.8 deg wide (standard deviation): its lines go on from those that the means hold. Fault
+    caught: those taken out as a ripple, after which nothing fits what is left.
+    """
+
+    def pulse(theta):
+        return 0.5 * np.exp(-0.5 * ((np.mod(theta, np.pi) - 2.0) / np.radians(1.8)) ** 2)
+
+    fit, recording, nuisances = fitted(study, pulse, turns=170, rate=200)
+    assert fit.problem.rows.are_averages
+    assert strong_ripple([recording], fit, nuisances) is None
+
+
+PULSE = [(order, np.exp(-0.5 * (order * np.radians(1.8)) ** 2)) for order in range(26, 50, 2)]
+SIDES = [(162 + i, 0.9 ** abs(i)) for i in range(-6, 6)]
+ENCODER = [(32.0 * i, 1.0 / i) for i in range(1, 5)]
+
+
+@pytest.mark.parametrize(("lines", "expected"), [(PULSE, True), (SIDES, False), (ENCODER, False)])
+def test_a_pulse_has_many_lines_wide_apart(lines, expected):
+    """Of a pulse every second order from the edge on, a mesh with its neighbours, an encoder with its multiples. Fault
+    caught: either condition left out.
+    """
+    orders, amplitudes = np.transpose(lines)
+    assert is_part_of_a_pulse(list(orders), amplitudes, DEFAULT.high_order) is expected
 
 
 @pytest.mark.parametrize(("lost", "said"), [((False, False), True), ((True, False), False), ((False, True), False)])

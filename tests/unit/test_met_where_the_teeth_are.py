@@ -16,6 +16,7 @@ from hdopt.diagnosis.inference.noise import Noise
 from hdopt.drive.errors import DriveErrors
 from hdopt.effects import EFFECTS
 from hdopt.effects.local_tooth_defect import Seat
+from hdopt.effects.met import Pulse, Spline
 from hdopt.effects.sines import sine_columns, sine_sum
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.recordings.rows import Rows
@@ -265,3 +266,35 @@ def test_which_end_of_the_wave_generator_is_which_leaves_no_trace(name):
         one = ExtendedModel(STUDY.drive, ERRORS, (here,), geometry=geometry)
         other = ExtendedModel(STUDY.drive, DriveErrors(**turned), (there,), geometry=geometry)
         assert other.waveform(THETA) == pytest.approx(one.waveform(THETA), abs=1e-9)
+
+
+@pytest.mark.parametrize("row", [0.0, 0.02, 0.09])
+def test_a_pulse_in_means_of_neighbours_is_its_mean(row):
+    """Means over a row, against the mean of the Gaussian at 2,000 places in it, and their slope against differences.
+    Fault caught: the pulse taken at the middle of a row that is wider than it.
+    """
+    sigma, centre = 0.03, 2.0
+    angle = np.linspace(1.8, 2.2, 41) + 2 * np.pi * np.arange(41)
+    places = row * (np.arange(2000) + 0.5) / 2000 - row / 2
+    gaussian = np.exp(-0.5 * ((np.linspace(1.8, 2.2, 41)[:, None] + places - centre) / sigma) ** 2)
+    pulse = Pulse(Spline.CIRCULAR, centre, sigma, row)
+    # The midpoint rule is off by (row/2000)^2 f''/24 with f'' at most 1/sigma^2: 1e-7 at the widest.
+    np.testing.assert_allclose(pulse.columns(angle, 0)[:, 0], gaussian.mean(1), atol=1e-7)
+    value, slope = pulse.added(angle, 0, np.array([0.004]))
+    np.testing.assert_allclose(value, 0.004 * gaussian.mean(1), atol=1e-9)
+    step = 1e-5
+    sides = [pulse.added(angle + side, 0, np.array([0.004]))[0] for side in (-step, step)]
+    # Third derivative at most 3 * 0.004/sigma^3, by step^2/6.
+    np.testing.assert_allclose(slope, (sides[1] - sides[0]) / (2 * step), atol=1e-8)
+
+
+def test_rows_that_are_means_are_wide_for_a_pulse():
+    """Fault caught: terms of averaged rows made as if each were a sample."""
+    rows = Operation().conditions(GEAR.ratio, np.linspace(0.0, 40.0, 401), 1.0, 2 * np.pi * 80)
+    shape = {"centre": 1.0, "width_deg": 2.0, "on": Seat.CIRCULAR_SPLINE}
+    effect = EFFECTS["local_tooth_defect"]
+    assert effect.term(rows, shape).met.row == 0.0
+    assert effect.term(replace(rows, averaged=4.0), shape).met.row == pytest.approx(0.1)
+    once = {**shape, "on": Seat.CIRCULAR_SPLINE_ONCE}
+    narrow, wide = (effect.term(r, once).columns.max() for r in (rows, replace(rows, averaged=4.0)))
+    assert wide < 0.8 * narrow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -119,7 +120,8 @@ def subtracted_terms(base: Fit, power: float, terms: Sequence[Term]) -> Subtract
 
 def strong_ripple(recordings: Sequence[Recording], base: Fit, nuisances: Nuisances) -> Array | None:
     """The strongest lines of orders beyond the averaged rows in what `base` and `nuisances` leave of `recordings`, as
-    they add to the error of the rows as recorded, (n,); None where they are weak, or where no rows were averaged.
+    they add to the error of the rows as recorded, (n,); None where they are weak or those of a pulse, or where no rows
+    were averaged.
     """
     averaged, settings = base.problem.rows, base.problem.settings.high_order
     if averaged.locked or not averaged.are_averages:
@@ -131,7 +133,20 @@ def strong_ripple(recordings: Sequence[Recording], base: Fit, nuisances: Nuisanc
     if not lines:
         return None
     ripple = waves_of(problem.rows, probe.residual, lines)
-    return ripple if np.var(ripple) > settings.strong * np.var(probe.residual - ripple) else None
+    if np.var(ripple) <= settings.strong * np.var(probe.residual - ripple):
+        return None
+    return None if is_part_of_a_pulse(lines, probe.spectrum(np.array(lines)), settings) else ripple
+
+
+def is_part_of_a_pulse(orders: Sequence[float], amplitudes: Array, settings: HighOrderSettings) -> bool:
+    """Whether lines at `orders` (k,) of `amplitudes` (k,) are those of a pulse once a turn, whose other lines the
+    averaged rows hold: many about as large as each other, wide apart. A ripple of teeth or of an encoder is a line with
+    a few multiples, or with neighbours by which it is modulated.
+    """
+    power = amplitudes**2 / np.sum(amplitudes**2)
+    middle = float(power @ np.array(orders))
+    spread = math.sqrt(float(power @ (np.array(orders) - middle) ** 2))
+    return bool(1 / np.sum(power**2) > settings.pulse_lines and spread > settings.pulse_spread * middle)
 
 
 def subtract(recordings: Sequence[Recording], total: Array) -> list[Recording]:
