@@ -19,7 +19,7 @@ from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut, hidden_samples
 from hdopt.diagnosis.orientation import turn_round
 from hdopt.diagnosis.search.high_order import subtract
 from hdopt.diagnosis.settings import DiagnosisSettings
-from hdopt.diagnosis.state import State
+from hdopt.diagnosis.state import Guess, State
 from hdopt.effects.term import Term
 from hdopt.recordings.recording import Recording
 from hdopt.recordings.rows import Rows, gather, neighbours_for
@@ -29,9 +29,9 @@ Pipeline = Callable[[Sequence[Recording]], State]
 
 def nested_held_out(
     recordings: Sequence[Recording], pipeline: Pipeline, seed: int, settings: DiagnosisSettings
-) -> NestedHeldOut | None:
+) -> tuple[NestedHeldOut, tuple[Guess, ...]] | None:
     """The error of the last state of `pipeline`, run on some turns of the `recordings`, on the turns that were hidden
-    from it; None where too few can be hidden. Turns are drawn with `seed`, by the `settings`.
+    from it, and what it found; None where too few can be hidden. Turns are drawn with `seed`, by the `settings`.
     """
     hidden = hidden_samples(recordings, np.random.default_rng(seed), settings.held_out)
     if hidden is None:
@@ -44,7 +44,7 @@ def nested_held_out(
     errors = [_rms(refitted(fit, rows, share > 0, state).residual[share == 1]) for fit in (base, best)]
     named = {name for found in (state.selection, state.high) if found is not None for name in found.best.effects}
     turns = len(np.unique(rows.block[share == 1]))
-    return NestedHeldOut(errors[0], errors[1], turns, tuple(sorted(named)))
+    return NestedHeldOut(errors[0], errors[1], turns, tuple(sorted(named))), state.as_guesses()
 
 
 def as_seen(recordings: Sequence[Recording], hidden: Sequence[Mask], state: State) -> tuple[Recording, ...]:

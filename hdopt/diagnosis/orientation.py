@@ -59,17 +59,19 @@ def turn_round(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     )
 
 
-def preference(as_counted: Sequence[Fit], turned: Sequence[Fit]) -> float:
-    """How much better the base explains the recording `as_counted` than `turned` round: the sum, over fits made alike
-    of both (alone, beside smooth columns), of log(power left turned / power left as counted). Negative where turned
-    round is better.
+def preference(as_counted: Fit, turned: Fit) -> float:
+    """How much better the base explains the recording `as_counted` than `turned` round, of two fits made alike: log
+    (power left turned / power left as counted). Negative where turned round is better.
     """
-    return sum(math.log(two.objective / one.objective) for one, two in zip(as_counted, turned, strict=True))
+    return math.log(turned.objective / as_counted.objective)
 
 
-def is_decisive(preferred: float, settings: OrientationSettings) -> bool:
-    """Whether a preference (`preferred`) is large enough by the `settings`."""
-    return abs(preferred) > settings.decisive
+def is_decisive(preferred: Sequence[float], settings: OrientationSettings) -> bool:
+    """Whether the base decides by its preferences (`preferred`), alone and where asked beside smooth columns: the first
+    is large enough by the `settings`, and the other does not speak against it. Waves of the teeth, or lobes, that are
+    as large as the base's own bend it towards either way, and beside smooth columns, which do not hold them, too.
+    """
+    return abs(preferred[0]) > settings.decisive and all(one * preferred[0] > 0 for one in preferred)
 
 
 def as_counted(parameters: dict[str, Parameter], term: Term) -> dict[str, Parameter]:

@@ -10,7 +10,7 @@ from hdopt.diagnosis.inference.encoder_steps import without_output_steps
 from hdopt.diagnosis.nested import nested_held_out
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
 from hdopt.diagnosis.stages import STAGES, STAGES_OF_A_PART, begin, smooth_model
-from hdopt.diagnosis.state import State
+from hdopt.diagnosis.state import Guess, State
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import Recording
 
@@ -25,11 +25,13 @@ def gather_evidence(
     """Run all stages on `recordings` with the `base` model (None for a gear without one); random drives are drawn
     with `seed`, and `nuisance` names what is free beside the model (`inference.nuisance`). `settings` are the
     thresholds. Steps of a coarse output encoder are taken out first. All else is done once more on a part of the turns,
-    and looked at on the others.
+    and looked at on the others; what was found there is tried on all of them.
     """
 
-    def run(some: Sequence[Recording], stages: Sequence[Callable[[State], State]]) -> State:
-        state = begin(some, base, seed, settings, nuisance)
+    def run(
+        some: Sequence[Recording], stages: Sequence[Callable[[State], State]], guesses: tuple[Guess, ...] = ()
+    ) -> State:
+        state = replace(begin(some, base, seed, settings, nuisance), guesses=guesses)
         for stage in stages:
             state = stage(state)
         return state
@@ -39,4 +41,5 @@ def gather_evidence(
     )
     # First, so that what it worked with is gone before the diagnosis itself is in memory.
     nested = nested_held_out(recordings, lambda some: run(some, STAGES_OF_A_PART), seed, settings)
-    return replace(assess(run(recordings, STAGES)), nested=nested)
+    held_out, guesses = nested or (None, ())
+    return replace(assess(run(recordings, STAGES, guesses)), nested=held_out)

@@ -20,10 +20,10 @@ from hdopt.diagnosis.inference.settled_shapes import settled
 from hdopt.diagnosis.orientation import Orientation, is_decisive, preference, turn_round
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.high_order import find_ripple, strong_ripple, subtract, subtracted_terms
-from hdopt.diagnosis.search.search_state import SearchPlan
+from hdopt.diagnosis.search.search_state import SearchPlan, SearchState, names_of
 from hdopt.diagnosis.search.subset_search import Selection, first_look, select
 from hdopt.diagnosis.settings import DiagnosisSettings
-from hdopt.diagnosis.state import State
+from hdopt.diagnosis.state import Guess, State
 from hdopt.effects.sines import sine_columns
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import Recording
@@ -154,16 +154,16 @@ def choose_orientation(state: State) -> State:
     return oriented(state, better_way)
 
 
-def choose_orientation_by_base(state: State) -> State:
-    """As `choose_orientation`, but where neither base explains clearly more, the one that explains more at all: a
-    search saved. `state` is where the work stands.
+def choose_orientation_at_first_look(state: State) -> State:
+    """As `choose_orientation`, but where neither base explains clearly more, the one in which a first look at the
+    effects explains more: a search saved. `state` is where the work stands.
     """
-    return oriented(state, likelier_way)
+    return oriented(state, likelier_way_with_effects)
 
 
-def oriented(state: State, undecided: Callable[[State, State, float], State]) -> State:
+def oriented(state: State, undecided: Callable[[State, State], State]) -> State:
     """`state` on its recordings as counted or turned round, by what the base explains. `undecided` chooses where that
-    is not clear: of the state, its turned counterpart, and how far the base prefers the first (`preference`).
+    is not clear: of the state and its turned counterpart.
     """
     problem = state.problem
     output = -1 if state.recordings[0].output_reversed else 1
@@ -172,22 +172,16 @@ def oriented(state: State, undecided: Callable[[State, State, float], State]) ->
     rng, settings = state.draws(), state.settings
     turned = begin_turned(state)
     turned = replace(turned, base=fit_base(turned.problem.with_noise(problem.noise), rng, near=turned.base))
-    preferred = preference([state.base], [turned.base])
-    if not abs(preferred) > settings.orientation.base_alone and state.clean is not None:
+    preferred = [preference(state.base, turned.base)]
+    if not abs(preferred[0]) > settings.orientation.base_alone and state.clean is not None:
         clean = fit_clean_base(turned.problem, rng)
         if clean is not None:
-            ways = ([state.base, beside_smooth(state.clean)], [turned.base, beside_smooth(clean)])
-            preferred = preference(*ways)
+            preferred.append(preference(beside_smooth(state.clean), beside_smooth(clean)))
     turned = replace(turned, orientation=Orientation(-1, -output, "data"))
     state = replace(state, orientation=Orientation(1, output, "data"))
     if is_decisive(preferred, settings.orientation):
-        return likelier_way(state, turned, preferred)
-    return undecided(state, turned, preferred)
-
-
-def likelier_way(state: State, turned: State, preferred: float) -> State:
-    """`state` where its base is `preferred` at all, else its `turned` counterpart."""
-    return state if preferred > 0 else fit_base_in_noise(turned)
+        return state if preferred[0] > 0 else fit_base_in_noise(turned)
+    return undecided(state, turned)
 
 
 def begin_turned(state: State) -> State:
@@ -233,25 +227,45 @@ def smooth_model(
     return np.asarray(gather(recordings, neighbours_for(recordings)).error - residual)
 
 
-def better_way(state: State, turned: State, preferred: float) -> State:
-    """Of `state` and its `turned` counterpart the one whose effects and base explain more together, whatever the base
-    alone `preferred`; `state`, by convention, where that is a tie. A first look decides where it is clear enough.
+def better_way(state: State, turned: State) -> State:
+    """Of `state` and its `turned` counterpart the one whose effects and base explain more together; `state`, by
+    convention, where that is a tie. A first look decides where it is clear enough.
     """
     other, settings = fit_base_in_noise(turned), state.settings.orientation
-    ways = []
-    for way in (state, other):
-        problem = way.problem.with_noise(state.problem.noise)
-        base = refine(on_problem(way.base, problem), way.settings.fit.known_iterations)
-        ways.append(replace(way, base=base, inflation=state.inflation))
-    looks = [first_look(way.base, way.inflation, way.draws(), plan_of(way)) - unexplained(way) for way in ways]
-    if abs(looks[0] - looks[1]) > settings.first_look:
-        return state if looks[0] > looks[1] else other
+    ways = in_one_noise(state, other)
+    gap = gap_at_first_look(ways)
+    if abs(gap) > settings.first_look:
+        return state if gap > 0 else other
     ways = [search_effects(way) for way in ways]
     scores = [way.selection.best.log_bayes_factor - unexplained(way) for way in ways]
     if abs(scores[0] - scores[1]) < settings.tie:
         return replace(ways[0], orientation=replace(state.orientation, decided_by="convention"))
     # Turned round, the noise is another, and the search goes on in it from what was found.
     return ways[0] if scores[0] > scores[1] else replace(other, selection=ways[1].selection)
+
+
+def likelier_way_with_effects(state: State, turned: State) -> State:
+    """Of `state` and its `turned` counterpart the one in which a first look at the effects explains more."""
+    other = fit_base_in_noise(turned)
+    return state if gap_at_first_look(in_one_noise(state, other)) >= 0 else other
+
+
+def in_one_noise(state: State, other: State) -> list[State]:
+    """`state` and `other`, its counterpart turned round, both in the noise of the first."""
+    ways = []
+    for way in (state, other):
+        problem = way.problem.with_noise(state.problem.noise)
+        base = refine(on_problem(way.base, problem), way.settings.fit.known_iterations)
+        ways.append(replace(way, base=base, inflation=state.inflation))
+    return ways
+
+
+def gap_at_first_look(ways: Sequence[State]) -> float:
+    """By how much log evidence the first of two `ways` explains more than the second, its base and the leader of a
+    first look at the effects together.
+    """
+    first, second = (first_look(way.base, way.inflation, way.draws(), plan_of(way)) - unexplained(way) for way in ways)
+    return first - second
 
 
 def unexplained(state: State) -> float:
@@ -273,6 +287,36 @@ def search_effects(state: State) -> State:
         return state
     rng = state.draws()
     return replace(state.found(select(state.base, state.inflation, rng, plan_of(state))), rng=rng, searched=True)
+
+
+def try_guesses(state: State) -> State:
+    """What was found on other rows of the recordings, from where it stood there: drives have many minima, and what is
+    better here was missed by the search. `state` is where the work stands.
+    """
+    known = {names_of(fit): fit for fit in leaders_on(state.selection, state.problem)}
+    look = SearchState(state.base, plan_of(state), state.inflation, state.draws())
+    least = state.selection.best.log_bayes_factor + state.settings.search.better
+    better = False
+    for guess in state.guesses:
+        if guess.turned != state.orientation.turned:
+            continue
+        fit = refine(guessed(guess, state.problem), state.settings.fit.known_iterations)
+        if look.log_bayes_factor(fit) > least:
+            known[names_of(fit)], better = fit, True
+    if not better:
+        return state
+    rng = state.draws()
+    plan = SearchPlan(skip=state.ruled_out, known=tuple(known.values()))
+    return replace(state.found(select(state.base, state.inflation, rng, plan)), rng=rng)
+
+
+def guessed(guess: Guess, problem: FitProblem) -> Fit:
+    """The model of `guess` on the rows of `problem`, with the offsets that these want."""
+    bare = evaluate(problem, guess.errors, np.zeros(problem.nuisance.shape[1]), (), ())
+    terms = [problem.explanations[effect].term(problem.rows, shape, bare.motion) for effect, shape in guess.terms]
+    fit = evaluate(problem, guess.errors, bare.offsets, terms, guess.coefficients)
+    offsets = bare.offsets + np.linalg.lstsq(problem.nuisance, fit.residual, rcond=None)[0]
+    return evaluate(problem, guess.errors, offsets, terms, guess.coefficients)
 
 
 def measure_noise_again(state: State) -> State:
@@ -363,6 +407,7 @@ STAGES: tuple[Callable[[State], State], ...] = (
     fit_base_in_noise,
     choose_orientation,
     search_effects,
+    try_guesses,
     measure_noise_again,
     search_high_orders,
     search_without_ripple,
@@ -370,7 +415,7 @@ STAGES: tuple[Callable[[State], State], ...] = (
 )
 """A diagnosis, in the order of its work, after `begin`; `checks.assessment.assess` takes the last state."""
 
-STAGES_OF_A_PART = tuple(choose_orientation_by_base if stage is choose_orientation else stage for stage in STAGES)
+STAGES_OF_A_PART = tuple(choose_orientation_at_first_look if stage is choose_orientation else stage for stage in STAGES)
 """The same on a part of the turns, whose error on the others is asked for and not its verdict: no second search where
 the base leaves the orientation open.
 """

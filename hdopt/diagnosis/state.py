@@ -13,7 +13,20 @@ from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.orientation import AS_COUNTED, Orientation
 from hdopt.diagnosis.search.subset_search import Selection
 from hdopt.diagnosis.settings import DiagnosisSettings
+from hdopt.effects.term import Shape
 from hdopt.recordings.read import Recording
+
+
+@dataclass(frozen=True)
+class Guess:
+    """What a search on other rows of the same recordings found, without its rows: `errors` of the base (12,) mm,
+    `terms` as (effect id, shape) with their `coefficients`, and whether the recordings were `turned` round there.
+    """
+
+    errors: Array
+    terms: tuple[tuple[str, Shape], ...]
+    coefficients: tuple[Array, ...]
+    turned: bool
 
 
 @dataclass(frozen=True)
@@ -27,7 +40,8 @@ class State:
     (n,) arcmin (`ripple`, None for nothing). `inflation` says how much rougher the noise is than its model. `rng` is
     the stream of random drives: a stage draws from a copy (`draws`) and hands that on, so that it can be run again.
     `orientation` says which way the angles were counted: `recordings` and everything after stand as counted there.
-    `searched`: whether the `selection` is that of a search in the noise that stands here.
+    `searched`: whether the `selection` is that of a search in the noise that stands here. `guesses` are what was found
+    elsewhere and is tried here too.
     """
 
     recordings: tuple[Recording, ...]
@@ -42,6 +56,7 @@ class State:
     rng: np.random.Generator
     orientation: Orientation = AS_COUNTED
     searched: bool = False
+    guesses: tuple[Guess, ...] = ()
 
     @property
     def problem(self) -> FitProblem:
@@ -56,6 +71,18 @@ class State:
     def draws(self) -> np.random.Generator:
         """A copy of the random stream."""
         return copy.deepcopy(self.rng)
+
+    def as_guesses(self) -> tuple[Guess, ...]:
+        """What the search found, the best first, to be tried on other rows of these recordings."""
+        return tuple(
+            Guess(
+                fit.errors,
+                tuple((term.effect, term.shape) for term in fit.terms),
+                fit.coefficients,
+                self.orientation.turned,
+            )
+            for fit in self.selection.leaders
+        )
 
     def found(self, selection: Selection) -> State:
         """The state with the `selection` of a search, whose base may be a better one."""

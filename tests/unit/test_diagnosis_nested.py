@@ -104,7 +104,7 @@ def test_what_the_hidden_turns_hold_is_never_learnt():
         states.append(base_alone(recordings))
         return states[-1]
 
-    plain, other = (nested_held_out([one], seen, 1, DEFAULT) for one in (recording, spoilt))
+    plain, other = (nested_held_out([one], seen, 1, DEFAULT)[0] for one in (recording, spoilt))
     np.testing.assert_array_equal(states[0].base.prediction, states[1].base.prediction)
     # All of the hidden rows are 5 arcmin off now, and no other is: their mean square is the old one plus 25 and twice 5
     # times the old mean error, 0.02/sqrt(384).
@@ -128,7 +128,7 @@ def test_a_choice_that_overfits_shows_in_the_nested_figure_alone():
         return replace(state, selection=replace(state.selection, candidates=(Candidate(fit, 1.0, 1.0),)))
 
     recording = record(noise(7))
-    nested = nested_held_out([recording], overfitting, 1, DEFAULT)
+    nested, _ = nested_held_out([recording], overfitting, 1, DEFAULT)
     state = overfitting([recording])
     folds = turn_folds(state.base, np.random.default_rng(1))
     chosen_on_all, truth = (held_out(fit, None, folds).rms for fit in (state.selection.best.fit, state.base))

@@ -140,8 +140,8 @@ def strong_ripple(recordings: Sequence[Recording], base: Fit, nuisances: Nuisanc
 
 def is_part_of_a_pulse(orders: Sequence[float], amplitudes: Array, settings: HighOrderSettings) -> bool:
     """Whether lines at `orders` (k,) of `amplitudes` (k,) are those of a pulse once a turn, whose other lines the
-    averaged rows hold: many about as large as each other, wide apart. A ripple of teeth or of an encoder is a line with
-    a few multiples, or with neighbours by which it is modulated.
+    averaged rows hold: many about as large as each other, wide apart, as the `settings` say. A ripple of teeth or of an
+    encoder is a line with a few multiples, or with neighbours by which it is modulated.
     """
     power = amplitudes**2 / np.sum(amplitudes**2)
     middle = float(power @ np.array(orders))
