@@ -72,7 +72,8 @@ def _lines(found: Compensated, output: Path) -> Iterator[str]:
     for way, left in found.both.items():
         yield f"  {way}: {left:.4g} arcmin left"
     if found.found.crossing.deg:
-        yield f"  after a reversal the return error crosses over about {found.found.crossing.deg:.2g} deg of output"
+        way = "play crosses" if found.found.crossing.straight else "the return error crosses"
+        yield f"  after a reversal {way} over about {found.found.crossing.deg:.2g} deg of output"
     if len(found.recordings) > 1:
         for part in found.recordings:
             speed = "" if part.speed_rpm is None else f" at {part.speed_rpm:.4g} r/min"

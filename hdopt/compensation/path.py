@@ -1,9 +1,9 @@
 """The return error's path after a reversal: which side the drive leans to, in -1..1, over the output's travel.
 
 Friction lets the error cross from one side to the other over a travel of its own (P. Dahl, "A solid friction model",
-Aerospace Corp. TOR-158, 1968, exponent 1); play crosses at once. A controller keeps the state: it moves towards the
-direction of motion by exp(-travel/crossing), from wherever it stood. Where it stood when a recording began, the
-recording decides: on the side of its motion, on the other, or relaxed between both.
+Aerospace Corp. TOR-158, 1968, exponent 1); play crosses in a straight line, over the travel that it is wide. A
+controller keeps the state: it moves towards the direction of motion from wherever it stood. Where it stood when a
+recording began, the recording decides: on the side of its motion, on the other, or relaxed between both.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from hdopt.effects.conditions import Conditions
 TRIED = 12
 """Crossings tried, evenly spaced in their logarithm."""
 STARTS = (1.0, 0.0, -1.0)
+LOW_ORDERS = 6
 SHORTEST_ROWS = 3.0
 """Shortest crossing that is tried, in rows: one that is over sooner cannot be told from one at once."""
 LONGEST_SHARE = 0.5
@@ -29,9 +30,12 @@ LONGEST_SHARE = 0.5
 Paths = Mapping[Crossing, Array]
 
 
-def paths_of(conditions: Conditions) -> Paths:
+def paths_of(conditions: Conditions, half_arcmin: float = 0.0) -> Paths:
     """Crossing -> path (n,) in -1..1 along the `conditions`, for every crossing worth trying; `AT_ONCE` is the
-    direction itself. {} where nothing reverses."""
+    direction itself. {} where nothing reverses.
+
+    `half_arcmin` is half the return error, about: play is as wide.
+    """
     if not conditions.reverses:
         return {}
     steps = np.abs(np.diff(conditions.travel))
@@ -39,7 +43,19 @@ def paths_of(conditions: Conditions) -> Paths:
     most = LONGEST_SHARE * float(conditions.travel.max())
     tried = np.geomspace(least, most, TRIED) if most > least else ()
     each = [Crossing(float(deg), start) for deg, start in itertools.product(tried, STARTS)]
+    if half_arcmin:
+        each += [Crossing(abs(half_arcmin) / 30, start, True) for start in STARTS]
     return {crossing: path_of(conditions, crossing) for crossing in (AT_ONCE, *each)}
+
+
+def half_about(conditions: Conditions, error: Array) -> float:
+    """Half the return error (arcmin) in the `error` (n,) along the `conditions`, about: beside a zero of each recording
+    and the lowest orders of the input. 0 where nothing reverses."""
+    if not conditions.reverses:
+        return 0.0
+    phases = np.outer(conditions.theta, np.arange(1, LOW_ORDERS + 1))
+    zeros = (conditions.record[:, None] == np.arange(conditions.records)).astype(float)
+    return half_return(error, np.column_stack([zeros, np.cos(phases), np.sin(phases)]), conditions.direction)
 
 
 def path_of(conditions: Conditions, crossing: Crossing) -> Array:
@@ -53,7 +69,11 @@ def path_of(conditions: Conditions, crossing: Crossing) -> Array:
     for rows in passes_of(conditions):
         side = float(conditions.direction[rows.start])
         before = crossing.start * side if conditions.first[rows.start] else last
-        path[rows] = side + (before - side) * np.exp(-conditions.travel[rows] / crossing.deg)
+        travel = conditions.travel[rows] / crossing.deg
+        if crossing.straight:
+            path[rows] = np.clip(before + 2 * side * travel, -1.0, 1.0)
+        else:
+            path[rows] = side + (before - side) * np.exp(-travel)
         last = float(path[rows.stop - 1])
     return path
 

@@ -27,10 +27,12 @@ Spectrum: TypeAlias = tuple[Index, Index, NDArray[np.complex128]]
 
 class Crossing(NamedTuple):
     """Output's travel `deg` over which the side of the return error crosses after a reversal (0: at once), and where it
-    stood at the `start` of a recording: 1 on the side of the motion, -1 on the other, 0 between."""
+    stood at the `start` of a recording: 1 on the side of the motion, -1 on the other, 0 between. `straight` for play,
+    which crosses in a straight line and is over after `deg`; friction goes as exp(-travel/deg)."""
 
     deg: float = 0.0
     start: float = 1.0
+    straight: bool = False
 
 
 AT_ONCE = Crossing()

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any  # Any: values of JSON
 
 from hdopt.compensation.mesh import Beat
-from hdopt.compensation.surface import Harmonics, Surface
+from hdopt.compensation.surface import Crossing, Harmonics, Surface
 from hdopt.compensation.zones import Zones
 
 Found = Harmonics | Zones | Surface | Beat
@@ -25,6 +25,7 @@ def _csv(found: Found, facts: Mapping[str, Any]) -> str:
     head = [f"# {key}: {str(value).replace(chr(10), ' ')}" for key, value in facts.items()]
     head.append(f"# half_return_arcmin: {found.back!r}")
     head.append(f"# return_crossing_output_deg: {found.crossing.deg!r}")
+    head.append(f"# return_crosses: {crosses(found)}")
     head.append(f"# return_path_at_start: {found.crossing.start!r}")
     if isinstance(found, Zones):
         head.append(f"# error_arcmin: sum 0, with the half return, + the {_which(found)} of sums 1 and 2")
@@ -63,6 +64,7 @@ def _terms(found: Harmonics | Zones) -> list[tuple[int, int, float, float, int]]
 def _json(found: Found, facts: Mapping[str, Any]) -> str:
     content: dict[str, Any] = {"schema": 1, **facts, "half_return_arcmin": found.back}
     content["return_crossing_output_deg"] = found.crossing.deg
+    content["return_crosses"] = crosses(found)
     content["return_path_at_start"] = found.crossing.start
     if isinstance(found, Surface | Beat):
         content["table"] = "input angle by output angle" if isinstance(found, Surface) else "input angle by input turn"
@@ -90,7 +92,7 @@ double hdopt_path(double path, double output_moved_rad)
     if (output_moved_rad == 0)
         return path;
     double side = output_moved_rad > 0 ? 1 : -1;
-    return side + (path - side) * {remains};
+    {moves}
 }}
 """
 
@@ -161,10 +163,9 @@ double hdopt_error_arcmin(double input_rad, double output_rad, double path)
 
 def _c(found: Found, facts: Mapping[str, Any]) -> str:
     said = "\n".join(f"   {key}: {value}" for key, value in facts.items()).replace("*/", "* /")
-    # Crossing at once leaves nothing of the old side, however small the move.
-    turn = math.radians(found.crossing.deg)
-    remains = f"exp(-fabs(output_moved_rad) / {turn!r})" if turn > 0 else "0"
-    head = _HEAD.format(facts=said, crossing=found.crossing.deg, start=found.crossing.start, remains=remains)
+    head = _HEAD.format(
+        facts=said, crossing=found.crossing.deg, start=found.crossing.start, moves=_moves(found.crossing)
+    )
     if not isinstance(found, Surface | Beat):
         columns = list(zip(*_terms(found), strict=True)) or [()] * 5
         numbers = {name: _list(column) for name, column in zip(("k", "j", "cos", "sin", "sum"), columns, strict=True)}
@@ -174,6 +175,22 @@ def _c(found: Found, facts: Mapping[str, Any]) -> str:
     inputs, outputs = found.values.shape
     form = _C_TABLE if isinstance(found, Surface) else _C_BEAT
     return head + form.format(inputs=inputs, outputs=outputs, rows=rows, back=repr(found.back))
+
+
+def _moves(crossing: Crossing) -> str:
+    """What the C code returns as the path after a move."""
+    turn = math.radians(crossing.deg)
+    if crossing.straight and turn > 0:
+        return f"path += 2 * output_moved_rad / {turn!r};\n    return side * path > 1 ? side : path;"
+    # Crossing at once leaves nothing of the old side, however small the move.
+    return f"return side + (path - side) * {f'exp(-fabs(output_moved_rad) / {turn!r})' if turn > 0 else '0'};"
+
+
+def crosses(found: Found) -> str:
+    """How the return error of `found` crosses after a reversal, in words."""
+    if found.crossing.deg == 0:
+        return "at once"
+    return "in a straight line" if found.crossing.straight else "exponentially"
 
 
 def _list(values: Sequence[float]) -> str:

@@ -12,8 +12,8 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.compensation.expected import NORMAL, peak_to_peak_again
-from hdopt.compensation.path import paths_of
-from hdopt.compensation.writers import FORMATS, Found, homing_arcmin, written
+from hdopt.compensation.path import half_about, paths_of
+from hdopt.compensation.writers import FORMATS, Found, crosses, homing_arcmin, written
 from hdopt.compensation.zones import MOST_TERMS, SMALL
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
@@ -116,6 +116,7 @@ class Compensated(ShownAsTable):
             "return": {
                 "half_arcmin": self.found.back,
                 "crossing_output_deg": self.found.crossing.deg,
+                "crosses": crosses(self.found),
                 "path_at_start": self.found.crossing.start,
             },
             "recordings": [vars(part) for part in self.recordings],
@@ -212,7 +213,7 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
     rows = gather(moving, neighbours_of(moving))
     whole = None if drive is None else model_of(rows, drive, seed)
     fold, held_out = folds(rows)
-    paths = paths_of(rows)
+    paths = paths_of(rows, half_about(rows, rows.error))
     trials = tried(
         (rows, fold),
         terms,

@@ -126,7 +126,10 @@ def candidates(rows: Rows, fit: WaveformFit | None, terms: int | None, paths: Pa
     pairs = dictionary(rows.span_turns / rows.ratio)
     most = terms or MOST_TERMS
     alone = pursue(angles, rows.error, zeros, paths.get(AT_ONCE), pairs, most)
-    crossing = _crossing(rows.error - alone.at(*angles), zeros, paths)
+    lefts = [rows.error - alone.at(*angles)]
+    if fit is not None:
+        lefts.append(rows.error - fit.predict(rows.theta))
+    crossing = _crossing(min(lefts, key=lambda left: float(np.std(left))), zeros, paths)
     path = paths.get(crossing)
     if crossing != AT_ONCE:
         alone = replace(pursue(angles, rows.error, zeros, path, pairs, most), crossing=crossing)

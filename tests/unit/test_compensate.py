@@ -13,7 +13,7 @@ import pytest
 
 from hdopt.cli import main
 from hdopt.cli.compensate import Terms, command
-from hdopt.compensation.path import crossing_of, path_of, paths_of
+from hdopt.compensation.path import crossing_of, half_about, path_of, paths_of
 from hdopt.compensation.surface import AT_ONCE, Crossing, Harmonics, surface_of
 from hdopt.compensation.writers import written
 from hdopt.drive.errors import DriveErrors
@@ -200,6 +200,25 @@ def test_where_the_path_stood_at_the_start_is_found(start):
     assert np.abs(left[begin].mean()) < 0.02
 
 
+@pytest.mark.parametrize("start", [1.0, 0.0])
+def test_play_crosses_over_the_travel_that_it_is_wide(start):
+    """6 arcmin of play over rows 0.5 arcmin of output apart, followed by hand: at once would be off by up to all of
+    it for a dozen rows after each reversal."""
+    ends = np.cumsum([0, 20, -18, 25, -27]) * TURN
+    theta = np.concatenate([np.arange(a, b, np.sign(b - a) * TURN / 540) for a, b in itertools.pairwise(ends)])
+    reach, lag = np.degrees(theta) * 60 / RATIO, [start * 3.0]
+    for moved in np.diff(reach):
+        lag.append(min(max(lag[-1] + moved, -3.0), 3.0))
+    error = np.array(lag) + 0.3 * np.sin(2 * theta) + np.random.default_rng(1).normal(0, NOISE, len(theta))
+    frame = {"input_angle_deg": np.degrees(theta), "output_angle_deg": np.degrees(theta) / RATIO - error / 60}
+    rows = gather([recording_from_table(pd.DataFrame(frame), RATIO)])
+    paths, one = paths_of(rows, half_about(rows, rows.error)), np.ones((len(rows), 1))
+    found = crossing_of(rows.error - 0.3 * np.sin(2 * theta), one, paths, 1.0)
+    assert found.straight and found.start == start
+    assert found.deg == pytest.approx(0.1, rel=0.05)
+    assert np.abs(3.0 * path_of(rows, found) - lag).max() < 0.6
+
+
 def test_play_crosses_at_once():
     """Would catch a crossing that is named where there is none."""
     made = compensate([swinging(seed, 0.0) for seed in (1, 2)])
@@ -218,12 +237,12 @@ def test_noise_has_no_crossing():
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-@pytest.mark.parametrize("crossing_deg", [0.0, 20.0])
-def test_the_controllers_path_is_ours(tmp_path, crossing_deg):
+@pytest.mark.parametrize("crossing", [Crossing(), Crossing(20.0), Crossing(30.0, 1.0, True)])
+def test_the_controllers_path_is_ours(tmp_path, crossing):
     """The state that the C code keeps, move by move both ways, is the path along a recording: to 0.02, as rows at a
     turning point are means of both ways and their travel is so far off."""
     rows = gather([swinging(5, 20.0)])
-    found = Harmonics(np.array([2]), np.array([0]), np.array([0.3]), np.array([0.0]), 0.1, Crossing(crossing_deg))
+    found = Harmonics(np.array([2]), np.array([0]), np.array([0.3]), np.array([0.0]), 0.1, crossing)
     (tmp_path / "c.c").write_text(written(found, "c", {}))
     subprocess.run(["cc", "-shared", "-fPIC", "-o", "c.so", "c.c", "-lm"], cwd=tmp_path, check=True)
     step = ctypes.CDLL(str(tmp_path / "c.so")).hdopt_path
@@ -233,7 +252,7 @@ def test_the_controllers_path_is_ours(tmp_path, crossing_deg):
     for moved in np.diff(reach):
         state = step(state, moved)
         kept.append(state)
-    ours = path_of(rows, Crossing(crossing_deg))
+    ours = path_of(rows, crossing)
     inside = np.r_[False, np.diff(rows.direction) == 0]  # a row at a turning point is the mean of both ways
     np.testing.assert_allclose(np.array(kept)[inside], ours[inside], atol=0.02)
 
