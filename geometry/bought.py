@@ -33,7 +33,7 @@ class Screws:
     @property
     def words(self) -> tuple[str, str, str]:
         """Name, number and material in the parts list."""
-        name = f"screw, {self.count} off, {self.engaged:.4g} mm in thread"
+        name = f"screw, {self.count} off, {round(self.engaged, 1):g} mm in thread"
         return name, f"ISO 4762 - {self.thread} × {self.length}", "steel 8.8"
 
 

@@ -73,8 +73,12 @@ CASES = {
         ("--set", "bolt_count=19"),
         r"the web between two bolt holes is 1\.9[0-9]* mm; 2 mm are needed",
     ),
-    "thin flange": (
+    "flange of little thread": (
         ("--set", "hub_flange_thickness_mm=0.5"),
+        r"M3 x 8, engages 0 mm of thread.* 3 mm are needed in steel .* give export.hub_flange_thickness_mm = 3",
+    ),
+    "thin flange": (
+        ("--set", "hub_flange_thickness_mm=0.5", "--set", "bolt_count=0"),
         r"hub: its axial width is 0\.5 mm; 2 mm are needed .* change export.hub_flange_thickness_mm",
     ),
     "countersinks meet": (("--set", "bore_chamfer_mm=4.2"), "the bore that its countersinks leave|between counters"),
