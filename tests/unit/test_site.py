@@ -215,3 +215,33 @@ def test_ratios_of_benchmarks_are_for_one_drive_and_of_the_shortest_time():
     page = renewed(f"before {START}\nold\n{END} after", run)
     assert "over the compiled kernel | 5e5 |" in page and "old" not in page
     assert page.startswith("before ") and page.endswith(" after")
+
+
+MADE_UP = ("studies/NAME.toml", "docs/gallery/example_NN_name.py", "tests/mutants/asked.json")
+"""Files on the pages that stand for others, or that a run leaves."""
+
+
+def options_of(command: str) -> set[str]:
+    params = import_module(f"hdopt.cli.{command}").command.params
+    return {option for param in params for option in (*param.opts, *param.secondary_opts)} | {"--help"}
+
+
+def codes(text: str) -> list[str]:
+    """What stands on a page as code: in backticks, in fences, and indented."""
+    fenced = [line for block in re.findall(r"```\w*\n(.*?)```", text, re.S) for line in block.split("\n")]
+    inline = re.findall(r"`([^`\n]+(?:\n[^`\n]+)?)`", re.sub(r"```.*?```", "", text, flags=re.S))
+    return [code.replace("\n", " ") for code in (*inline, *fenced, *re.findall(r"^    (\S.+)$", text, re.M))]
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"], ids=lambda page: page.name)
+def test_every_option_and_file_that_a_page_names_exists(page):
+    """Would catch an option that was renamed, one of another command, and a file that moved."""
+    every = {option for command in COMMANDS for option in options_of(command)}
+    rooms = (ROOT, DOCS, ROOT / "hdopt", ROOT / "hdopt" / "diagnosis", ROOT / "hdopt" / "report")
+    for code in codes(page.read_text(encoding="utf-8")):
+        for command, rest in re.findall(r"(?:^|[\s$/])hdopt ([a-z]+)\b([^|;]*)", code):
+            assert command in COMMANDS, code
+            assert set(re.findall(r"(?<![\w-])--[a-z0-9][\w-]*", rest)) <= options_of(command), code
+        assert set(re.findall(r"^--[a-z0-9][\w-]*", code)) <= every, code
+        for file in re.findall(r"(?<![\w/.~])((?:[\w-]+/)+[\w-]+\.(?:py|toml|md|js|json|csv|ipynb))\b", code):
+            assert file in MADE_UP or any((room / file).exists() for room in rooms), file

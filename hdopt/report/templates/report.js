@@ -26,7 +26,9 @@
     // On a narrow screen each entry of the legend takes a line of its own, which the plot is not to pay for.
     const legend = narrow ? LEGEND_LINE * Math.max(0, plot.legendEntries - 2) : 0;
     const size = (own.font && own.font.size) || 13;
-    const height = narrow && own.narrowHeight && !printing ? own.narrowHeight : printing ? printHeight(plot.ownHeight) : plot.ownHeight;
+    // Labels that stand upright take their room from the plot: it gets the height of a narrow screen then.
+    const asked = own.narrowHeight && (narrow || (own.tickangle && width < UPRIGHT)) ? own.narrowHeight : plot.ownHeight;
+    const height = printing ? printHeight(asked) : asked;
     return {
       width,
       height: height + legend,
