@@ -32,8 +32,7 @@ def searched(design, matrix):
 
 @pytest.mark.parametrize("structure", Structure, ids=lambda structure: structure.value)
 def test_the_exact_geometry_of_the_contour(structure):
-    """Would catch a rim counted along the wrong direction in zone 2, an eccentricity that the structure takes away
-    after all, and a place taken from the tip instead of the contour (0.01 arcmin and more)."""
+    """Would catch a structure that takes away the other eccentricity, and a place that the table gives unpolished."""
     design, matrix = drive(ground(), structure), random_errors(3, seed=5).to_matrix()
     assert beat_extremes_arcmin(design, matrix) == pytest.approx(searched(design, matrix), abs=ARCMIN)
 
