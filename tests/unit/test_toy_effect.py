@@ -111,10 +111,10 @@ def test_a_study_and_ke_know_it(folder):
 
 @pytest.mark.slow
 def test_stack_counts_it(folder):
-    bare = json.loads(
-        run(folder, "stack", "study.toml", "-n", "2000", "--set", "operation.include=none", "--json", "-")
-    )
-    told = json.loads(run(folder, "stack", "study.toml", "-n", "2000", "--json", "-"))
+    """Drive by drive, beside the error: 200 drives show it as 2000 do, for which the default yield would ask."""
+    few = ("stack", "study.toml", "-n", "200", "--set", "requirement.yield=0.9", "--json", "-")
+    bare = json.loads(run(folder, *few, "--set", "operation.include=none"))
+    told = json.loads(run(folder, *few))
     assert told["mean_arcmin"] == pytest.approx(bare["mean_arcmin"] + 0.4, abs=2e-3)
 
 
