@@ -344,7 +344,10 @@ def apply_overrides(document: Document, overrides: Sequence[str]) -> Document:
         key, equals, value = override.partition("=")
         if not equals:
             raise HdoptError(f"--set {override!r} has no '='; write KEY=VALUE, as in --set wave_generator.width_mm=8")
-        values.append((key.strip(), parse_value(value.strip())))
+        try:
+            values.append((key.strip(), parse_value(value.strip())))
+        except HdoptError as error:
+            raise HdoptError(f"--set {shown(key.strip())}: {error}") from error
     return with_values(document, values)
 
 
