@@ -28,6 +28,7 @@ from hdopt.effects.base import Effect, Keys
 from hdopt.effects.conditions import TURN, Conditions
 from hdopt.effects.declared import Category, Quantity, needed
 from hdopt.effects.estimate import FitEstimate, Parameter
+from hdopt.effects.prior import outside_prior
 from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.term import Shape, Term
 
@@ -52,6 +53,7 @@ class Resonance(Effect):
     domain = "speed"
     needs_base = True
     driven = True
+    has_parts = True
     acts = "beside, excited by KE with all effects of teeth and bearing but the mesh"
     bench_part = "the inertia that the bench hangs on the drive"
     needs: ClassVar[Mapping[str, str]] = {"speed": "speed_rpm"}
@@ -115,6 +117,12 @@ class Resonance(Effect):
             steps={"frequency_hz": 0.003 * frequency, "damping_ratio": 0.05 * damping},
             trials=TRIALS if foot is Foot.ERROR else len(Foot) * TRIALS,
         )
+
+    def every_part_shows(self, term: Term, estimate: FitEstimate) -> bool:
+        """Whether its numbers may be those of an inertia on a spring: with a gain of nothing and a drag instead, or a
+        damping that lets nothing swing, it bends to a delay, a drift or a loop.
+        """
+        return not any(one.certainly for one in outside_prior(self, self.parameters(term, estimate)))
 
     def _excitation(self, motion: Array | None) -> Array:
         if motion is None:

@@ -14,6 +14,7 @@ from hdopt.diagnosis.checks.repeated_passes import RepeatedPasses, repeated_pass
 from hdopt.diagnosis.checks.scale import Scale, fitted_scale
 from hdopt.diagnosis.checks.slow_wander import SlowWave, slow_wave
 from hdopt.diagnosis.checks.step_detection import Steps, sudden_steps
+from hdopt.diagnosis.inference.base_excitation import is_driven
 from hdopt.diagnosis.inference.catalogue import STRAIN_WAVE_ONLY
 from hdopt.diagnosis.inference.conditions import AcrossConditions, across_conditions
 from hdopt.diagnosis.inference.cross_validation import HeldOut, held_out, paired_t, turn_folds
@@ -25,7 +26,8 @@ from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import SMALLEST_POWER, TINY
 from hdopt.diagnosis.orientation import Orientation
-from hdopt.diagnosis.search.candidates import penalty_scale, search_terms
+from hdopt.diagnosis.search.acceptance import is_acceptable
+from hdopt.diagnosis.search.candidates import joint_fit, penalty_scale, search_terms
 from hdopt.diagnosis.search.penalty import Scale as PenaltyScale
 from hdopt.diagnosis.search.penalty import penalty
 from hdopt.diagnosis.search.subset_search import Selection
@@ -145,11 +147,12 @@ def most_flips(base: HeldOut, best: HeldOut, settings: DiagnosisSettings) -> int
 
 def best_placebo(probe: FitProbe, pool: Sequence[Term], best: Fit) -> Term | None:
     """Of the terms in `pool` the single one of the catalogue that explains most of what `probe` sees and is no part of
-    the `best` fit.
+    the `best` fit. One that swings must have the numbers of what swings: without them it is no other explanation.
     """
     found = {t.effect for t in best.terms}
     others = [t for t in pool if t.effect not in found and t.effect in EFFECTS]
-    return max(others, key=probe.gain, default=None)
+    in_order = sorted(others, key=probe.gain, reverse=True)
+    return next((t for t in in_order if not is_driven(t) or is_acceptable(joint_fit(probe.fit, [t]))), None)
 
 
 def placebo_error(probe: FitProbe, placebo: Term, folds: Index) -> HeldOut:
