@@ -17,6 +17,8 @@ from hdopt.recordings.columns import Column
 from hdopt.recordings.units import CHANNEL_UNITS, parse_unit
 
 BENCH_KEYS = ("name", "ratio", "columns")
+LARGEST, LONGEST_SHOWN = 1e300, 60
+"""Above which a number is a slip of the pen, and characters of a value that a message shows."""
 COLUMN_KEYS = ("column", "unit", "counts_per_turn", "gear", "sign", "step_deg", "uncertainty_arcsec", "calibration")
 
 
@@ -35,29 +37,41 @@ def load_bench(path: Path) -> Bench:
     `path` is the TOML file.
     """
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError as error:
         raise HdoptError(f"no file {path}; give a bench file, or make one with hdopt inspect --write-bench") from error
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        raise HdoptError(f"{path.name} cannot be read as TOML: {str(error).splitlines()[0][:200]}") from error
+    except (OSError, ValueError, RecursionError) as error:  # of ValueError: not UTF-8, not TOML, thousands of digits
+        said = (str(error).splitlines() or ["nested too deep"])[0][:200]
+        raise HdoptError(f"{path.name or path} cannot be read as TOML: {said}") from error
     for key in content:
         if key not in BENCH_KEYS:
             raise HdoptError(f"{path.name}: {unknown_name('key', key, BENCH_KEYS)}")
     ratio = content.get("ratio")
     if ratio is not None and not _is_positive(ratio):
-        raise HdoptError(f"{path.name}: ratio is {ratio!r}; give a finite number above 0")
+        raise HdoptError(f"{path.name}: ratio is {_shown(ratio)}; give a finite number above 0")
     columns = content.get("columns", {})
     if not isinstance(columns, dict):
         raise HdoptError(f"{path.name}: columns must be tables [columns.input], [columns.output], ...")
+    name = content.get("name", "")
+    if not isinstance(name, str):
+        raise HdoptError(f"{path.name}: name is {_shown(name)}; give a text in quotes")
     return Bench(
-        str(content.get("name", "")),
+        name,
         None if ratio is None else float(ratio),
         {channel: _column(path.name, channel, entry) for channel, entry in columns.items()},
     )
 
 
 def _is_positive(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and value > 0
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    return 0 < value <= LARGEST  # an integer of 400 digits is no float
+
+
+def _shown(value: object) -> str:
+    """A value of the file as a message shows it, whatever its length."""
+    text = repr(value)
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
 def _column(file: str, channel: str, entry: Any) -> Column:
@@ -71,12 +85,16 @@ def _column(file: str, channel: str, entry: Any) -> Column:
             raise HdoptError(f"{where}: {unknown_name('key', key, COLUMN_KEYS)}")
     for key in ("counts_per_turn", "gear"):
         if key in entry and not _is_positive(entry[key]):
-            raise HdoptError(f"{where} {key} is {entry[key]!r}; give a finite number above 0")
+            raise HdoptError(f"{where} {key} is {_shown(entry[key])}; give a finite number above 0")
     sign = entry.get("sign", 1)
-    if sign not in (1, -1):
-        raise HdoptError(f"{where} sign is {sign!r}; give 1 or -1")
-    unit = str(entry.get("unit", ""))
+    if isinstance(sign, bool) or sign not in (1, -1):
+        raise HdoptError(f"{where} sign is {_shown(sign)}; give 1 or -1")
+    unit = entry.get("unit", "")
+    if not isinstance(unit, str):
+        raise HdoptError(f'{where} unit is {_shown(unit)}; give a text in quotes, such as "deg"')
     if "counts_per_turn" in entry:
+        if unit not in ("", "counts"):
+            raise HdoptError(f"{where} has unit {unit!r} and counts_per_turn; a column is one of both: take one out")
         unit = f"counts/{entry['counts_per_turn']}"
     if "gear" in entry and entry["gear"] != 1:
         unit += f"/gear{entry['gear']}"
@@ -98,7 +116,7 @@ def _column(file: str, channel: str, entry: Any) -> Column:
 def _not_negative(where: str, key: str, entry: Mapping[str, Any]) -> float:
     value = entry.get(key, 0.0)
     if value != 0 and not _is_positive(value):
-        raise HdoptError(f"{where} {key} is {value!r}; give a finite number, 0 or above")
+        raise HdoptError(f"{where} {key} is {_shown(value)}; give a finite number, 0 or above")
     return float(value)
 
 

@@ -359,12 +359,43 @@ def test_bench_file_round_trip(truth, tmp_path):
         ("[columns.input]\ncolumn = 'a'\ncounts_per_turn = -1", "give a finite number above 0"),
         ("[columns.input]\ncolumn = 'a'\ncalibration = [[10, 1], [5, 1]]", "its angles rising"),
         ("[columns.input", "cannot be read as TOML"),
+        ("ratio = 1" + 400 * "0", "ratio is 10000.*; give a finite number above 0"),
+        ("ratio = 1" + 5000 * "0", "cannot be read as TOML"),
+        ("ratio = " + 2000 * "[" + 2000 * "]", "b.toml"),
+        ("name = 3", "name is 3; give a text in quotes"),
+        ("[columns.input]\ncolumn = 'a'\nunit = 3", "unit is 3; give a text in quotes"),
+        ("[columns.input]\ncolumn = 'a'\nsign = true", "sign is True; give 1 or -1"),
+        ("[columns.input]\ncolumn = 'a'\nunit = 'deg'\ncounts_per_turn = 4096", "unit 'deg' and counts_per_turn"),
     ],
 )
 def test_bench_file_is_checked(tmp_path, text, message):
+    """Each with the file's name, in three lines at most; would catch a key that another silently overrides, a truth
+    value for a number, and a number too long for the machine.
+    """
     (tmp_path / "b.toml").write_text(text)
-    with pytest.raises(HdoptError, match=message):
+    with pytest.raises(HdoptError, match=message) as refused:
         load_bench(tmp_path / "b.toml")
+    assert str(refused.value).startswith("b.toml")
+    assert len(str(refused.value)) < 400
+
+
+def test_a_bench_file_may_begin_with_a_byte_order_mark(tmp_path):
+    """As Windows' editor writes it."""
+    (tmp_path / "b.toml").write_bytes(b"\xef\xbb\xbfratio = 80.0\n")
+    assert load_bench(tmp_path / "b.toml").ratio == 80.0
+
+
+def test_a_column_name_that_stands_twice_is_told(truth, tmp_path):
+    """Asked which, where nobody says; told, where a name is said. Fault caught: the first taken without a word."""
+    time, theta, output = truth
+    rows = "".join(f"{t:.6f},{a:.9f},{b:.12f},0.5\n" for t, a, b in zip(time, theta, output, strict=True))
+    (tmp_path / "r.csv").write_text("time_s,input_angle_rad,output_angle_rad,output_angle_rad\n" + rows)
+    with pytest.raises(HdoptError, match="not plain: output: output_angle_rad or output_angle_rad.1"):
+        read_recording(tmp_path / "r.csv", RATIO)
+    columns = "time=time_s:s,input=input_angle_rad:rad,output=output_angle_rad:rad"
+    recording = read_recording(tmp_path / "r.csv", RATIO, columns)
+    assert any("'output_angle_rad' more than once: the first is meant" in note for note in recording.understood)
+    same(recording, truth, 1e-3)
 
 
 @pytest.mark.parametrize(("given", "true"), [(120.0, 121.0), (121.0, 120.0), (80.0, 81.0), (160.0, 161.0)])

@@ -119,7 +119,14 @@ def _notes(layout: Layout) -> tuple[str, ...]:
         text += ", units in a row of their own"
     if layout.comments:
         text += f", {layout.comments} lines of comment or preamble left out"
-    return (text,)
+    known = set(layout.header)
+    repeated = [name for name in layout.header if f"{name}.1" in known]
+    if not repeated:
+        return (text,)
+    return (
+        text,
+        f"the header has {repeated[0]!r} more than once: the first is meant, the second is {repeated[0] + '.1'!r}",
+    )
 
 
 def _values(column: Any, decimal: str) -> Any:
