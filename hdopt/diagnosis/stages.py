@@ -290,9 +290,12 @@ def search_effects(state: State) -> State:
 
 
 def try_guesses(state: State) -> State:
-    """What was found on other rows of the recordings, from where it stood there: drives have many minima, and what is
-    better here was missed by the search. `state` is where the work stands.
+    """What was found on other rows of the recordings, from where it stood there: the two zones of a drive make many
+    minima, and what is better here was missed by the search. A gear without a base has no zones. `state` is where the
+    work stands.
     """
+    if state.problem.base is None:
+        return state
     known = {names_of(fit): fit for fit in leaders_on(state.selection, state.problem)}
     look = SearchState(state.base, plan_of(state), state.inflation, state.draws())
     least = state.selection.best.log_bayes_factor + state.settings.search.better

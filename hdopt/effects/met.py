@@ -17,7 +17,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import erf
 
 from hdopt.arrays import Array
 from hdopt.effects.sines import sine_columns, sine_sum
@@ -120,6 +119,8 @@ def gaussian(off: Array, sigma: float, row: float = 0.0) -> Array:
     all rad, (n,)."""
     if not row:
         return np.asarray(np.exp(-0.5 * (off / sigma) ** 2))
+    from scipy.special import erf  # of a diagnosis alone: one drive is computed without SciPy
+
     scale = math.sqrt(2) * sigma
     area = erf((off + row / 2) / scale) - erf((off - row / 2) / scale)
     return np.asarray(math.sqrt(math.pi) / 2 * scale / row * area)

@@ -208,7 +208,7 @@ def _interruptible():
 def test_an_interruption_that_a_callback_swallows_is_still_one(number, status, monkeypatch, capsys):
     """Would catch status 2 where compiled code drops the exception that a signal raised and ends with its own."""
 
-    def computed(arguments):
+    def computed(*arguments):
         try:
             os.kill(os.getpid(), number)
             time.sleep(5)
@@ -232,7 +232,7 @@ def test_an_interruption_that_a_callback_swallows_is_still_one(number, status, m
 def test_an_interruption_that_a_library_hides_is_still_one(interruption, status, monkeypatch, capsys):
     """A compiled library that is interrupted while it is imported raises an ImportError, which ended with status 2."""
 
-    def imported(arguments):
+    def imported(*arguments):
         try:
             raise interruption
         except BaseException as error:
