@@ -294,7 +294,7 @@ def try_guesses(state: State) -> State:
     minima, and what is better here was missed by the search. A gear without a base has no zones. `state` is where the
     work stands.
     """
-    if state.problem.base is None:
+    if state.problem.base is None or not state.guesses:
         return state
     known = {names_of(fit): fit for fit in leaders_on(state.selection, state.problem)}
     look = SearchState(state.base, plan_of(state), state.inflation, state.draws())

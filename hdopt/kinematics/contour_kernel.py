@@ -17,7 +17,7 @@ from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics.beat_lanes import FLOORS, Walk, extremes_in_lanes, fill_comb, new_nodes, second_difference
 from hdopt.kinematics.exact import GRID_POINTS, LONGEST_STEP, NEWTON_STEPS, ZONE_HALF_WIDTH
-from hdopt.kinematics.teeth_kernel import _with_sine
+from hdopt.kinematics.teeth_kernel import depth_bend, with_sine
 
 CONTOUR_PLACES = 8192
 """Places of a turn at which points and slopes of the contour are tabulated; cubics between them leave 1e-12 mm of an
@@ -232,16 +232,6 @@ def _sample(constants: ContourConstants, row: Array, depth: Array, offset_cs: Ar
                 offset_fs[zone, k, j] = side * (place - zone * n / 2) * (2 * math.pi / n)
 
 
-@compiled
-def _depth_bend(depth: Array) -> float:
-    """Largest second difference of any branch over the grid, mm."""
-    found = 0.0
-    for zone in range(2):
-        for k in range(2):
-            found = max(found, second_difference(depth[zone, k], 1))
-    return found
-
-
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=False)
 def contour_extremes_block(constants: ContourConstants, cs: Array, fs: Array, rows: Array, out: Array) -> None:
     """Fill `out` (n, 2) with the essential infimum and supremum of each row of errors `rows` (n, 12), mm of arc.
@@ -257,10 +247,10 @@ def contour_extremes_block(constants: ContourConstants, cs: Array, fs: Array, ro
     on_cs, on_fs = np.empty(n_cs), np.empty(n_fs)
     for i in range(len(rows)):
         row = rows[i]
-        _with_sine(cs[i if len(cs) > 1 else 0], constants.sine_share * row[8], row[9], on_cs)
-        _with_sine(fs[i if len(fs) > 1 else 0], constants.sine_share * row[10], row[11], on_fs)
+        with_sine(cs[i if len(cs) > 1 else 0], constants.sine_share * row[8], row[9], on_cs)
+        with_sine(fs[i if len(fs) > 1 else 0], constants.sine_share * row[10], row[11], on_fs)
         comb = fill_comb(on_fs, phases, stride_fs, comb_rows, floor)
         _sample(constants, row, depth, offset_cs, offset_fs)
-        bend = constants.tan_alpha * _depth_bend(depth) + second_difference(on_cs, stride_cs)
+        bend = constants.tan_alpha * depth_bend(depth) + second_difference(on_cs, stride_cs)
         walk = Walk(depth, offset_cs, offset_fs, on_cs, constants.tan_alpha, constants.advance, comb, bend)
         out[i, 0], out[i, 1] = extremes_in_lanes(walk, nodes, lanes)

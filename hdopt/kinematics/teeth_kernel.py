@@ -84,8 +84,8 @@ def _sample(constants: BeatConstants, row: Array, depth: Array, offset_cs: Array
 
 
 @compiled
-def _depth_bend(depth: Array) -> float:
-    """Largest second difference of any branch over the grid, mm."""
+def depth_bend(depth: Array) -> float:
+    """Largest second difference of any branch of `depth` (2, 2, m), mm, over its grid."""
     found = 0.0
     for zone in range(2):
         for k in range(2):
@@ -94,8 +94,10 @@ def _depth_bend(depth: Array) -> float:
 
 
 @compiled
-def _with_sine(table: Array, amplitude: float, phase: float, out: Array) -> None:
-    """Fill `out` with a spline's table and a sine of one wave beside it, mm of arc; rotated step by step."""
+def with_sine(table: Array, amplitude: float, phase: float, out: Array) -> None:
+    """Fill `out` (n,) with a spline's `table` (n,) and a sine of `amplitude` and `phase` (rad) of one wave beside it,
+    mm of arc; rotated step by step.
+    """
     n = len(table)
     turn, cos_turn, sin_turn = 2 * math.pi / n, math.cos(2 * math.pi / n), math.sin(2 * math.pi / n)
     cos, sin = math.cos(phase), math.sin(phase)
@@ -125,12 +127,12 @@ def beat_extremes_block(constants: BeatConstants, cs: Array, fs: Array, rows: Ar
     for i in range(len(rows)):
         row = rows[i]
         if len(cs) > 1 or row[8] > 0.0:
-            _with_sine(cs[i if len(cs) > 1 else 0], constants.sine_share * row[8], row[9], with_cs)
+            with_sine(cs[i if len(cs) > 1 else 0], constants.sine_share * row[8], row[9], with_cs)
             on_cs, cs_bend = with_cs, second_difference(with_cs, stride_cs)
         if len(fs) > 1 or row[10] > 0.0:
-            _with_sine(fs[i if len(fs) > 1 else 0], constants.sine_share * row[10], row[11], with_fs)
+            with_sine(fs[i if len(fs) > 1 else 0], constants.sine_share * row[10], row[11], with_fs)
             comb = fill_comb(with_fs, phases, stride_fs, comb_rows, floor)
         _sample(constants, row, depth, offset_cs, offset_fs)
-        bend = constants.tan_alpha * _depth_bend(depth) + cs_bend
+        bend = constants.tan_alpha * depth_bend(depth) + cs_bend
         walk = Walk(depth, offset_cs, offset_fs, on_cs, constants.tan_alpha, constants.advance, comb, bend)
         out[i, 0], out[i, 1] = extremes_in_lanes(walk, nodes, lanes)
