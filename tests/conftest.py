@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -27,6 +28,13 @@ ALLOWED_SKIPS = ("no recordings", "this machine has OSMesa", "asammdf is an extr
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 """Before numpy is first imported: workers side by side, each with a thread a core for every small product, take a
 hundred times as long.
+"""
+
+settings.register_profile("same", derandomize=True)
+settings.register_profile("explore", derandomize=False)
+settings.load_profile("same")
+"""A property is asked for the same examples in every run: what passed once does not fail elsewhere by chance. New
+examples are drawn with `pytest --hypothesis-profile explore`; one that fails becomes an `@example` of its test.
 """
 
 if "PYTEST_XDIST_WORKER" in os.environ:
