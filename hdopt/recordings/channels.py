@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import SequenceMatcher
 
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.errors import HdoptError, unknown_name
+from hdopt.errors import HdoptError, shown
 from hdopt.recordings.clocks import on_one_clock, seconds_of
 from hdopt.recordings.columns import Column, with_units
 from hdopt.recordings.table import Channel, Table
@@ -16,6 +17,10 @@ from hdopt.recordings.units import ANGLE_UNITS, CHANNEL_UNITS, DEGREE, TURN, par
 
 ARCSEC = DEGREE / 3600
 OPTIONAL = ("time", "torque", "temperature")
+NEAR = 0.6
+"""Likeness (of 1) from which a name may have been meant."""
+MOST_LISTED = 12
+"""Names of a file that a message lists."""
 
 
 @dataclass(frozen=True)
@@ -41,20 +46,40 @@ def mapped_channels(table: Table, columns: Mapping[str, Column], defaults: bool,
         if defaults and channel in OPTIONAL:
             del present[channel]
             continue
-        known = list(map(str, table.channels))
         raise HdoptError(
-            f"{name}: {unknown_name(f'column for {channel}', column.name, known)}; "
+            f"{name}: unknown column for {channel} {_beside(column.name, [*table.channels, *table.others])}; "
             "name the columns with --columns input=NAME:UNIT,output=NAME:UNIT"
         )
     stated, said, doubts = with_units(present, table, name)
     sources = {channel: table.channels[column.name] for channel, column in stated.items()}
+    for channel, source in sources.items():
+        if source.unsure:
+            raise HdoptError(
+                f"{name}: {stated[channel].name!r}: {source.unsure}; write the file with one decimal sign and without "
+                "grouped thousands"
+            )
+        doubts += [f"{stated[channel].name!r}: {sentence}" for sentence in source.said]
     values: dict[str, Array] = {}
     for channel, column in stated.items():
         values[channel], sentence = _converted(channel, column, sources[channel], name)
         said += sentence
     said.insert(0, "; ".join(_told(channel, column) for channel, column in stated.items()))
     merged, how = on_one_clock(sources, values)
-    return Channels(merged, stated, (*table.notes, *said, *how), tuple(doubts))
+    return Channels(merged, stated, (*table.notes, *said, *how), (*table.doubts, *doubts))
+
+
+def _beside(wanted: str, known: Sequence[str]) -> str:
+    """The `wanted` name, the nearest of the `known` where one is near, and what the file has, the nearest first."""
+    bare = wanted.strip("/").lower()
+
+    def likeness(name: str) -> float:
+        end, place = (text.rpartition("/")[2] for text in (bare, name.lower()))
+        return max(SequenceMatcher(None, *pair).ratio() for pair in ((bare, name.lower()), (end, place)))
+
+    names = sorted(dict.fromkeys(map(str, known)), key=lambda name: -likeness(name))
+    near = f"did you mean {names[0]!r}? " if names and likeness(names[0]) >= NEAR else ""
+    more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
+    return f"{shown(wanted)}; {near}the file has {', '.join(names[:MOST_LISTED])}{more}"
 
 
 def _told(channel: str, column: Column) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeAlias
 
@@ -22,13 +22,14 @@ SAME_RATIO = 1e-9
 class RecordedDrive:
     """A recorded `drive`, its `study` (None without one) and `ratio`, and how its files are laid out: `columns` as
     `--columns`, `bench` as a bench file says. A gear without a model has `drive` None; its `ratio` may then be known
-    from the recordings alone."""
+    from the recordings alone. `overruled` says what of the bench file does not hold because it was given anew."""
 
     drive: Drive | None
     study: Study | None = None
     ratio: float | None = None
     columns: str | None = None
     bench: Bench | None = None
+    overruled: tuple[str, ...] = ()
 
     def read(self, path: str | Path) -> Recording:
         """The recording of this drive in the file `path`. Raises `HdoptError` where it cannot be used, or no ratio is
@@ -38,10 +39,20 @@ class RecordedDrive:
         return read_recording(path, self.ratio, self.columns, self.bench)
 
     def recordings(self, given: AnyRecordings) -> list[Recording]:
-        """The recordings of this drive: those `given` as records stay, files are read."""
+        """The recordings of this drive: those `given` as records stay, files are read. The first one read warns of what
+        was `overruled`."""
         if isinstance(given, Recording | str | Path):
             given = [given]
-        return [item if isinstance(item, Recording) else self.read(item) for item in given]
+        found = []
+        said = self.overruled
+        for item in given:
+            if isinstance(item, Recording):
+                found.append(item)
+                continue
+            recording = self.read(item)
+            found.append(replace(recording, warnings=(*said, *recording.warnings)))
+            said = ()
+        return found
 
 
 AnyRecordings: TypeAlias = Sequence[Recording | str | Path] | Recording | str | Path
@@ -64,18 +75,35 @@ def recorded_drive(
         return drive
     layout = load_bench(Path(bench)) if isinstance(bench, str | Path) else bench
     stated = ratio if ratio is not None or layout is None else layout.ratio
+    overruled = _overruled(ratio, columns, layout)
     if drive is None or drive == "none":
         if stated is None and drive is not None:
             raise HdoptError("--drive none needs the gear's ratio; give --ratio X, or ratio in the bench file")
-        return RecordedDrive(None, None, stated, columns, layout)
+        return RecordedDrive(None, None, stated, columns, layout, overruled)
     study, of = (None, drive) if isinstance(drive, Drive) else ((found := _study(drive)), found.drive)
     own = float(of.geometry.ratio)
     if stated is not None and abs(stated - own) > SAME_RATIO:
+        said = "ratio given" if ratio is not None else "bench file's ratio"
         raise HdoptError(
-            f"the ratio given is {stated:g}, that of the drive {_name(drive)} is {own:g}; give the drive that was "
+            f"the {said} is {stated:g}, that of the drive {_name(drive)} is {own:g}; give the drive that was "
             "recorded, or --drive none with the ratio"
         )
-    return RecordedDrive(of, study, own, columns, layout)
+    return RecordedDrive(of, study, own, columns, layout, overruled)
+
+
+def _overruled(ratio: float | None, columns: str | None, bench: Bench | None) -> tuple[str, ...]:
+    """What of a `bench` does not hold beside a `ratio` and `columns` that were given anew, a sentence each."""
+    if bench is None:
+        return ()
+    said = []
+    if ratio is not None and bench.ratio is not None and abs(ratio - bench.ratio) > SAME_RATIO:
+        said.append(f"the ratio is {ratio:g} as given with --ratio; the {bench.ratio:g} of the bench file is not used")
+    if columns and bench.columns:
+        said.append(
+            "the columns are those given with --columns; those of the bench file, with their signs, steps and "
+            "calibration, are not used"
+        )
+    return tuple(said)
 
 
 def _study(drive: Study | str | Path) -> Study:

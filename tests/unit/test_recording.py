@@ -118,7 +118,7 @@ def test_mostly_nan_is_refused(table, tmp_path):
 def test_text_among_the_numbers_counts_as_missing(table, tmp_path):
     table = table.astype({"output_angle_deg": object})
     table.loc[5, "output_angle_deg"] = "overrun"
-    assert "1 rows with missing values" in read(table, tmp_path).warnings[0]
+    assert any("1 rows with missing values" in said for said in read(table, tmp_path).warnings)
 
 
 def test_repeated_rows_are_dropped(table, tmp_path):

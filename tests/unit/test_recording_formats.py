@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import re
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -9,9 +10,10 @@ import pandas as pd
 import pytest
 
 from hdopt.errors import HdoptError
-from hdopt.recordings.bench import bench_text, load_bench
+from hdopt.recordings.bench import Bench, bench_text, load_bench
 from hdopt.recordings.columns import Column
 from hdopt.recordings.read import read_channels, read_recording
+from hdopt.workflow.recorded_drive import recorded_drive
 
 RATIO, TURN, ROWS, RATE = 80.0, 2 * np.pi, 800, 50.0
 START = datetime(2026, 11, 22, 9, 59, 58, 250_000, tzinfo=UTC)
@@ -147,7 +149,8 @@ def test_lines_with_too_many_fields_are_counted_and_said(truth, tmp_path, recwar
     lines[90] += ",8,9"
     (tmp_path / "r.csv").write_text("\n".join(lines))
     found = read_recording(tmp_path / "r.csv", RATIO)
-    assert any("2 lines with more fields than the header names left out" in said for said in found.understood)
+    told = "2 lines with more fields than the header names left out, the first .* in line 41; does a decimal comma"
+    assert any(re.search(told, said) for said in found.warnings)
     assert len(found) == ROWS - 2 and not recwarn.list
 
 
@@ -212,8 +215,33 @@ def test_hdf5_and_matlab_73(truth, tmp_path):
         recording = read_recording(tmp_path / name, RATIO, "time=t,input=rig/motor,output=/rig/load")
         same(recording, truth)
         assert any("input is in rad, as the file says" in said for said in recording.understood)
-    with pytest.raises(HdoptError, match=r"has no dataset nope, x; its datasets are rig/load, rig/motor, t"):
+    with pytest.raises(HdoptError, match=r"unknown column for input 'nope'; the file has .*rig/motor"):
         read_recording(tmp_path / "bench.h5", RATIO, "input=nope:deg,output=x:deg")
+    told = r"for output '/rig/laod'; did you mean 'rig/load'\? the file has rig/load, .*rig/motor"
+    with pytest.raises(HdoptError, match=told):
+        read_recording(tmp_path / "bench.h5", RATIO, "input=/rig/motor,output=/rig/laod")
+
+
+@pytest.mark.parametrize("along", [0, 1])
+def test_columns_of_an_array_are_channels(truth, tmp_path, along):
+    """Would catch arrays of several columns left out without a word, and rows taken for columns."""
+    h5py = pytest.importorskip("h5py")
+    from scipy.io import savemat
+
+    array = np.stack(truth, axis=along)
+    with h5py.File(tmp_path / "bench.h5", "w") as file:
+        file["rig/all"] = array
+    savemat(tmp_path / "bench.mat", {"rig": {"all": array}, "note": 3.0})
+    same(
+        read_recording(tmp_path / "bench.h5", RATIO, "time=/rig/all[0]:s,input=rig/all[1]:rad,output=/rig/all[2]:rad"),
+        truth,
+    )
+    same(
+        read_recording(tmp_path / "bench.mat", RATIO, "time=rig.all[0]:s,input=rig.all[1]:rad,output=rig.all[2]:rad"),
+        truth,
+    )
+    with pytest.raises(HdoptError, match=r"for input '/rig/all'; did you mean 'rig/all\[0\]'\? the file has"):
+        read_recording(tmp_path / "bench.h5", RATIO, "input=/rig/all:rad,output=rig/all[2]:rad")
 
 
 def test_tdms_channels_of_different_rates(truth, tmp_path):
@@ -235,6 +263,11 @@ def test_tdms_channels_of_different_rates(truth, tmp_path):
     np.testing.assert_allclose(recording.error_arcmin, ke_arcmin(recording.input_angle), atol=WITHIN_ARCMIN)
     assert len(recording) == len(late)
     assert any("interpolated linearly onto the clock of output (100 Hz)" in said for said in recording.understood)
+    told = r"for output 'rig/laod'; did you mean 'load'\? the file has load, .*motor"
+    with pytest.raises(HdoptError, match=told):
+        read_recording(tmp_path / "bench.tdms", RATIO, "input=rig/motor,output=rig/laod")
+    with pytest.raises(HdoptError, match=r"for input 'x'; the file has"):
+        read_recording(tmp_path / "bench.tdms", RATIO, "input=x:rad,output=y:rad")
 
 
 def test_ros2_bag_and_mcap(truth, tmp_path):
@@ -348,6 +381,29 @@ def test_bench_file_round_trip(truth, tmp_path):
     # The deviation is taken at the reading, not at the true angle: 30 arcsec x (30 arcsec a quarter turn) is nothing.
     same(recording, truth, 1e-3)
     assert recording.sensor_arcmin == pytest.approx(5 / 80 / 60)
+
+
+def test_what_is_given_beside_a_bench_file_is_not_silently_stronger(truth, tmp_path):
+    """Would catch a ratio, or columns with their calibration, that replace those of the bench without a word."""
+    time, theta, output = truth
+    pd.DataFrame({"t": time, "in": theta, "out": output}).to_csv(tmp_path / "r.csv", index=False)
+    columns = {
+        "time": Column("t", "s"),
+        "input": Column("in", "rad"),
+        "output": Column("out", "rad", 1.0, ((0.0, 30.0),)),
+    }
+    (tmp_path / "bench.toml").write_text(bench_text(columns, 79.5))
+    given = "time=t:s,input=in:rad,output=out:rad"
+    twice = [tmp_path / "r.csv"] * 2
+    first, second = recorded_drive("none", RATIO, given, tmp_path / "bench.toml").recordings(twice)
+    assert sum("the ratio is 80 as given with --ratio; the 79.5 of the bench file" in w for w in first.warnings) == 1
+    assert sum("those of the bench file, with their signs, steps and calibration" in w for w in first.warnings) == 1
+    assert not any("bench file" in warning for warning in second.warnings)
+    (tmp_path / "bench.toml").write_text(bench_text(columns, RATIO))
+    same_again = recorded_drive("none", RATIO, None, tmp_path / "bench.toml").recordings(twice)
+    assert not any("bench file" in warning for recording in same_again for warning in recording.warnings)
+    with pytest.raises(HdoptError, match="the bench file's ratio is 81, that of the drive csf-25-80 is"):
+        recorded_drive("csf-25-80", None, None, Bench("", 81.0))
 
 
 @pytest.mark.parametrize(

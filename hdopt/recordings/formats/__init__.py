@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Protocol
@@ -76,6 +77,9 @@ def read_table(path: Path, wanted: Sequence[str] | None = None) -> Table:
     reader: Reader = import_module(f"hdopt.recordings.formats.{module}").read
     try:
         table = reader(path, wanted)
+        if wanted and not set(wanted) <= set(table.channels):  # a name that is not there: the message lists what is
+            whole = reader(path, None)
+            table = replace(whole, channels={**whole.channels, **table.channels})
     except HdoptError:
         raise
     except ModuleNotFoundError as error:

@@ -8,8 +8,7 @@ from typing import Any  # Any: arrays of numbers and of text, as the file's form
 
 import numpy as np
 
-from hdopt.errors import HdoptError
-from hdopt.recordings.table import Channel, Table
+from hdopt.recordings.table import Channel, Table, columns_of
 
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "unit_string")
 
@@ -17,8 +16,8 @@ UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "unit_string")
 def read(path: Path, wanted: Sequence[str] | None) -> Table:
     """One-dimensional datasets by path ('group/name'), fields of compound ones as 'group/name.field'.
 
-    A dataset's unit is taken from its attribute `unit` or `units`. A column vector, as MATLAB has it, counts as one
-    dimension.
+    A dataset's unit is taken from its attribute `unit` or `units`. Those of two dimensions are columns, 'name[0]' and
+    so on (`columns_of`).
 
     `path` of the file; `wanted` names the columns that will be used, None for all.
     """
@@ -32,20 +31,20 @@ def read(path: Path, wanted: Sequence[str] | None) -> Table:
         unit = next((_text(item.attrs[key]) for key in UNIT_ATTRIBUTES if key in item.attrs), "")
         for field in item.dtype.names or ("",):
             key = f"{name}.{field}" if field else name
-            if wanted and not {key, f"/{key}"} & set(wanted):
+            asked = [want for want in wanted or () if want.strip("/").partition("[")[0] == key.partition("[")[0]]
+            if wanted and not asked:
                 continue
             values = np.asarray(item[field] if field else item[()])
-            if max(values.shape, default=0) == values.size and values.size > 1 and values.dtype.kind in "fiubSO":
-                found[f"/{key}" if wanted and f"/{key}" in wanted else key] = Channel(_decoded(values.ravel()), unit)
+            if values.dtype.kind not in "fiubSO" or values.size < 2:
+                continue
+            for path_name, column in columns_of(key, values):
+                channel = Channel(_decoded(column), unit)
+                found[path_name] = channel
+                if f"/{path_name}" in asked:
+                    found[f"/{path_name}"] = channel
 
     with h5py.File(path, "r") as file:
         file.visititems(visit)
-        if not found and wanted:
-            names: list[str] = []
-            file.visit(lambda name: names.append(name) if isinstance(file[name], h5py.Dataset) else None)
-            raise HdoptError(
-                f"{path.name} has no dataset {', '.join(wanted)}; its datasets are {', '.join(names[:12])}"
-            )
     return Table(found)
 
 

@@ -9,11 +9,12 @@ from typing import Any  # Any: arrays of numbers and of text, as the file's form
 import numpy as np
 
 from hdopt.errors import HdoptError
-from hdopt.recordings.table import Channel, Table
+from hdopt.recordings.table import Channel, Table, columns_of
 
 
 def read(path: Path, wanted: Sequence[str] | None) -> Table:
-    """Vectors of equal length in a MATLAB file, those of structs as 'struct.field' (or 'field' where there is one).
+    """Vectors of equal length in a MATLAB file, those of structs as 'struct.field' (or 'field' where there is one), the
+    columns of a matrix as 'name[0]' and so on (`columns_of`).
 
     `path` of the file; `wanted` names the columns that will be used, None for all.
     """
@@ -42,6 +43,6 @@ def _vectors(variables: dict[str, Any], prefix: str) -> list[tuple[str, Any]]:
     for key, value in variables.items():
         if isinstance(value, dict):
             found += _vectors(value, f"{prefix}{key}.")
-        elif np.ndim(value) == 1 and np.asarray(value).dtype.kind in "fiub":
-            found.append((prefix + key, np.asarray(value)))
+        elif np.asarray(value).dtype.kind in "fiub":
+            found += columns_of(prefix + key, np.asarray(value))
     return found

@@ -33,8 +33,6 @@ def read(path: Path, wanted: Sequence[str] | None) -> Table:
             else:
                 left_out.add(f"{channel.topic} ({channel.message_encoding})")
     table = collector.table()
-    if table.rows == 0 and wanted:
-        return read(path, None)  # a name that no topic bears: what the file has belongs in the message
     if table.rows == 0 and left_out:
         raise HdoptError(
             f"{path.name} holds no messages in JSON or CDR, only {', '.join(sorted(left_out)[:6])}; export it as "

@@ -9,16 +9,19 @@ from __future__ import annotations
 import codecs
 import csv
 import gzip
+import io
+import itertools
 import re
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any  # Any: arrays of numbers and of text, as the file's format has them
+from typing import IO, TYPE_CHECKING, Any, cast  # Any: arrays of numbers and of text, as the file's format has them
 
 import numpy as np
 
-from hdopt.errors import HdoptError
+from hdopt.errors import HdoptError, shown
+from hdopt.recordings.formats.decimals import from_text
 from hdopt.recordings.table import Channel, Table
 
 if TYPE_CHECKING:
@@ -67,9 +70,9 @@ def read(path: Path, wanted: Sequence[str] | None) -> Table:
     units = dict(zip(names, layout.units, strict=False))
     channels: dict[str, Channel] = {}
     for name in [str(column) for column in frame]:
-        channels[name] = Channel(_values(frame.pop(name), layout.decimal), units.get(name, ""))
+        channels[name] = _channel(frame.pop(name), layout, units.get(name, ""))
     others = tuple(name for name in names if name not in channels)
-    return Table(channels, (*_notes(layout), *left_out), others)
+    return Table(channels, _notes(layout), others, left_out)
 
 
 def _frame(path: Path, layout: Layout, use: list[str] | None) -> tuple[pd.DataFrame, tuple[str, ...]]:
@@ -104,10 +107,17 @@ def _frame(path: Path, layout: Layout, use: list[str] | None) -> tuple[pd.DataFr
             f"{path.name}: its rows have more fields than the {len(layout.header)} that its header names; name them "
             "all, or see whether a decimal comma stands where the comma separates"
         )
-    skipped = sum(text.count("Skipping line") for text in said)
-    if not skipped:
-        return frame, ()
-    return frame, (f"{skipped} line{'s' if skipped > 1 else ''} with more fields than the header names left out",)
+    numbers = [int(number) for text in said for number in re.findall(r"Skipping line (\d+)", text)]
+    return frame, (_left_out(path, layout, numbers),) if numbers else ()
+
+
+def _left_out(path: Path, layout: Layout, numbers: Sequence[int]) -> str:
+    """A sentence on the lines of these `numbers`, from 1, that have too many fields, with the first of them."""
+    with _unpacked(path) as stream, io.TextIOWrapper(stream, layout.encoding, "replace") as lines:
+        first = next(itertools.islice(lines, numbers[0] - 1, None), "").strip()
+    many = f"{len(numbers)} line{'s' if len(numbers) > 1 else ''} with more fields than the header names left out"
+    hint = "; does a decimal comma stand in it?" if layout.separator == "," else ""
+    return f"{many}, the first {shown(first)} in line {numbers[0]}{hint}"
 
 
 def _notes(layout: Layout) -> tuple[str, ...]:
@@ -129,28 +139,21 @@ def _notes(layout: Layout) -> tuple[str, ...]:
     )
 
 
-def _values(column: Any, decimal: str) -> Any:
+def _channel(column: Any, layout: Layout, unit: str) -> Channel:
     """A column as numbers where it can be; text stays text (times, words)."""
-    import pandas as pd
-
     if column.dtype.kind in "fiub":
-        return column.to_numpy()
-    text = column.astype(object)
-    if decimal == ",":
-        swapped = text.map(lambda cell: cell.replace(",", ".") if isinstance(cell, str) else cell)
-        numbers = pd.to_numeric(swapped, errors="coerce")
-    else:
-        numbers = pd.to_numeric(text, errors="coerce")
-    return numbers.to_numpy(float) if numbers.notna().mean() > 0.3 else text.to_numpy(object)
+        return Channel(column.to_numpy(), unit)
+    return from_text(column, layout.decimal, unit)
 
 
 def _open(path: Path) -> bytes:
     """The first bytes of a file, unpacked."""
-    if path.suffix.lower() == ".gz":
-        with gzip.open(path, "rb") as stream:
-            return stream.read(SAMPLE_BYTES)
-    with path.open("rb") as plain:
-        return plain.read(SAMPLE_BYTES)
+    with _unpacked(path) as stream:
+        return stream.read(SAMPLE_BYTES)
+
+
+def _unpacked(path: Path) -> IO[bytes]:
+    return cast(IO[bytes], gzip.open(path, "rb")) if path.suffix.lower() == ".gz" else path.open("rb")
 
 
 def _encoding(raw: bytes) -> str:
