@@ -4,8 +4,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
+import pytest
 
-from hdopt.diagnosis.search.high_order import ripple_orders, subtract
+from hdopt.diagnosis.inference.catalogue import explanations
+from hdopt.diagnosis.inference.nonphysical_alternatives import AnyOrder
+from hdopt.diagnosis.search import high_order
+from hdopt.diagnosis.search.candidates import Candidate
+from hdopt.diagnosis.search.high_order import high_order_selection, ripple_orders, subtract
+from hdopt.diagnosis.search.subset_search import Selection
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.effects import HIGH_ORDER
 from hdopt.recordings.read import recording_from_table
 
 
@@ -24,3 +32,121 @@ def test_a_ripple_is_taken_out_of_each_recording_in_its_place():
     total = np.arange(800.0)
     for number, left in enumerate(subtract([one, one], total)):
         np.testing.assert_allclose(one.error_arcmin - left.error_arcmin, np.arange(400) + 400 * number, atol=1e-9)
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """A residual of 1 arcmin^2 beside a ripple whose power the test says; lines that are no pulse's."""
+
+    def of(power, pulse=False):
+        left = np.array([-1.0, -1.0, 1.0, 1.0])
+        ripple = np.sqrt(power) * np.array([-1.0, 1.0, -1.0, 1.0])
+        probe = SimpleNamespace(residual=left + ripple, spectrum=lambda orders: np.ones(len(orders)))
+        monkeypatch.setattr(high_order, "left_as_recorded", lambda *about: SimpleNamespace(rows=None))
+        monkeypatch.setattr(high_order, "evaluate", lambda *about: None)
+        monkeypatch.setattr(high_order, "FitProbe", lambda fit: probe)
+        monkeypatch.setattr(high_order, "ripple_orders", lambda *about: (20.0, 90.0))
+        monkeypatch.setattr(high_order, "strongest_orders", lambda probe, count, lowest, highest: [lowest + 1])
+        monkeypatch.setattr(high_order, "waves_of", lambda rows, values, orders: ripple)
+        monkeypatch.setattr(high_order, "is_part_of_a_pulse", lambda *about: pulse)
+        rows = SimpleNamespace(locked=False, are_averages=True)
+        return high_order.strong_ripple((), SimpleNamespace(problem=SimpleNamespace(rows=rows, settings=DEFAULT)), None)
+
+    return of
+
+
+def test_a_ripple_is_strong_against_what_stands_beside_it(told):
+    """A quarter of the power beside it. Faults caught: held against all that is there, or strong at a fifth of that."""
+    assert told(0.24) is None
+    assert np.var(told(0.26)) == pytest.approx(0.26)
+    assert told(0.26, pulse=True) is None
+
+
+def test_what_was_taken_out_gained_its_power_in_every_row():
+    """Log evidence counts in noise variances: 0.3 arcmin^2 in 200 rows and a noise of 0.5 arcmin are 240 of them."""
+    problem = SimpleNamespace(weighed_rows=200.0, noise=SimpleNamespace(sigma=0.5))
+    taken = high_order.subtracted_terms(SimpleNamespace(problem=problem), 0.3, ["a term"])
+    assert (taken.terms, taken.gain) == (("a term",), pytest.approx(240.0))
+
+
+@pytest.fixture
+def searched(monkeypatch):
+    """The search of high orders, where averaged rows were explained by a rough term of 2 arcmin^2 and an exact one:
+    what it was asked, by the power that both explain together and the lines that stand out."""
+
+    class AveragedRows(SimpleNamespace):
+        def __len__(self):
+            return 2
+
+    def of(together=9.0, lines=(30.0,)):
+        seen = SimpleNamespace()
+        rows = AveragedRows(locked=False, are_averages=True, rows_per_turn=400.0, highest_order=20.0)
+        terms = (SimpleNamespace(rough=True), SimpleNamespace(rough=False))
+        sizes = [np.array([-1.0, 1.0]) * np.sqrt(2.0), np.array([-5.0, 5.0])]
+
+        class Problem(SimpleNamespace):
+            def with_noise(self, noise):
+                return Problem(**{**vars(self), "noise": noise})
+
+        problem = Problem(rows=rows, settings=DEFAULT, noise="first guess")
+        low = SimpleNamespace(
+            problem=problem, terms=terms, residual=np.zeros(2), contribution=lambda i: sizes[i], offsets=None
+        )
+        base = SimpleNamespace(residual=np.array([-1.0, 1.0]) * np.sqrt(together))
+        found = SimpleNamespace(best=SimpleNamespace(fit=low), base=base)
+
+        def evaluate(problem, *about):
+            return SimpleNamespace(problem=problem, residual=np.array([-4.0, 4.0]), offsets=None)
+
+        def select(bare, inflation, rng, plan):
+            seen.plan, seen.noise = plan, bare.problem.noise
+            return "a selection"
+
+        monkeypatch.setattr(high_order, "left_as_recorded", lambda *about: problem)
+        monkeypatch.setattr(high_order, "evaluate", evaluate)
+        monkeypatch.setattr(high_order, "refine", lambda fit, iterations: fit)
+        monkeypatch.setattr(high_order, "FitProbe", lambda fit: fit)
+        monkeypatch.setattr(high_order, "strongest_orders", lambda *about, **limits: list(lines))
+        monkeypatch.setattr(high_order, "waves_of", lambda rows, values, orders: 0.75 * values)
+        monkeypatch.setattr(high_order.noise_model, "estimate", lambda rows, left, settings: np.std(left))
+        monkeypatch.setattr(high_order, "leaves_nothing", lambda term: not term.rough)
+        monkeypatch.setattr(high_order, "subtracted_terms", lambda fit, power, terms: (power, list(terms)))
+        monkeypatch.setattr(high_order, "select", select)
+        assert high_order_selection((), found, None, ("tooth_mesh",), None) == "a selection"
+        seen.rough = terms[0]
+        return seen
+
+    return of
+
+
+def test_high_orders_are_searched_by_what_is_of_high_order(searched):
+    """All of the catalogue that is not, and what is ruled out, is left aside; plain lines of any order are not."""
+    plan = searched().plan
+    assert set(explanations()) - set(plan.skip) == {*HIGH_ORDER, AnyOrder.id} - {"tooth_mesh"}
+    assert plan.order_range == (20.0, DEFAULT.high_order.order_share * 400.0)
+
+
+def test_a_strong_ripple_is_no_noise_of_the_rows_as_recorded(searched):
+    assert searched().noise == pytest.approx(1.0)
+    assert searched(lines=()).noise == pytest.approx(4.0)
+
+
+def test_what_rough_shapes_explained_may_come_back_as_high_orders(searched):
+    """Their own power, or what both explain together where that is less: a term may be large only against a bent base.
+    Fault caught: the power of a term that the base takes back."""
+    for together, power in ((9.0, 2.0), (0.5, 0.5)):
+        seen = searched(together)
+        assert seen.plan.subtracted == (pytest.approx(power), [seen.rough])
+
+
+def test_a_ripple_found_in_the_zones_adds_what_it_adds_there(monkeypatch):
+    """Fault caught: the contribution beside the zones taken where the fit inside of them is the better one."""
+    high = Selection("base", (Candidate(SimpleNamespace(terms=("a",), contributions="beside"), 9.0, 1.0),), 1.0)
+    found = SimpleNamespace(best=SimpleNamespace(fit=None))
+    monkeypatch.setattr(high_order, "high_order_selection", lambda *about: high)
+    monkeypatch.setattr(high_order, "gather", lambda recordings: None)
+    inside = SimpleNamespace(fit="inside", adds="what it adds there")
+    for zones, fit, adds in ((inside, "inside", "what it adds there"), (None, high.best.fit, "beside")):
+        monkeypatch.setattr(high_order, "fit_in_zones", lambda *about, zones=zones: zones)
+        selection, ripple = high_order.find_ripple((), found, None, (), None)
+        assert (selection.best.fit, ripple) == (fit, adds)
