@@ -1,0 +1,106 @@
+"""The base's errors as a drive's, their intervals and what a record leaves open, against what is worked out by hand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hdopt.diagnosis.inference.base_fit import base_estimate, beat_warning, open_combinations
+from hdopt.diagnosis.settings import DEFAULT
+
+HALF_WIDTH = 5.0
+PRIOR = np.full(12, 0.05)
+
+
+def estimated(errors, spread):
+    """Of Cartesian errors (12,) mm with these standard deviations (12,) mm; zeros have their coefficients too."""
+    covariance = np.diag(np.r_[np.square(spread), 7.0])
+    problem = SimpleNamespace(base=SimpleNamespace(half_width=HALF_WIDTH), settings=DEFAULT, prior=PRIOR)
+    return base_estimate(
+        SimpleNamespace(
+            problem=problem,
+            errors=np.asarray(errors, float),
+            covariance=lambda: covariance,
+            base_value=np.array([-0.3, 0.3]),
+        )
+    )
+
+
+def test_intervals_of_a_length_and_its_direction_are_those_of_its_two_parts():
+    """An eccentricity of 0.02 mm along x (direction 90 deg): its length is as uncertain as x, its direction as y over
+    the length; 1.96 standard deviations, lengths in mm and angles in deg."""
+    spread = np.full(12, 1e-6)
+    spread[:2] = 0.003, 0.001
+    errors = np.full(12, 0.01)
+    errors[:2] = 0.02, 0.0
+    found = estimated(errors, spread).parameters
+    length, direction = found["axis_eccentricity_mm"], found["axis_eccentricity_direction_deg"]
+    assert (length.value, length.unit) == (pytest.approx(0.02), "mm")
+    assert (length.low, length.high) == (pytest.approx(0.02 - 1.96 * 0.003), pytest.approx(0.02 + 1.96 * 0.003))
+    assert (direction.value, direction.unit) == (pytest.approx(90.0), "deg")
+    assert direction.high - direction.value == pytest.approx(np.degrees(1.96 * 0.001 / 0.02))
+
+
+def test_a_tilt_is_its_lift_over_half_the_width():
+    spread = np.full(12, 1e-6)
+    spread[2] = 0.001
+    found = estimated(np.full(12, 0.01), spread).parameters["axis_tilt_x_deg"]
+    assert found.value == pytest.approx(np.degrees(np.arctan(0.01 / HALF_WIDTH)))
+    assert found.high - found.value == pytest.approx(np.degrees(1.96 * 0.001 / HALF_WIDTH), rel=1e-4)
+
+
+def test_a_length_is_not_below_zero_and_a_direction_passes_the_half_turn():
+    """Along -y the direction jumps from 180 to -180 deg: its slope does not."""
+    spread = np.full(12, 1e-6)
+    spread[:2] = 0.001, 0.03
+    errors = np.full(12, 0.01)
+    errors[:2] = 0.0, -0.02
+    found = estimated(errors, spread).parameters
+    assert found["axis_eccentricity_mm"].low == 0.0
+    direction = found["axis_eccentricity_direction_deg"]
+    assert direction.high - direction.value == pytest.approx(np.degrees(1.96 * 0.001 / 0.02), rel=1e-3)
+
+
+def test_what_is_left_open_is_a_part_of_the_prior():
+    """Standard deviations of 0.05 and 0.15 of the prior: variances below and above a hundredth of its. The names are
+    those of the largest members, whatever their sign."""
+    names = open_combinations(np.diag([(0.05 * 0.05) ** 2] * 11 + [(0.15 * 0.05) ** 2]), PRIOR)
+    assert names == ("FS tooth cosine",)
+    covariance = np.diag([(0.01 * 0.05) ** 2] * 12)
+    both = np.zeros(12)
+    both[[4, 8]] = 0.3, -0.9
+    covariance += np.outer(0.05 * both, 0.05 * both)
+    (name,) = open_combinations(covariance, PRIOR)
+    assert name == "CS tooth sine with wave-generator eccentricity along its major axis"
+    wide = PRIOR * np.r_[20.0, np.ones(11)]
+    assert open_combinations(np.diag([(0.5 * 0.05) ** 2, *[1e-12] * 11]), wide) == ()
+
+
+def rows_over(turns, ratio=80.0, rate=48):
+    theta = np.arange(round(turns * rate)) * 2 * np.pi / rate
+
+    class Rows(SimpleNamespace):
+        def __len__(self):
+            return len(self.theta)
+
+    return Rows(theta=theta, ratio=ratio, span_turns=turns)
+
+
+def uncertainty(turns, ratio=80.0, rate=48):
+    """Standard deviation of the worst combination of order 2's sine and cosine beside order 2 (1 + 1/N), at unit noise,
+    by ordinary least squares."""
+    theta = np.arange(round(turns * rate)) * 2 * np.pi / rate
+    columns = [f(order * theta) for order in (2.0, 2.0 * (1 + 1 / ratio)) for f in (np.sin, np.cos)]
+    design = np.column_stack([*columns, np.ones(len(theta))])
+    return np.sqrt(np.linalg.eigvalsh(np.linalg.inv(design.T @ design)[:2, :2])[-1])
+
+
+@pytest.mark.parametrize("turns", [5, 10])
+def test_a_short_record_says_how_much_worse_it_tells_the_splines_apart(turns):
+    """Against the covariance of least squares, of this record and of one over an output turn."""
+    said = beat_warning(rows_over(turns))
+    growth = float(said.split("apart ")[1].split(" times")[0])
+    assert growth == pytest.approx(uncertainty(turns) / uncertainty(80), rel=0.06)  # two digits are written
+    for enough in (20, 80):
+        assert uncertainty(enough) / uncertainty(80) < DEFAULT.base.beat_growth
+        assert beat_warning(rows_over(enough)) is None
