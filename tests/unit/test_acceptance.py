@@ -195,12 +195,18 @@ def test_a_pulse_is_no_ripple(study):
 PULSE = [(order, np.exp(-0.5 * (order * np.radians(1.8)) ** 2)) for order in range(26, 50, 2)]
 SIDES = [(162 + i, 0.9 ** abs(i)) for i in range(-6, 6)]
 ENCODER = [(32.0 * i, 1.0 / i) for i in range(1, 5)]
+MANY_SIDES = [(162 + i, 0.95 ** abs(i)) for i in range(-12, 12)]
+ONE_AMONG_SMALL = [(40.0, 1.0), *((28.0 + 4 * i, 0.3) for i in range(11))]
 
 
-@pytest.mark.parametrize(("lines", "expected"), [(PULSE, True), (SIDES, False), (ENCODER, False)])
+@pytest.mark.parametrize(
+    ("lines", "expected"),
+    [(PULSE, True), (SIDES, False), (MANY_SIDES, False), (ENCODER, False), (ONE_AMONG_SMALL, False)],
+)
 def test_a_pulse_has_many_lines_wide_apart(lines, expected):
-    """Of a pulse every second order from the edge on, a mesh with its neighbours, an encoder with its multiples. Fault
-    caught: either condition left out.
+    """Of a pulse every second order from the edge on, a mesh with its neighbours, an encoder with its multiples, a line
+    among lines of a tenth of its power. Faults caught: either condition left out, the spread taken for its square, the
+    lines counted by their amplitude.
     """
     orders, amplitudes = np.transpose(lines)
     assert is_part_of_a_pulse(list(orders), amplitudes, DEFAULT.high_order) is expected
