@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hdopt.diagnosis.inference import base_fit
 from hdopt.diagnosis.inference.base_fit import base_estimate, beat_warning, open_combinations
 from hdopt.diagnosis.settings import DEFAULT
 
@@ -66,12 +67,14 @@ def test_what_is_left_open_is_a_part_of_the_prior():
     those of the largest members, whatever their sign."""
     names = open_combinations(np.diag([(0.05 * 0.05) ** 2] * 11 + [(0.15 * 0.05) ** 2]), PRIOR)
     assert names == ("FS tooth cosine",)
-    covariance = np.diag([(0.01 * 0.05) ** 2] * 12)
-    both = np.zeros(12)
-    both[[4, 8]] = 0.3, -0.9
-    covariance += np.outer(0.05 * both, 0.05 * both)
-    (name,) = open_combinations(covariance, PRIOR)
-    assert name == "CS tooth sine with wave-generator eccentricity along its major axis"
+    for members in ((0.3, -0.9), (-0.3, -0.9), (0.3, 0.9), (-0.3, 0.9)):
+        both = np.zeros(12)
+        both[[4, 8]] = members
+        (name,) = open_combinations(np.diag([(0.01 * 0.05) ** 2] * 12) + np.outer(0.05 * both, 0.05 * both), PRIOR)
+        assert name == "CS tooth sine with wave-generator eccentricity along its major axis"
+        both[[8, 4]] = members
+        (name,) = open_combinations(np.diag([(0.01 * 0.05) ** 2] * 12) + np.outer(0.05 * both, 0.05 * both), PRIOR)
+        assert name == "wave-generator eccentricity along its major axis with CS tooth sine"
     wide = PRIOR * np.r_[20.0, np.ones(11)]
     assert open_combinations(np.diag([(0.5 * 0.05) ** 2, *[1e-12] * 11]), wide) == ()
 
@@ -104,3 +107,45 @@ def test_a_short_record_says_how_much_worse_it_tells_the_splines_apart(turns):
     for enough in (20, 80):
         assert uncertainty(enough) / uncertainty(80) < DEFAULT.base.beat_growth
         assert beat_warning(rows_over(enough)) is None
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """A fit of the base whose thinned objective is least at a first error of 0.03 mm, and all rows say the
+    contrary; the drives that were tried."""
+    tried = []
+
+    class Problem(SimpleNamespace):
+        def only(self, mask):
+            return Problem(**{**vars(self), "thin": True})
+
+    def evaluate(problem, errors, offsets, terms, coefficients):
+        if problem.thin:
+            tried.append(errors)
+        off = abs(errors[0] - 0.03)
+        fields = {"problem": problem, "errors": errors, "offsets": offsets, "coefficients": coefficients}
+        return SimpleNamespace(objective=1.0 + off if problem.thin else 2.0 - off, terms=terms, **fields)
+
+    monkeypatch.setattr(base_fit, "evaluate", evaluate)
+    monkeypatch.setattr(base_fit, "refine", lambda fit, *rest, **more: fit)
+    monkeypatch.setattr(base_fit, "_solve_offsets", lambda fit: fit)
+    problem = Problem(
+        base="a base", thin=False, settings=DEFAULT, nuisance=np.ones((9, 1)), rows=np.zeros(9), prior=PRIOR
+    )
+    return base_fit.fit_base(problem, np.random.default_rng(1), starts=16), np.array(tried)
+
+
+def test_the_best_of_the_drives_kept_is_the_best_on_all_rows(started):
+    """Of the two that are best on thinned rows. Fault caught: the first of them kept, whatever all rows say."""
+    fit, tried = started
+    kept = sorted(tried[:, 0], key=lambda error: abs(error - 0.03))[: DEFAULT.base.kept_starts]
+    assert fit.errors[0] == kept[-1] != kept[0]
+
+
+def test_starts_are_random_drives_of_sizes_below_the_prior(started):
+    """No two alike, of either sign, within the largest share of the prior that a start may have (five sigma)."""
+    _, tried = started
+    assert len(np.unique(tried)) == tried.size
+    assert 0.3 < np.mean(tried > 0) < 0.7
+    assert np.abs(tried / PRIOR).max() < 5 * DEFAULT.base.largest_start
+    assert np.std(tried / PRIOR) > DEFAULT.base.smallest_start
