@@ -386,18 +386,32 @@ def test_no_size_of_what_ships_is_in_doubt(name):
         ({"module_mm": 0.317}, r"deflects the flexspline by 0\.396 mm, 1\.25 modules, where about one is usual"),
         ({"module_mm": 0.317}, r"160 / 2 = 25\.36 mm, lies 19 modules inside its wall, which ends at 31\.39 mm"),
         ({"flexspline_wall_mm": 2.0}, r"lies 2\.45 modules inside its wall, which ends at 32\.65 mm"),
+        (
+            {"module_mm": 0.317},
+            r"^flexspline_addendum_mm is 0\.874 and circular_spline_addendum_mm is 0\.811 times the module of 0\.317",
+        ),
+        ({"circular_spline_addendum_mm": 0.18}, r"^circular_spline_addendum_mm is 0\.455 times the module of 0\.396"),
+        ({"semi_minor_mm": 30.5}, r"would stretch the flexspline's wall round its turn, as from 30\.65 to 30\.77 mm"),
+        ({"semi_minor_mm": 29.9}, r"would compress the flexspline's wall round its turn, as from 30\.65 to 30\.48 mm"),
     ],
 )
 def test_a_number_left_over_from_another_drive_is_doubted(changes, said):
-    """By hand: 0.396 mm x 200/2 = 39.6 mm; the wall ends at 30.65 + 0.74 = 31.39 mm."""
+    """By hand: 0.396 mm x 200/2 = 39.6 mm; the wall ends at 30.65 + 0.74 = 31.39 mm; 0.277 / 0.317 = 0.874; the ring's
+    radius is nearly the mean of the axes and (a - b)^2 / (8 (a + b)) more: 30.774 mm, 30.476 mm."""
     study = load_study("csf-25-80").with_(changes)
     (doubt,) = [one for one in check_study(study).doubts if re.search(said, one)]
     assert doubt in check_study(study).to_dict()["doubts"]
 
 
 def test_another_drive_whose_sizes_belong_together_is_not_doubted():
-    """100:1 on the same pitch circle, with its own deflection."""
+    """100:1 on the same pitch circle, with its own deflection and addenda."""
     study = load_study("csf-25-80").with_(
-        flexspline_teeth=200, circular_spline_teeth=202, module_mm=0.317, semi_major_mm=30.967, semi_minor_mm=30.33
+        flexspline_teeth=200,
+        circular_spline_teeth=202,
+        module_mm=0.317,
+        semi_major_mm=30.967,
+        semi_minor_mm=30.33,
+        flexspline_addendum_mm=0.222,
+        circular_spline_addendum_mm=0.206,
     )
     assert check_study(study).doubts == ()
