@@ -151,11 +151,13 @@ def __getattr__(name: str) -> Any:
 def _public(name: str) -> Any:
     from types import FunctionType
 
+    from hdopt.keywords import names_keywords
+
     if name not in _EXPORTS:  # a built-in type, of an annotation
         raise KeyError(name)
     found = getattr(import_module(_EXPORTS[name]), name)
     if not isinstance(found, FunctionType):
-        return found
+        return names_keywords(found)
     from hdopt.workflow.called import as_called
 
     return as_called(found, _public)

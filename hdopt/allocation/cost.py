@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError
+from hdopt.keywords import names_keywords
 
 Expression: TypeAlias = Any
 """A variable or expression of cvxpy, which has no types for them."""
@@ -47,6 +48,7 @@ def _positive(model: str, **values: float) -> None:
             raise HdoptError(f"{name} of the {model} cost is {value!r}; it must be a finite number above 0")
 
 
+@names_keywords
 @dataclass(frozen=True)
 class Power:
     """a + b/t^k, k > 0 (Sutherland and Roth 1975; k = 1 is the reciprocal model of Chase and Greenwood 1988)."""
@@ -73,6 +75,7 @@ class Power:
         return self.a + self.b * scale**-self.k * cp.power(variable, -self.k, approx=False)
 
 
+@names_keywords
 @dataclass(frozen=True)
 class Reciprocal(Power):
     """a + b/t (Chase and Greenwood 1988)."""
@@ -80,6 +83,7 @@ class Reciprocal(Power):
     k: float = 1.0
 
 
+@names_keywords
 @dataclass(frozen=True)
 class Exponential:
     """a exp(-t/b) + fixed (Speckhart 1972)."""
@@ -105,6 +109,7 @@ class Exponential:
         return self.fixed + self.a * cp.exp(-variable * (scale / self.b))
 
 
+@names_keywords
 @dataclass(frozen=True)
 class Piecewise:
     """Straight lines between quoted points (tolerance, cost), at least two, tolerances rising."""
@@ -154,6 +159,7 @@ class Piecewise:
         return cp.maximum(*(slope * scale * variable + start for slope, start in self.segments), -1e300)
 
 
+@names_keywords
 @dataclass(frozen=True)
 class Grade:
     """One grade: its name, tolerance and cost; `extrapolated` says why its standard does not reach here, if so."""
@@ -164,6 +170,7 @@ class Grade:
     extrapolated: str = ""
 
 
+@names_keywords
 @dataclass(frozen=True)
 class GradeTable:
     """A choice of grades."""

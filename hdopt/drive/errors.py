@@ -13,11 +13,13 @@ from numpy.typing import ArrayLike
 
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError, unknown_name
+from hdopt.keywords import names_keywords
 
 Values = float | Array
 """One value, or an array of them."""
 
 
+@names_keywords
 @dataclass(frozen=True)
 class DriveErrors:
     """Machining and assembly errors, each a number or an array; all arrays broadcast against each other.

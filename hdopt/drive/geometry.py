@@ -14,6 +14,7 @@ from hdopt.drive.profiles import WaveGeneratorProfile
 from hdopt.drive.roundness import MeasuredRoundness
 from hdopt.drive.teeth import MeasuredTeeth
 from hdopt.drive.values import require, require_not_negative, require_positive, require_positive_if_given
+from hdopt.keywords import names_keywords
 
 ARCMIN = math.pi / 10800.0
 """One arcmin in rad."""
@@ -22,6 +23,7 @@ TOOTH_DIFFERENCE = 2
 """CS teeth minus FS teeth: the model is of wave generators with two lobes, one tooth of difference a lobe."""
 
 
+@names_keywords
 @dataclass(frozen=True)
 class DriveGeometry:
     """Teeth and sizes of flexspline (FS) and circular spline (CS); Jia 2021, Table 1.
@@ -115,6 +117,7 @@ class Structure(Enum):
         return {"automatic": (1, 2), "one_way_major": (1,), "one_way_minor": (2,)}.get(self.value, ())
 
 
+@names_keywords
 @dataclass(frozen=True)
 class WaveGenerator:
     """A wave generator: its profile (the FS inner wall it makes), its structure and its axial width, mm.
@@ -132,6 +135,7 @@ class WaveGenerator:
         require_positive_if_given(bearing_thickness=self.bearing_thickness)
 
 
+@names_keywords
 @dataclass(frozen=True)
 class Clearances:
     """Clearances that make lag at reversal (Jia 2021, Eqs. (33)-(35)); mm.
@@ -158,6 +162,7 @@ class Clearances:
                 )
 
 
+@names_keywords
 @dataclass(frozen=True)
 class Material:
     """The flexspline's material: Young's modulus and endurance limit in MPa (N/mm^2), Poisson's ratio."""
@@ -172,6 +177,7 @@ class Material:
         require_positive_if_given(endurance=self.endurance)
 
 
+@names_keywords
 @dataclass(frozen=True)
 class Load:
     """What the drive works under: output torque in N mm, input speed in rad/s, tooth face width in mm."""
@@ -185,6 +191,7 @@ class Load:
         require_positive_if_given(tooth_face_width=self.tooth_face_width)
 
 
+@names_keywords
 @dataclass(frozen=True)
 class Drive:
     """One design: gear geometry and wave generator, with what is known of clearances, material and load."""

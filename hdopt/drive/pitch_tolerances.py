@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from hdopt.drive.values import require, require_positive
+from hdopt.keywords import names_keywords
 
 CLASSES = (1, 11)
 """The flank tolerance classes of ISO 1328-1:2013, finest and coarsest."""
@@ -17,6 +18,7 @@ SOURCE = (
 )
 
 
+@names_keywords
 @dataclass(frozen=True)
 class PitchTolerances:
     """What the pitch of a spline must keep: `single`, the largest deviation of a single pitch by size (f_p), and

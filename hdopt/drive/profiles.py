@@ -19,6 +19,7 @@ from hdopt.arrays import Array
 from hdopt.drive.values import DriveError, require, require_positive
 from hdopt.errors import HdoptError, shown
 from hdopt.files import cells_of, read_text
+from hdopt.keywords import names_keywords
 
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(64)
 
@@ -96,6 +97,7 @@ def _check_derivative(derivative: int) -> None:
         raise ValueError(f"derivative is {derivative!r}; it must be 0, 1 or 2")
 
 
+@names_keywords
 @dataclass(frozen=True)
 class Ellipse:
     """Ellipse with the given semi-axes, mm (Jia 2021, Eq. (36) when both have the flexspline's perimeter)."""
@@ -148,6 +150,7 @@ class Ellipse:
         return float(4 * self.semi_major * ellipe(1 - (self.semi_minor / self.semi_major) ** 2))
 
 
+@names_keywords
 @dataclass(frozen=True)
 class TwoDisk:
     """Ring bent by two discs, in contact over the wrap angle gamma to either side of the major axis (Eq. (38)).
@@ -205,6 +208,7 @@ class TwoDisk:
         return 4 * (_arc_length(self, 0.0, self.wrap_angle) + _arc_length(self, self.wrap_angle, math.pi / 2))
 
 
+@names_keywords
 @dataclass(frozen=True)
 class Resal:
     """Ring bent by two opposite radial forces (Resal's curve, Jia 2021, Eq. (37)): the two-disk curve of zero wrap.
@@ -243,6 +247,7 @@ class Resal:
         return 4 * _arc_length(self, 0.0, math.pi / 2)
 
 
+@names_keywords
 @dataclass(frozen=True)
 class MeasuredProfile:
     """A measured profile: polar points joined by a periodic quintic spline that may smooth them.

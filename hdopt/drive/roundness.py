@@ -11,6 +11,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.drive.profiles import read_polar
 from hdopt.drive.values import require
+from hdopt.keywords import names_keywords
 
 EVEN_PLACES = 8192
 """Places of one turn that the measured points are joined on, by a periodic cubic, before they are filtered."""
@@ -25,6 +26,7 @@ def transmission(waves: Array, cutoff: float) -> Array:
     return np.asarray(np.exp2(-((np.asarray(waves) / cutoff) ** 2)))
 
 
+@names_keywords
 @dataclass(frozen=True)
 class MeasuredRoundness:
     """Radial deviation of the circular spline, mm: Re sum c_k exp(i k angle) over `waves` c_1, c_2, ... with angles

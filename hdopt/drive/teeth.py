@@ -13,10 +13,12 @@ from hdopt.arrays import Array
 from hdopt.drive.values import DriveError, require
 from hdopt.errors import HdoptError, shown
 from hdopt.files import cells_of, read_text
+from hdopt.keywords import names_keywords
 
 KINDS = ("cumulative", "single")
 
 
+@names_keywords
 @dataclass(frozen=True)
 class MeasuredTeeth:
     """Cumulative pitch deviation of every tooth of a spline, mm of arc at the pitch line, mean zero.

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError, shown
 from hdopt.files import read_text
+from hdopt.keywords import names_keywords
 
 INFINITY = math.inf
 
@@ -52,6 +53,7 @@ def require(condition: bool, message: str) -> None:
         raise HdoptError(message)
 
 
+@names_keywords
 @dataclass(frozen=True, kw_only=True)
 class Truncated:
     """Base of the families: keeps what lies in [lower, upper] of an untruncated distribution.
@@ -132,6 +134,7 @@ def _check_finite(family: str, **parameters: float) -> None:
         require(math.isfinite(value), f"{name} of the {family} distribution is {value!r}; it must be a finite number")
 
 
+@names_keywords
 @dataclass(frozen=True, kw_only=True)
 class Normal(Truncated):
     """Normal distribution of `mean` and `std` (before truncation)."""
@@ -163,6 +166,7 @@ class Normal(Truncated):
         return np.clip(self.mean + self.std * standard, *self.support)
 
 
+@names_keywords
 @dataclass(frozen=True, kw_only=True)
 class Uniform(Truncated):
     """Every value between `lower` and `upper` alike."""
@@ -179,6 +183,7 @@ class Uniform(Truncated):
         return self.lower + (self.upper - self.lower) * np.asarray(u, float)
 
 
+@names_keywords
 @dataclass(frozen=True, kw_only=True)
 class Triangular(Truncated):
     """Triangle from `minimum` over its peak `mode` to `maximum`."""
@@ -213,6 +218,7 @@ class Triangular(Truncated):
         return np.where(q > (self.maximum - self.mode) / width, rising, falling)
 
 
+@names_keywords
 @dataclass(frozen=True, kw_only=True)
 class Rayleigh(Truncated):
     """Length of a plane vector whose two components are normal with standard deviation `scale` about zero."""
@@ -232,6 +238,7 @@ class Rayleigh(Truncated):
         return length
 
 
+@names_keywords
 @dataclass(frozen=True, kw_only=True)
 class HalfNormal(Truncated):
     """Magnitude of a normal number of standard deviation `scale` about zero."""
@@ -252,6 +259,7 @@ class HalfNormal(Truncated):
         return -self.scale * special.ndtri(q / 2)
 
 
+@names_keywords
 @dataclass(frozen=True, kw_only=True)
 class LogNormal(Truncated):
     """exp of a normal number: `median` of the value, `log_std` the standard deviation of its natural logarithm."""
@@ -273,6 +281,7 @@ class LogNormal(Truncated):
         return self.median * np.exp(-self.log_std * special.ndtri(q))
 
 
+@names_keywords
 @dataclass(frozen=True, kw_only=True)
 class Beta(Truncated):
     """Beta distribution of shapes `a`, `b`, stretched from [0, 1] to [`minimum`, `maximum`]."""
@@ -308,6 +317,7 @@ class Beta(Truncated):
         return self.minimum + (self.maximum - self.minimum) * share
 
 
+@names_keywords
 @dataclass(frozen=True, kw_only=True)
 class MeasuredSample(Truncated):
     """The values that were measured, drawn along the straight line between neighbours of the sorted sample.
@@ -373,6 +383,7 @@ class MeasuredSample(Truncated):
         return np.asarray(np.interp(place, np.arange(len(self._kept)), self._kept))
 
 
+@names_keywords
 @dataclass(frozen=True, kw_only=True)
 class Fixed:
     """An input that does not vary."""
@@ -388,6 +399,7 @@ class Fixed:
         return np.full(np.shape(u), float(self.value))
 
 
+@names_keywords
 @dataclass(frozen=True, kw_only=True)
 class Scaled:
     """Another distribution, shrunk or stretched by `factor` about `centre`: what a changed tolerance does."""

@@ -9,7 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 LAYERS = [
     {"arrays"},
-    {"bench", "errors", "figures", "files", "late", "parallel"},
+    {"bench", "errors", "figures", "files", "keywords", "late", "parallel"},
     {"drive"},
     {"effects", "recordings", "kinematics", "mechanics"},
     {"tolerance", "simulation"},
@@ -24,6 +24,7 @@ LAYERS = [
 BESIDE = {
     ("parallel", "errors"): "the errors are the ground that every room stands on",
     ("figures", "errors"): "the errors are the ground that every room stands on",
+    ("keywords", "errors"): "the errors are the ground that every room stands on",
     ("files", "errors"): "the errors are the ground that every room stands on",
     ("parallel", "files"): "finished parts are kept on disk, whole or not at all",
     ("geometry", "allocation"): "fits are made of the IT grades of ISO 286, which stand once",
@@ -33,7 +34,7 @@ BESIDE = {
 }
 """Imports between rooms of one layer, with the reason."""
 
-TOP = {"__init__.py", "__main__.py", "arrays.py", "errors.py", "figures.py", "files.py", "late.py"}
+TOP = {"__init__.py", "__main__.py", "arrays.py", "errors.py", "figures.py", "files.py", "keywords.py", "late.py"}
 
 HEAVY = {"cadquery", "plotly", "cvxpy", "SALib", "openturns", "distributed", "dask", "nlopt", "pymoo", "vtk", "OCP"}
 

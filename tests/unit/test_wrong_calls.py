@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
+import importlib
 import inspect
 import pickle
+import pkgutil
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -15,9 +18,12 @@ import pandas as pd
 import pytest
 
 import hdopt
+import hdopt.allocation.cost
+import hdopt.drive
+import hdopt.tolerance.distributions
 from hdopt.errors import WrongCall
 from hdopt.files import HasTables
-from hdopt.workflow.called import _kinds, hints_of, in_python
+from hdopt.workflow.called import _kinds, as_called, hints_of, in_python
 from hdopt.workflow.placed import numbers_named
 
 CALLS = [name for name in hdopt.__all__ if isinstance(getattr(hdopt, name), FunctionType)]
@@ -186,3 +192,70 @@ def test_a_changed_study_is_placed_where_it_was_changed():
 
     with pytest.raises(hdopt.HdoptError, match=r"^study\.with_ errors\.axis_tilt_x_deg \(1e-09, the value farthest"):
         work(hdopt.load_study("csf-25-80").with_(axis_tilt_x_deg=1e-9))
+
+
+def _records():
+    """Every public record, and every one that a drive, a tolerance or a cost is made of."""
+    modules = [hdopt.tolerance.distributions, hdopt.allocation.cost]
+    modules += [importlib.import_module(f"hdopt.drive.{one.name}") for one in pkgutil.iter_modules(hdopt.drive.__path__)
+                if one.name != "data"]  # fmt: skip
+    parts = [kind for module in modules for kind in vars(module).values() if inspect.isclass(kind)]
+    public = [getattr(hdopt, name) for name in hdopt.__all__ if inspect.isclass(getattr(hdopt, name))]
+    ours = [one for one in (*public, *parts) if one.__module__.startswith("hdopt") and dataclasses.is_dataclass(one)]
+    return sorted(set(ours), key=lambda one: one.__name__)
+
+
+def _calls_of(record):
+    """The ways to call the class `record`: to make one, and its public methods, of one without any values."""
+    yield "", record
+    empty = object.__new__(record)
+    for name in dir(record):
+        found = inspect.getattr_static(record, name)
+        if not name.startswith("_") and isinstance(found, FunctionType | classmethod):
+            yield f".{name}", getattr(empty, name)
+
+
+@pytest.mark.parametrize("record", _records())
+def test_a_misspelt_argument_of_a_record_or_of_its_methods_leads_to_the_nearest(record):
+    """Would catch a record, or a method, that answers in Python's words: "got an unexpected keyword argument"."""
+    for way, call in _calls_of(record):
+        parameters = inspect.signature(call).parameters.values()
+        if any(one.kind is one.VAR_KEYWORD for one in parameters):
+            continue
+        for one in parameters:
+            with pytest.raises(
+                WrongCall, match=rf"^{record.__name__}{way}: unknown argument '{one.name}x'; did you mean"
+            ):
+                call(**{f"{one.name}x": None})
+        with pytest.raises(
+            WrongCall, match=rf"^{record.__name__}{way}: unknown argument 'qqqq'; (known: |it takes none)"
+        ):
+            call(qqqq=None)
+
+
+def test_a_unit_in_the_name_of_an_argument_is_answered_with_the_one_it_has():
+    """Would catch a hint that leads to the right name with the number in the wrong unit."""
+    with pytest.raises(WrongCall, match=r"'axis_tilt_y_deg'; did you mean 'axis_tilt_y', in rad\?"):
+        hdopt.DriveErrors(axis_tilt_y_deg=0.2)
+    with pytest.raises(WrongCall, match=r"'axis_eccentricity_mm'; did you mean 'axis_eccentricity', in mm\?"):
+        hdopt.DriveErrors(axis_eccentricity_mm=0.01)
+
+
+def test_the_result_of_a_call_is_watched_whatever_room_it_comes_from():
+    class Fresh:
+        __module__ = "hdopt.somewhere"
+
+        def plot(self, backend: str = "plotly") -> str:
+            return [][backend]  # a fault of its own, which is no wrong call
+
+    def work() -> Fresh:
+        return Fresh()
+
+    result = as_called(work, hdopt._public)()
+    with pytest.raises(WrongCall, match=r"^Fresh\.plot: unknown argument 'bakend'; did you mean 'backend'\?"):
+        result.plot(bakend="x")
+    with pytest.raises(WrongCall, match=r"^Fresh\.plot: too many positional arguments; it takes backend$"):
+        result.plot("x", "y")
+    with pytest.raises(TypeError, match="list indices") as raised:
+        result.plot()
+    assert not isinstance(raised.value, WrongCall)
