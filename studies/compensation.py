@@ -8,6 +8,8 @@ takes away the true error, torque, time and temperature included, so only noise 
 from __future__ import annotations
 
 import argparse
+import sys
+import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -117,6 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     from hdopt.files import to_csv, write_text
     from hdopt.study import load_study
+    from hdopt.workflow.doing import still
 
     parser = argparse.ArgumentParser(prog="python -m hdopt.studies.compensation", description=__doc__)
     parser.add_argument("--cases", type=int, default=60)
@@ -133,9 +136,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     terms = None if options.terms == "auto" else int(options.terms)
     rows = kept.to_dict("records")
     done = {int(row["seed"]) for row in rows}
-    for seed, effect, severity in plan(options.seed, options.skip + options.cases)[options.skip :]:
-        if seed in done:
-            continue
+    asked = [one for one in plan(options.seed, options.skip + options.cases)[options.skip :] if one[0] not in done]
+    begun = time.monotonic()
+    for number, (seed, effect, severity) in enumerate(asked):
+        more = f", {still(begun, number, len(asked))}" if number else ""
+        print(f"case {number + 1} of {len(asked)}: {effect or 'nothing'} hidden{more}", file=sys.stderr, flush=True)
         case = run_case(seed, effect, severity, drive, terms)
         if case is not None:
             rows.append({str(key): value for key, value in asdict(case).items()})

@@ -12,6 +12,7 @@ from hdopt.report import Points, Ruling, Section, Table, Text
 from hdopt.report.sections.words import label
 from hdopt.studies.sections import ConcealedSection
 from hdopt.study import Study
+from hdopt.workflow.doing import counted
 from hdopt.workflow.steps import Context, StepResult
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ def concealed_physics(study: Study, context: Context) -> StepResult:
     The answer to the study is "no" where a criterion of the frozen gate (`hdopt.bench.thresholds`) is missed.
     """
     from hdopt.bench.proof import prove
+    from hdopt.bench.suite import plan
     from hdopt.diagnosis import diagnose
     from hdopt.parallel.engine import engine_from, for_large_items
     from hdopt.recordings.read import recording_from_table
@@ -40,8 +42,15 @@ def concealed_physics(study: Study, context: Context) -> StepResult:
         return diagnose(records, drive, seed=context.seed).to_dict()
 
     # Each case is a part of its own: kept when it is done, and on a cluster where there is one.
-    spread = for_large_items(engine_from(None)).map
-    scores = prove(answer, size.seed, spread, share=size.share, families=tuple(size.families))
+    work, families = for_large_items(engine_from(None)).map, tuple(size.families)
+    total = len(plan(size.seed, families, share=size.share))
+    scores = prove(
+        answer,
+        size.seed,
+        lambda function, cases: counted(work(function, cases), total, "case"),
+        share=size.share,
+        families=families,
+    )
     gate = [vars(criterion) for criterion in scores.gate()]
     results: dict[str, object] = {
         "seed": size.seed,

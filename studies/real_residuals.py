@@ -17,6 +17,7 @@ from hdopt.report import Points, Section, Table
 from hdopt.report.sections.words import label
 from hdopt.studies.sections import ResidualsSection
 from hdopt.study import Study
+from hdopt.workflow.doing import counted
 from hdopt.workflow.steps import Context, StepResult
 
 if TYPE_CHECKING:
@@ -48,8 +49,13 @@ def real_residuals(study: Study, context: Context) -> StepResult:
     Three kinds of cases: a reversing actuator's own motion and residual, and a simulated drive whose only noise is that
     residual, or the difference between star trails of one exposure, scaled to a share of the drive's error.
     """
+    from hdopt.bench.cases import CATALOGUE
+    from hdopt.bench.real_residuals import ON_REAL_MOTION
+
     size = study.section("residuals", ResidualsSection, "real-residuals")
-    cases = pd.DataFrame(list(answered_cases(study.drive, size, recordings_folder(), context.seed)))
+    total = len(planned(size, ON_REAL_MOTION)) + 2 * len(planned(size, CATALOGUE))
+    answered = answered_cases(study.drive, size, recordings_folder(), context.seed)
+    cases = pd.DataFrame(list(counted(answered, total, "case")))
     table = (
         cases.groupby(["noise", "severity"])
         .agg(
@@ -145,21 +151,24 @@ def answered_cases(
     rng = np.random.default_rng(size.seed)
     real = actuator_residual(folder)
 
-    def plan(effects: Iterable[str]) -> list[tuple[str, float]]:
-        wanted = [name for name in effects if not size.effects or name in size.effects]
-        return [("", 0.0)] * size.nothing + [(name, severity) for name in wanted for severity in size.severities]
-
-    for effect, severity in plan(ON_REAL_MOTION):
+    for effect, severity in planned(size, ON_REAL_MOTION):
         recording = recording_from_table(on_real_motion(real, effect, severity, rng), real.ratio)
         yield judged("actuator, its own motion", effect, severity, diagnose(recording, None, real.ratio, seed=seed))
     for noise, residual in (
         ("actuator, simulated drive", real.residual),
         ("star trails, simulated drive", trails(folder)),
     ):
-        for effect, severity in plan(CATALOGUE):
+        for effect, severity in planned(size, CATALOGUE):
             tables = on_simulated_drive(residual, effect, severity, size.noise_share, rng)
             recordings = [recording_from_table(table, drive.geometry.ratio) for table in tables]
             yield judged(noise, effect, severity, diagnose(recordings, drive, seed=seed))
+
+
+def planned(size: ResidualsSection, effects: Iterable[str]) -> list[tuple[str, float]]:
+    """(effect, severity) of each case in one noise, of those `effects` that `size` asks for: those with nothing
+    first."""
+    wanted = [name for name in effects if not size.effects or name in size.effects]
+    return [("", 0.0)] * size.nothing + [(name, severity) for name in wanted for severity in size.severities]
 
 
 def judged(noise: str, hidden: str, severity: float, diagnosis: Diagnosis) -> dict[str, str | float | bool]:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import StudyOptions, emit, progress, status, study_options, table_options, work_options
+from hdopt.cli.common import StudyOptions, emit, status, study_options, table_options, work_options
+from hdopt.cli.log import looked_at
 
 if TYPE_CHECKING:
     from hdopt.allocation.results import AllocateResult
@@ -27,13 +28,17 @@ def command(asked: StudyOptions, rule: str | None, compare: bool | None, json_fi
 
     STUDY is a study file or a shipped study with costs. Exit status 1: the requirement cannot be met.
     """
+    from threading import get_ident
+
     from hdopt.allocation.convex import Infeasible
     from hdopt.workflow.allocate import allocate
+    from hdopt.workflow.allocation_stages import AllocationWatch
     from hdopt.workflow.requirement import of_allocation
 
-    loaded = asked.load()
+    loaded, watch = asked.load(), AllocationWatch(get_ident())
     try:
-        result = allocate(loaded, rule, compare=compare, seed=seed, progress=lambda rules: progress(rules, "rules"))
+        with looked_at("allocation", watch.words):
+            result = allocate(loaded, rule, compare=compare, seed=seed, progress=watch.rules)
     except Infeasible as error:
         answer = {
             "study": loaded.name,

@@ -11,13 +11,13 @@ import click
 from hdopt.cli.common import (
     StudyOptions,
     emit,
-    progress,
     resume_option,
     status,
     study_options,
     table_options,
     work_options,
 )
+from hdopt.cli.log import looked_at
 
 if TYPE_CHECKING:
     from hdopt.workflow.run import RunResult
@@ -40,21 +40,25 @@ def command(
     """
     if verify:
         return _verify(Path(folder or asked.study or "."), json_file)
+    from hdopt.workflow.doing import Doing, told
     from hdopt.workflow.requirement import of_run
     from hdopt.workflow.run import run_study
 
     loaded = asked.load()
     place = Path(folder) if folder else Path("out") / loaded.name
-    result = run_study(loaded, place, seed, lambda names: progress(names, loaded.name), resume)
+    with told(Doing()) as doing, looked_at(loaded.name, doing.words):
+        result = run_study(loaded, place, seed, doing.steps, resume)
     verdict = of_run(loaded, result.found)
     emit(result.to_dict(), json_file, _lines(result), verdict, result)
     return status(result.answer, verdict)
 
 
 def _verify(folder: Path, json_file: Path | None) -> int:
+    from hdopt.workflow.doing import Doing, told
     from hdopt.workflow.verify import lines, verify_run
 
-    result = verify_run(folder, lambda names: progress(names, str(folder)))
+    with told(Doing()) as doing, looked_at(str(folder), doing.words):
+        result = verify_run(folder, doing.steps)
     emit(result.to_dict(), json_file, lines(result), tables=result)
     return 0 if result.repeated else 1
 

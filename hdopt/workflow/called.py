@@ -14,6 +14,8 @@ from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union  # Any: the arguments of any call
 
 from hdopt.errors import HdoptError, WrongCall, shown, unknown_name
+from hdopt.keywords import bound, names_keywords, nearest
+from hdopt.workflow.notebook import said_in_a_notebook
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -66,7 +68,7 @@ def as_called(work: F, public: Callable[[str], Any]) -> F:
 
     @functools.wraps(work)
     def call(*arguments: Any, **options: Any) -> Any:
-        given = _bound(work, known, arguments, options)
+        given = bound(f"hdopt.{work.__name__}", known, arguments, options, _unknown)
         hints = hints_of(work, public)
         for name, value in given.arguments.items():
             if type(value) in _exact(hints[name]):
@@ -77,38 +79,21 @@ def as_called(work: F, public: Callable[[str], Any]) -> F:
                 place, wanted = error.args
                 raise WrongCall(f"hdopt.{work.__name__}: {place}; give {wanted}{_hint(value, wanted)}") from None
         try:
-            return work(*given.args, **given.kwargs)
+            with said_in_a_notebook(work.__name__, given.arguments, known.parameters):
+                result = work(*given.args, **given.kwargs)
         except HdoptError as error:
             error.args = (in_python(str(error), work.__name__, tuple(known.parameters)), *error.args[1:])
             raise
+        names_keywords(type(result))
+        return result
 
     call.__module__ = "hdopt"  # where pickle finds it again
     return typing.cast(F, call)
 
 
-def _bound(
-    work: Callable[..., Any], known: inspect.Signature, arguments: Sequence[Any], options: Mapping[str, Any]
-) -> inspect.BoundArguments:
-    for name in options:
-        if name not in known.parameters:
-            raise WrongCall(f"hdopt.{work.__name__}: {_unknown(name, known)}")
-    try:
-        return known.bind(*arguments, **options)
-    except TypeError as error:
-        said = str(error)
-        if said.startswith("missing"):
-            raise WrongCall(f"hdopt.{work.__name__}: {said}; it takes {', '.join(known.parameters)}") from None
-        if said.startswith("too many"):
-            first = [one.name for one in known.parameters.values() if one.kind is not one.KEYWORD_ONLY]
-            beside = [f"{name}=..." for name in known.parameters if name not in first]
-            by_name = f"; by name {', '.join(beside)}" if beside else ""
-            raise WrongCall(f"hdopt.{work.__name__}: {said}; it takes {', '.join(first) or 'none'}{by_name}") from None
-        raise WrongCall(f"hdopt.{work.__name__}: {said}") from None
-
-
 def _unknown(name: str, known: inspect.Signature) -> str:
     """What to say of an argument that a call has not: which one was meant, or where it goes."""
-    said = unknown_name("argument", name, known.parameters)
+    said = nearest(name, known)
     if "did you mean" in said:
         return said
     if name in OF_FILES and "drive" in known.parameters:
