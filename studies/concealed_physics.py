@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from hdopt.bench.scores import CaseScore, Criterion, Scores
 
 RELIABILITY = "Stated confidence against how often it was right"
+INTERVAL = "Low and high: the 95 % interval of the share that was right."
 
 
 def concealed_physics(study: Study, context: Context) -> StepResult:
@@ -59,8 +60,20 @@ def concealed_physics(study: Study, context: Context) -> StepResult:
         "passed": bool(scores.passed),
     }
     results["gate"] = gate
-    says = tuple(without_empty(scores.summary().split("\n\n")))
-    return StepResult((proof_section(scores, size),), results, says=says, answer=bool(scores.passed))
+    section = proof_section(scores, size)
+    return StepResult((section,), results, says=tuple(said_of(section, scores)), answer=bool(scores.passed))
+
+
+def said_of(section: Section, scores: Scores) -> Iterator[str]:
+    """Lines for the terminal: how the page's `section` begins, then the counts behind it, of `scores`."""
+    for item in section.items:
+        if isinstance(item, Ruling):
+            yield f"{'kept' if item.met else 'missed'}: {item.text}"
+        if isinstance(item, Points):
+            yield from item.sentences
+    yield ""
+    _, *blocks = scores.summary().split("\n\n")  # the gate comes first, and is said already
+    yield from without_empty(blocks)
 
 
 def proof_section(scores: Scores, size: ConcealedSection) -> Section:
@@ -81,8 +94,8 @@ def proof_section(scores: Scores, size: ConcealedSection) -> Section:
             if scores.families
             else ()
         ),
-        *((Table("concealed-reliability", RELIABILITY, reliability),) if len(reliability) else ()),
-        *((Table("concealed-failed", "Every case that failed", failed),) if len(failed) else ()),
+        *((Table("concealed-reliability", RELIABILITY, reliability, INTERVAL),) if len(reliability) else ()),
+        *((Table("concealed-failed", "Every case that failed", failed, "", {"severity": "g"}),) if len(failed) else ()),
         Text(f"Seed {size.seed}, {100 * size.share:g} % of the full proof, {len(scores.cases)} cases."),
     )
     return Section("concealed-physics", "What a bench concealed, and what was found", items)
@@ -91,6 +104,9 @@ def proof_section(scores: Scores, size: ConcealedSection) -> Section:
 AT_MOST = ("false-alarm", "unknown physics named", "effects whose", "calibration", "cases that cannot")
 """How the criteria begin whose limit is an upper one; the others have a lower one."""
 ENOUGH = "enough cases"
+UNCOVERED = "effects whose intervals do not"
+BOTH = ", at most "
+"""What comes before the upper limit in the detail of a criterion that has both."""
 
 
 def gate_frame(gate: Sequence[Criterion]) -> pd.DataFrame:
@@ -98,10 +114,10 @@ def gate_frame(gate: Sequence[Criterion]) -> pd.DataFrame:
     case bears on is neither kept nor missed."""
     rows = []
     for one in gate:
-        limit = "" if isnan(one.limit) or one.name == ENOUGH else f"{_side(one)} {one.limit:.3g}"
+        limit = "" if isnan(one.limit) or one.name == ENOUGH else _limit(one)
         value = nan if one.name == ENOUGH else one.value
         asked = not isnan(one.value)
-        rows.append((one.name, value, limit, ("yes" if one.passed else "no") if asked else "not asked", one.detail))
+        rows.append((one.name, value, limit, ("yes" if one.passed else "no") if asked else "not asked", _counted(one)))
     return pd.DataFrame(rows, columns=["criterion", "value", "limit", "kept", "counted"])
 
 
@@ -111,21 +127,36 @@ def families_frame(scores: Scores) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["family", "cases", "right"])
 
 
-def _side(one: Criterion) -> str:
-    return "at most" if one.name.startswith(AT_MOST) else "at least"
+def _limit(one: Criterion) -> str:
+    """'at most 0.01', or '0.93 to 0.97' of a criterion whose detail names its upper limit."""
+    _, both, upper = one.detail.partition(BOTH)
+    if both:
+        return f"{one.limit:.3g} to {upper}"
+    return f"{'at most' if one.name.startswith(AT_MOST) else 'at least'} {one.limit:.3g}"
+
+
+def _counted(one: Criterion) -> str:
+    """What a criterion was counted in, its effects in words."""
+    counted = one.detail.partition(BOTH)[0]
+    effects = counted.split(", ")
+    return named(effects) if one.name == UNCOVERED and counted else counted
 
 
 def _missed(gate: Sequence[Criterion], cases: int, share: float) -> Iterator[str]:
     """What keeps a proof from passing, a sentence each."""
     for one in gate:
         if not one.passed and not isnan(one.value) and one.name != ENOUGH:
-            yield f"Missed: {one.name} {one.value:.3g}, {_side(one)} {one.limit:.3g} is asked ({one.detail})."
+            counted = f" ({_counted(one)})" if _counted(one) else ""
+            yield f"Missed: {one.name}: {one.value:.3g}, where {_limit(one)} is asked{counted}."
     unasked = [one.name for one in gate if isnan(one.value)]
     if unasked:
-        yield f"No case of this run bears on {len(unasked)} criteria: {'; '.join(unasked)}."
+        criteria = "one criterion" if len(unasked) == 1 else f"{len(unasked)} criteria"
+        yield f"No case of this run bears on {criteria}: {'; '.join(unasked)}."
     if any(one.name == ENOUGH and not one.passed for one in gate):
+        few = "One case is" if cases == 1 else f"{cases} cases are"
         yield (
-            f"{cases} cases are too few for the gate, whatever they say: it is that of the full proof, and this is "
+            f"{few} too few for the gate, whatever {'it says' if cases == 1 else 'they say'}: it is that of the full "
+            f"proof, and this is "
             f"{100 * share:g} % of it or a part of its families."
         )
 
@@ -140,15 +171,16 @@ def without_empty(blocks: Iterable[str]) -> Iterator[str]:
 
 
 def _failed_row(case: CaseScore) -> dict[str, str | float]:
-    """A failed case as a row of the page, its effects in words."""
+    """A failed case as a row of the page, its effects in words; no severity where nothing was hidden."""
+    concealed = named(case.truth) or case.outside or "nothing"
+    kind = f" ({case.hidden})" if case.hidden and case.hidden != concealed else ""
+    said = named(case.said)
     return {
         "case": case.id,
         "family": case.family,
-        "severity": case.severity,
-        "concealed": named(case.truth) or case.outside or "nothing",
-        "of the kind": case.hidden,
-        "verdict": case.verdict,
-        "said": named(case.said),
+        "severity": case.severity or nan,
+        "concealed": f"{concealed}{kind}",
+        "answered": f"{case.verdict}: {said}" if said else case.verdict,
         "why it failed": case.reason,
     }
 

@@ -38,6 +38,16 @@ def test_its_page_begins_with_the_verdict_and_speaks_in_words():
     gate = [
         SimpleNamespace(name="exact sets, 2 hidden", value=float("nan"), limit=0.9, passed=False, detail="0 of 0"),
         SimpleNamespace(name="false-alarm rate", value=0.527, limit=0.01, passed=False, detail="0 of 4"),
+        SimpleNamespace(
+            name="95 % intervals that hold the truth",
+            value=1.0,
+            limit=0.93,
+            passed=False,
+            detail="7 of 7, at most 0.97",
+        ),
+        SimpleNamespace(
+            name="effects whose intervals do not", value=1.0, limit=0.0, passed=False, detail="lost_motion"
+        ),
         SimpleNamespace(name="unknown physics recognised", value=1.0, limit=0.95, passed=True, detail="3 of 3"),
         SimpleNamespace(name="enough cases", value=0.0, limit=1.0, passed=False, detail="1 cases"),
     ]
@@ -51,18 +61,24 @@ def test_its_page_begins_with_the_verdict_and_speaks_in_words():
     )  # fmt: skip
     section = proof_section(scores, SimpleNamespace(seed=1, share=0.02))
     ruling, *rest = section.items
-    assert isinstance(ruling, Ruling) and ruling.met is False and ruling.text.startswith("1 of 3 criteria")
+    assert isinstance(ruling, Ruling) and ruling.met is False and ruling.text.startswith("1 of 5 criteria")
     points, *_ = rest
     assert points.sentences == (
-        "Missed: false-alarm rate 0.527, at most 0.01 is asked (0 of 4).",
-        "No case of this run bears on 1 criteria: exact sets, 2 hidden.",
-        "1 cases are too few for the gate, whatever they say: it is that of the full proof, and this is 2 % of it or a "
+        "Missed: false-alarm rate: 0.527, where at most 0.01 is asked (0 of 4).",
+        "Missed: 95 % intervals that hold the truth: 1, where 0.93 to 0.97 is asked (7 of 7).",
+        "Missed: effects whose intervals do not: 1, where at most 0 is asked (Lost motion).",
+        "No case of this run bears on one criterion: exact sets, 2 hidden.",
+        "One case is too few for the gate, whatever it says: it is that of the full proof, and this is 2 % of it or a "
         "part of its families.",
     )
     tables = {item.key: item.frame for item in rest if isinstance(item, Table)}
     assert list(tables) == ["concealed-gate", "concealed-families", "concealed-failed"]
-    assert tables["concealed-gate"]["kept"].tolist() == ["not asked", "no", "yes", "no"]
-    assert tables["concealed-gate"]["limit"].tolist() == ["at least 0.9", "at most 0.01", "at least 0.95", ""]
+    assert tables["concealed-gate"]["kept"].tolist() == ["not asked", "no", "no", "no", "yes", "no"]
+    assert tables["concealed-gate"]["limit"].tolist() == [
+        "at least 0.9", "at most 0.01", "0.93 to 0.97", "at most 0", "at least 0.95", "",
+    ]  # fmt: skip
+    (row,) = tables["concealed-failed"].to_dict("records")
+    assert row["concealed"] == "CS tooth harmonics (lobes)" and row["answered"] == "named: Torsional windup, Resonance"
     page = render(Report("Title", "", (section,)))
     assert ">nan" not in page and "(limit" not in page
     assert "CS tooth harmonics" in page and "Torsional windup, Resonance" in page and "cs_tooth_harmonics" not in page
@@ -76,6 +92,9 @@ def test_every_criterion_of_the_real_gate_has_its_side():
     sides = dict(zip(gate_frame(gate)["criterion"], gate_frame(gate)["limit"], strict=True))
     for one in gate:
         asked = sides[one.name].split(" ")[:2]
+        if one.name == "95 % intervals that hold the truth":
+            assert sides[one.name] == "0.93 to 0.97"
+            continue
         assert one.name in ("enough cases", "log score of confidences, over the best constant") or asked in (
             ["at", "most"], ["at", "least"],
         )  # fmt: skip
