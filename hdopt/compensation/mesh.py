@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.compensation.surface import AT_ONCE, Crossing, Harmonics
+from hdopt.compensation.surface import Grid, Harmonics
 from hdopt.compensation.teeth import ALONE, CELLS, LOOSE, SHORTEST, STEPS, Teeth, beyond_waves, refit_waves
 from hdopt.compensation.zones import MOST_TERMS, SMALL, Zones, in_terms, zone_values
 from hdopt.effects.met import Spline, met_angles
@@ -133,16 +133,9 @@ def _modest(bare: Teeth, seen: tuple[Array, Array], free: Array, share: float) -
 
 
 @dataclass(frozen=True)
-class Beat:
-    """The error over a whole beat, `values` (n_input, N) arcmin, mean zero: even steps of the input in every input turn
-    of the output's turn; `back` and `crossing` as in `Harmonics`."""
-
-    values: Array
-    back: float = 0.0
-    crossing: Crossing = AT_ONCE
-
-    def __len__(self) -> int:
-        return int(self.values.size)
+class Beat(Grid):
+    """A grid over a whole beat, `values` (n_input, N): even steps of the input in every input turn of the output's
+    turn."""
 
     def at(self, inputs: Array, outputs: Array, direction: Array | float = 0.0) -> Array:
         """Error (arcmin, n) by straight lines along the input at `inputs`, `outputs` (n,) rad and `direction`; the

@@ -87,9 +87,9 @@ def nothing(back: float = 0.0) -> Harmonics:
 
 
 @dataclass(frozen=True)
-class Surface:
-    """The error on an even grid, `values` (n_input, n_output) arcmin, mean zero; `back` and `crossing` as in
-    `Harmonics`."""
+class Grid:
+    """The error at even steps, `values` (n_input, n) arcmin, mean zero, that straight lines join; a subclass says what
+    the columns are. `back` and `crossing` as in `Harmonics`."""
 
     values: Array
     back: float = 0.0
@@ -97,6 +97,11 @@ class Surface:
 
     def __len__(self) -> int:
         return int(self.values.size)
+
+
+@dataclass(frozen=True)
+class Surface(Grid):
+    """A grid over input and output angle, `values` (n_input, n_output)."""
 
     def at(self, inputs: Array, outputs: Array, direction: Array | float = 0.0) -> Array:
         """Error (arcmin, n) by straight lines between grid points at `inputs`, `outputs` (n,) rad and `direction`."""

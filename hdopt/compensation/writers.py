@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any  # Any: values of JSON
 
 from hdopt.compensation.mesh import Beat
-from hdopt.compensation.surface import Crossing, Harmonics, Surface
+from hdopt.compensation.surface import Crossing, Grid, Harmonics, Surface
 from hdopt.compensation.zones import Zones
 
 Found = Harmonics | Zones | Surface | Beat
@@ -66,7 +66,7 @@ def _json(found: Found, facts: Mapping[str, Any]) -> str:
     content["return_crossing_output_deg"] = found.crossing.deg
     content["return_crosses"] = crosses(found)
     content["return_path_at_start"] = found.crossing.start
-    if isinstance(found, Surface | Beat):
+    if isinstance(found, Grid):
         content["table"] = "input angle by output angle" if isinstance(found, Surface) else "input angle by input turn"
         content["table_arcmin"] = found.values.tolist()
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
@@ -166,7 +166,7 @@ def _c(found: Found, facts: Mapping[str, Any]) -> str:
     head = _HEAD.format(
         facts=said, crossing=found.crossing.deg, start=found.crossing.start, moves=_moves(found.crossing)
     )
-    if not isinstance(found, Surface | Beat):
+    if not isinstance(found, Grid):
         columns = list(zip(*_terms(found), strict=True)) or [()] * 5
         numbers = {name: _list(column) for name, column in zip(("k", "j", "cos", "sin", "sum"), columns, strict=True)}
         larger = "fmin" if isinstance(found, Zones) and found.sense < 0 else "fmax"
