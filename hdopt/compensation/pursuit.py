@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from hdopt.arrays import Array
+from hdopt.arrays import Array, Index
+from hdopt.compensation.fine import LEAST_TURNS, fine_pairs
 from hdopt.compensation.surface import Harmonics
 
 INPUT_ORDERS = 10
@@ -24,11 +25,18 @@ CELLS = 4000
 
 def dictionary(span_output_turns: float) -> list[tuple[int, int]]:
     """The pairs (k, j) to try for a record that spans `span_output_turns`: neighbours in j only where it parts them."""
+    # Those of the output alone are no neighbours of others: a load that follows its angle is of order 1.
     # Orders j/N apart are a cycle apart over a whole output turn; a shorter record carries every second, third ... one.
     step = max(1, math.ceil(0.9 / max(span_output_turns, 1e-9)))
     if step > OUTPUT_ORDERS:
         return [(k, 0) for k in range(1, INPUT_ORDERS + 1)]
-    pairs = [(k, j) for k in range(INPUT_ORDERS + 1) for j in range(-OUTPUT_ORDERS, OUTPUT_ORDERS + 1) if j % step == 0]
+    every = 1 if span_output_turns >= LEAST_TURNS else step
+    pairs = [
+        (k, j)
+        for k in range(INPUT_ORDERS + 1)
+        for j in range(-OUTPUT_ORDERS, OUTPUT_ORDERS + 1)
+        if j % (every if k == 0 else step) == 0
+    ]
     return [(k, j) for k, j in pairs if k > 0 or j > 0]
 
 
@@ -47,12 +55,42 @@ def pursue(
     what is left, so that coloured noise is not taken for harmonics.
     """
     free = zeros if direction is None else np.column_stack([zeros, direction])
-    stride = max(1, len(residual) // CELLS)
-    y = residual[::stride]
-    basis, _ = np.linalg.qr(free[::stride])
+    some = _some(len(residual))
+    chosen = _chosen((angles[0][some], angles[1][some]), residual[some], free[some], pairs, terms, len(pairs))
+    found = _fitted(angles, residual, zeros, direction, chosen)
+    if len(chosen) == terms:
+        return found
+    # An encoder's lines are far finer than any pair: every row for them, on what is left.
+    left = residual - found.at(*angles, 0.0 if direction is None else direction)
+    fine, among = fine_pairs(angles, left - _mean_of(free, left), (INPUT_ORDERS, OUTPUT_ORDERS))
+    more = _chosen(angles, left, free, fine, terms - len(chosen), among)
+    return _fitted(angles, residual, zeros, direction, [*chosen, *more]) if more else found
+
+
+def _some(count: int) -> Index:
+    """About `CELLS` of so many rows, one of every few by chance: at even steps a fine wave would pass for slow."""
+    step = max(1, count // CELLS)
+    starts = np.arange(0, count - step + 1, step)
+    return np.asarray(starts + np.random.default_rng(0).integers(step, size=len(starts)), np.int64)
+
+
+def _mean_of(free: Array, left: Array) -> Array:
+    """What `free` columns (n, q) take of what is `left` (n,)."""
+    basis, _ = np.linalg.qr(free)
+    return np.asarray(basis @ (basis.T @ left), float)
+
+
+def _chosen(
+    angles: tuple[Array, Array], y: Array, free: Array, pairs: list[tuple[int, int]], terms: int, among: int
+) -> list[tuple[int, int]]:
+    """At most `terms` of the `pairs`, one after another, that take more of `y` (n,) beside `free` columns (n, q) than
+    the largest of `among` would by chance."""
+    if not pairs:
+        return []
+    basis, _ = np.linalg.qr(free)
     left = y - basis @ (basis.T @ y)
     turned = [
-        {order: np.exp(1j * order * angle[::stride]) for order in {pair[which] for pair in pairs}}
+        {order: np.exp(1j * order * angle) for order in {pair[which] for pair in pairs}}
         for which, angle in enumerate(angles)
     ]
     waves = np.array([turned[0][k] * turned[1][j] for k, j in pairs])
@@ -72,12 +110,12 @@ def pursue(
             break
         after = left - part @ (part.T @ left)
         gain = len(y) * math.log(max(float(left @ left), 1e-300) / max(float(after @ after), 1e-300))
-        if gain * independent_share(after) < 2 * math.log(len(y)) + 2 * math.log(len(pairs)):
+        if gain * independent_share(after) < 2 * math.log(len(y)) + 2 * math.log(among):
             break
         chosen.append(best)
         basis = np.column_stack([basis, part])
         left = after
-    return _fitted(angles, residual, zeros, direction, [pairs[c] for c in chosen])
+    return [pairs[c] for c in chosen]
 
 
 def independent_share(left: Array) -> float:

@@ -8,7 +8,7 @@ turns of a beat.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -19,6 +19,10 @@ from hdopt.arrays import Array, Index
 COARSE, FINE = (192, 96), (384, 192)
 """Grids of a surface. The coarse one has 1.9 deg of the input and 3.75 deg of the output: straight lines in between are
 off by half a per cent of an amplitude of order 4; the fine one, of half the steps, is for single teeth."""
+CELLS_PER_WAVE = 5
+"""Cells of a table for a wave: straight lines between them leave a fifth of it, fewer hold nothing of it."""
+DIMMEST = 0.5
+"""Part of a wave that means of neighbouring samples leave from which on it is not made up for further."""
 
 
 Spectrum: TypeAlias = tuple[Index, Index, NDArray[np.complex128]]
@@ -68,6 +72,30 @@ class Harmonics:
             terms = zip(self.j[self.k == k].tolist(), self.amplitudes[self.k == k].tolist(), strict=True)
             value += (np.exp(1j * k * inputs) * sum(size * whole[j] for j, size in terms)).real
         return np.asarray(value, float)
+
+    def sharpened(self, ratio: float, width: float, count: int) -> Harmonics:
+        """These terms before means of `count` even samples over `width` rad of the input, from which they were fitted,
+        dimmed them; `ratio` is N."""
+        half = np.abs(self.k + self.j / ratio) * width / 2
+        seen = np.ones(len(half))
+        turns = half > 0
+        seen[turns] = np.sin(half[turns]) / (count * np.sin(half[turns] / count))
+        seen = np.maximum(seen, DIMMEST)
+        return replace(self, cos=self.cos / seen, sin=self.sin / seen)
+
+    def for_table(self, cells: tuple[int, ...]) -> tuple[Harmonics, Harmonics]:
+        """The terms that a table of `cells` holds between straight lines, with the return error, and those too fine."""
+        holds = (np.abs(self.k) * CELLS_PER_WAVE <= cells[0]) & (np.abs(self.j) * CELLS_PER_WAVE <= cells[1])
+        coarse, fine = (
+            replace(self, **{name: getattr(self, name)[mask] for name in ("k", "j", "cos", "sin")})
+            for mask in (holds, ~holds)
+        )
+        return coarse, replace(fine, back=0.0, crossing=AT_ONCE)
+
+    @property
+    def reach(self) -> float:
+        """Peak-to-peak (arcmin) of all terms where they meet at their largest."""
+        return 2 * float(np.abs(self.amplitudes).sum())
 
     @property
     def amplitudes(self) -> NDArray[np.complex128]:

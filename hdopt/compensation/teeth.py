@@ -14,6 +14,7 @@ import numpy as np
 
 from hdopt.arrays import Array, Index
 from hdopt.compensation.pursuit import independent_share
+from hdopt.compensation.surface import DIMMEST
 from hdopt.effects.met import Spline, Waves, met_angles, met_at
 from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel
 from hdopt.recordings.rows import Rows
@@ -29,8 +30,6 @@ ROUNDS, EVIDENCE_ROUNDS = 8, 25
 STEPS = (1.0, 0.5, 0.2)
 ENOUGH = 1e-3
 """Share by which the squares must fall for another round."""
-DIMMEST = 0.5
-"""Part of a wave that means of neighbouring samples leave from which on it is not made up for further."""
 CELLS = 4096
 LOOSE = 100.0
 """How much further than its own variance a fitted error of the model may move beside the waves."""

@@ -84,8 +84,9 @@ def driving(values: Array, sense: float) -> Array:
 def in_terms(values: Array, rest: Harmonics, sense: float, terms: int) -> Zones | Harmonics:
     """At most `terms` harmonics for the zones' `values` (2, n_input, n_output) arcmin and `rest`, which has the return
     error; `sense` as in `Zones`. The larger of two sums, or one sum where so few terms leave less that way."""
-    both = surface_of([rest], driving(values, sense), rest.back, rest.crossing)
-    one = both.harmonics(terms)
+    held, fine = rest.for_table(values.shape[1:])
+    both = surface_of([held], driving(values, sense), rest.back, rest.crossing)
+    one = both.harmonics(max(terms - len(fine), 0)) + fine
     spectra = [spectrum_of(zone) for zone in values]
     means = [float(zone.mean()) for zone in values]
     left = terms - len(rest) - len(values)
@@ -95,7 +96,8 @@ def in_terms(values: Array, rest: Harmonics, sense: float, terms: int) -> Zones 
     least = max(float(sizes[min(left, len(sizes) - 1)]), LEAST * float(sizes[0]))
     zones = [_kept(spectrum, mean, least) for spectrum, mean in zip(spectra, means, strict=True)]
     two = Zones(zones[0], zones[1], rest, sense)
-    return two if np.std(_off(two, both)) < np.std(_off(one, both)) else one
+    whole = surface_of([fine], both.values)
+    return two if np.std(_off(two, whole)) < np.std(_off(one, whole)) else one
 
 
 def _kept(spectrum: Spectrum, mean: float, least: float) -> Harmonics:
@@ -123,12 +125,14 @@ def formed(teeth: Teeth, rest: Harmonics, terms: int | None, left: float) -> tup
     `left` (arcmin) anyway; the finer of two grids where the coarser is.
     """
     fine = zone_values(teeth, FINE)
-    table = surface_of([rest], driving(fine, teeth.sense), rest.back, rest.crossing)
+    held, lost = rest.for_table(COARSE)
+    table = surface_of([held], driving(fine, teeth.sense), rest.back, rest.crossing)
     if terms != 0:
         found = in_terms(fine[:, ::2, ::2], rest, teeth.sense, MOST_TERMS if terms is None else terms)
-        off = float(np.ptp(_off(found, table)))
-        if terms is not None or off < SMALL * left:
+        # The terms too fine for a table are in what was found as they are: off is what the others are.
+        off = float(np.ptp(_off(found, surface_of([rest], driving(fine, teeth.sense)))))
+        if terms is not None or off < max(SMALL * left, lost.reach):
             return found, off
     coarse = replace(table, values=table.values[::2, ::2])
     off = float(np.ptp(_off(coarse, table)))
-    return (coarse, off) if off < SMALL * left else (table, 0.0)
+    return (coarse, off + lost.reach) if off < SMALL * left else (table, lost.reach)

@@ -54,8 +54,9 @@ def test_a_surface_gives_its_harmonics_back():
 @pytest.mark.parametrize(("turns", "step"), [(1.0, 1), (0.5, 2), (0.3, 3)])
 def test_a_short_record_parts_only_orders_far_enough_apart(turns, step):
     """Orders j/N apart are one cycle apart over an output turn."""
-    assert {j % step for _, j in dictionary(turns)} == {0}
-    assert len({j for _, j in dictionary(turns)}) == 2 * (10 // step) + 1
+    beside = [j for k, j in dictionary(turns) if k > 0]
+    assert {j % step for j in beside} == {0}
+    assert len(set(beside)) == 2 * (10 // step) + 1
 
 
 def test_less_than_a_tenth_of_an_output_turn_parts_nothing():
