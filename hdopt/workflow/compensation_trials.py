@@ -11,7 +11,7 @@ from hdopt.arrays import Array, Index, Mask
 from hdopt.compensation.mesh import ROWS_PER_TOOTH, fit_mesh, formed_mesh, shows_mesh
 from hdopt.compensation.path import Paths, crossing_of, half_return, path_of, some_of
 from hdopt.compensation.pursuit import dictionary, independent_share, pursue
-from hdopt.compensation.surface import AT_ONCE, Crossing, nothing, surface_of
+from hdopt.compensation.surface import AT_ONCE, COARSE, Crossing, nothing, surface_of
 from hdopt.compensation.teeth import Teeth, fit_teeth
 from hdopt.compensation.writers import Found
 from hdopt.compensation.zones import MOST_TERMS, formed
@@ -30,6 +30,9 @@ PLAIN_SIGN = 2.0
 """How many times as much the wrong sign of the error must leave for the sign to be plain."""
 ROWS_PER_TURN, MOST_ROWS = 128, 40_000
 """Rows an input turn that show single teeth, and how many rows there may be for their sake."""
+MEETS_AGAIN = 0.8
+"""Share of the stretches that a pass back must reach over to be one with the pass there."""
+BOTH_WAYS = "stretches of either direction"
 STRETCHES = "stretches of the one output turn"
 
 
@@ -47,7 +50,7 @@ def neighbours_of(recordings: Sequence[Recording]) -> int:
 
 def folds(rows: Rows) -> tuple[Index, str]:
     """The part (n,) that each of `rows` belongs to, and what the parts are: recordings, output turns, passes, or
-    stretches."""
+    stretches, of either direction by itself where the record comes back."""
     if rows.records >= 2:
         return np.asarray(rows.record % max(FOLDS, 2), np.int64), "recordings"
     beat = np.floor((rows.theta - rows.theta.min()) / (TURN * rows.ratio)).astype(np.int64)
@@ -60,7 +63,12 @@ def folds(rows: Rows) -> tuple[Index, str]:
         return np.asarray(rank[passes] % FOLDS, np.int64), "reversals"
     order = (rows.theta - rows.theta.min()) / max(float(np.ptp(rows.theta)), 1e-9)
     pieces = FOLDS * PIECES
-    return np.asarray(np.minimum((order * pieces).astype(int), pieces - 1) % FOLDS, np.int64), STRETCHES
+    piece = np.minimum((order * pieces).astype(int), pieces - 1)
+    back = rows.direction < 0
+    if all((np.bincount(piece[way], minlength=pieces) > 0).mean() > MEETS_AGAIN for way in (back, ~back)):
+        # What is held out on the way there is met on the way back: nothing round the splines is left to guess.
+        return np.asarray((piece + FOLDS // 2 * back) % FOLDS, np.int64), BOTH_WAYS
+    return np.asarray(piece % FOLDS, np.int64), STRETCHES
 
 
 def tried(
@@ -121,7 +129,8 @@ def candidates(rows: Rows, fit: WaveformFit | None, terms: int | None, paths: Pa
     """
     angles = (rows.theta, rows.theta / rows.ratio)
     zeros = (rows.record[:, None] == np.arange(rows.records)).astype(float)
-    if rows.span_turns >= 0.5 * rows.ratio:
+    if rows.span_turns >= 0.5 * rows.ratio and not paths:
+        # A drift in time; what comes again on the way back is no drift.
         zeros = np.column_stack([zeros, (rows.theta - rows.theta.mean()) / TURN])
     pairs = dictionary(rows.span_turns / rows.ratio)
     most = terms or MOST_TERMS
@@ -133,23 +142,25 @@ def candidates(rows: Rows, fit: WaveformFit | None, terms: int | None, paths: Pa
     path = paths.get(crossing)
     if crossing != AT_ONCE:
         alone = replace(pursue(angles, rows.error, zeros, path, pairs, most), crossing=crossing)
-    table = surface_of([alone], None, alone.back, crossing)
-    made: dict[str, tuple[Found, float]] = {"harmonics": (table if terms == 0 else alone, 0.0)}
+    count, width = round(rows.averaged), TURN / rows.rows_per_turn
+    alone = alone.sharpened(rows.ratio, width, count)
+    held, lost = alone.for_table(COARSE)
+    table = surface_of([held], None, alone.back, crossing)
+    made: dict[str, tuple[Found, float]] = {"harmonics": (table, lost.reach) if terms == 0 else (alone, 0.0)}
     if fit is None:
         return made
     free = zeros if path is None else np.column_stack([zeros, path])
     bare = Teeth.bare(fit.model, fit.errors, fit.sign)
     teeth = fit_teeth(rows, free, bare, np.diag(fit.covariance))
-    count = round(rows.averaged)
     for name, one in {"model": bare, "model and harmonics": bare, "model, teeth and harmonics": teeth}.items():
         left = rows.error - one.at(rows.theta)
         rest = nothing(0.0 if path is None else half_return(left, zeros, path))
         if name != "model":
             rest = pursue(angles, left, zeros, path, pairs, most // 2)
         rest = replace(rest, crossing=crossing)
-        made[name] = formed(
-            one.sharpened(TURN / rows.rows_per_turn, count), rest, terms, float(np.ptp(left - rest.at(*angles)))
-        )
+        spread = float(np.ptp(left - rest.at(*angles)))
+        rest = rest.sharpened(rows.ratio, width, count)
+        made[name] = formed(one.sharpened(width, count), rest, terms, spread)
     if shows_mesh(rows):
         mesh = fit_mesh(rows, free, bare)
         left = rows.error - mesh.at(rows.theta)
