@@ -77,7 +77,8 @@ def _lines(found: Compensated, output: Path) -> Iterator[str]:
     if len(found.recordings) > 1:
         for part in found.recordings:
             speed = "" if part.speed_rpm is None else f" at {part.speed_rpm:.4g} r/min"
-            yield f"  {part.name}{speed}: {part.before:.4g} -> {part.after:.4g} arcmin, expect {part.expected:.4g}"
+            expected = f"expect {part.expected:.4g} ({part.low:.4g} to {part.high:.4g})"
+            yield f"  {part.name}{speed}: {part.before:.4g} -> {part.after:.4g} arcmin, {expected}"
     for warning in found.warnings:
         yield f"note: {warning}"
     if found.worth:

@@ -51,13 +51,15 @@ NONE = "none"
 @dataclass(frozen=True)
 class PerRecording:
     """Held-out peak-to-peak (arcmin) of one recording at its usual input speed (r/min, None without a clock), and what
-    to expect of a fresh one under its conditions."""
+    to expect of a fresh one under its conditions, with its 95 % interval `low`, `high`."""
 
     name: str
     speed_rpm: float | None
     before: float
     after: float
     expected: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -133,9 +135,9 @@ class Compensated(ShownAsTable):
         """One row a recording: held-out peak-to-peak without and with the compensation."""
         import pandas as pd
 
-        rows = [(part.name, part.speed_rpm, part.before, part.after, part.expected) for part in self.recordings]
-        columns = ["recording", "speed_rpm", "before_arcmin", "after_arcmin", "expected_arcmin"]
-        return pd.DataFrame(rows, columns=columns)
+        columns = ["before_arcmin", "after_arcmin", "expected_arcmin", "low_arcmin", "high_arcmin"]
+        rows = [list(vars(part).values()) for part in self.recordings]
+        return pd.DataFrame(rows, columns=["recording", "speed_rpm", *columns])
 
     def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
         """Held-out peak-to-peak of every recording, without and with the compensation.
@@ -270,8 +272,12 @@ def _predicted(each: Sequence[tuple[float, float]]) -> tuple[float, float, float
     """Peak-to-peak to expect of a fresh recording of this length, with a 95 % interval: the mean over the recordings,
     of `each` of which value and standard deviation are known."""
     value = float(np.mean([value for value, _ in each]))
-    spread = NORMAL * math.sqrt(float(np.mean([spread**2 for _, spread in each])))
-    return value, max(value - spread, 0.0), value + spread
+    return value, *_interval(value, math.sqrt(float(np.mean([spread**2 for _, spread in each]))))
+
+
+def _interval(value: float, spread: float) -> tuple[float, float]:
+    """The 95 % interval of a `value` of which this is the standard deviation, not below zero."""
+    return max(value - NORMAL * spread, 0.0), value + NORMAL * spread
 
 
 def _per_recording(
@@ -282,7 +288,7 @@ def _per_recording(
         mask = rows.record == number
         speed = None if rows.speed is None else float(np.median(np.abs(rows.speed[mask]))) * 60 / TURN
         before, after = (float(np.ptp(left[mask])) for left in held_out)
-        found.append(PerRecording(recording.name, speed, before, after, each[number][0]))
+        found.append(PerRecording(recording.name, speed, before, after, each[number][0], *_interval(*each[number])))
     return tuple(found)
 
 
