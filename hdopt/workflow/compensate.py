@@ -19,8 +19,9 @@ from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
 from hdopt.figures import drawn
 from hdopt.files import ShownAsTable, write_text
-from hdopt.recordings.recording import TURN, Recording
+from hdopt.recordings.recording import Recording
 from hdopt.recordings.rows import Rows, gather
+from hdopt.workflow.compensation_speeds import of_one_speed, speeds_rpm
 from hdopt.workflow.compensation_trials import (
     STRETCHES,
     candidates,
@@ -252,6 +253,7 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
         (
             *_warnings(rows, held_out, moving),
             *(_too_few(len(found), terms, off, float(np.ptp(again))) if worth else ()),
+            *(of_one_speed(rows, again) if worth else ()),
         ),
     )
 
@@ -284,9 +286,8 @@ def _per_recording(
     recordings: Sequence[Recording], rows: Rows, held_out: tuple[Array, Array], each: Sequence[tuple[float, float]]
 ) -> tuple[PerRecording, ...]:
     found = []
-    for number, recording in enumerate(recordings):
+    for number, (recording, speed) in enumerate(zip(recordings, speeds_rpm(rows), strict=True)):
         mask = rows.record == number
-        speed = None if rows.speed is None else float(np.median(np.abs(rows.speed[mask]))) * 60 / TURN
         before, after = (float(np.ptp(left[mask])) for left in held_out)
         found.append(PerRecording(recording.name, speed, before, after, each[number][0], *_interval(*each[number])))
     return tuple(found)
