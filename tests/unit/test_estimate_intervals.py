@@ -68,3 +68,13 @@ def test_coverage_of_the_phase(size):
         phase = FitEstimate(pair, np.eye(2)).phase_deg(0, 1)
         held += phase.low <= 0 <= phase.high or phase.low <= 360 <= phase.high or phase.low <= -360 <= phase.high
     assert held / repeats >= 0.95 - 2.6 * math.sqrt(0.95 * 0.05 / repeats)
+
+
+def test_an_interval_is_in_the_unit_of_its_number():
+    """Of an amplitude in mm told in um, of a profile of a negative scale with an offset: low and high exchange."""
+    pair = FitEstimate(np.array([0.003, 0.004]), 1e-8 * np.eye(2))
+    size = pair.amplitude(0, 1, "um", scale=1e3)
+    assert (size.value, size.low, size.high) == pytest.approx((5.0, 5.0 - 0.196, 5.0 + 0.196), rel=1e-4)
+    profiled = FitEstimate(np.array([2.0]), np.eye(1), {0: (1.0, 5.0)})
+    found = profiled.parameter(0, "deg C", scale=-2.0, offset=100.0)
+    assert (found.value, found.low, found.high) == (96.0, 90.0, 98.0)
