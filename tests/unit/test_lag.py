@@ -11,7 +11,7 @@ from hdopt.drive.geometry import Clearances, Structure
 from hdopt.drive.values import DriveError
 from hdopt.errors import MissingValue
 from hdopt.kinematics import kinematic_error_arcmin
-from hdopt.mechanics.lag import lag
+from hdopt.mechanics.lag import Lag, lag
 
 THETA = np.radians(np.arange(360.0))
 CLEARANCES = Clearances(0.03, 0.02, 6.0, 8.0, 15.0)
@@ -88,3 +88,10 @@ def test_each_slot_runs_off_by_the_offset_along_it():
     assert lag_of(Structure.ONE_WAY_MAJOR, errors).cross_slide_arcmin == pytest.approx(expected[0], rel=1e-12)
     assert lag_of(Structure.ONE_WAY_MINOR, errors).cross_slide_arcmin == pytest.approx(expected[1], rel=1e-12)
     assert lag_of(Structure.AUTOMATIC, errors).cross_slide_arcmin == pytest.approx(expected.sum(axis=0), rel=1e-12)
+
+
+def test_flanks_interfere_whatever_play_the_cross_slide_adds():
+    """Half of the angles have a negative backlash, and none a negative sum."""
+    found = Lag(np.array([5.0, 5.0]), np.array([-1.0, 1.0]))
+    assert found.interference == 0.5
+    assert found.to_dict()["min"] == 4.0

@@ -6,7 +6,7 @@ from scipy import linalg, signal
 from test_cross_validation import RATE, noisy, rows_of, without_base
 
 from hdopt.diagnosis.inference import residual_noise
-from hdopt.diagnosis.inference.noise import Noise, autoregression, estimate, weights_with_a_past
+from hdopt.diagnosis.inference.noise import Noise, _covariance, autoregression, estimate, weights_with_a_past
 from hdopt.diagnosis.inference.nonphysical_alternatives import strongest_frequencies
 from hdopt.diagnosis.inference.residual_noise import measure_noise, roughness
 from hdopt.diagnosis.settings import DEFAULT
@@ -109,3 +109,11 @@ def test_lines_are_looked_for_up_to_half_the_row_rate(hz):
     wave = np.sin(2 * np.pi * hz * rows.time + 0.3)
     found = strongest_frequencies(rows, wave, DEFAULT.alternatives)
     assert found[0] == pytest.approx(hz, abs=0.25 / np.ptp(rows.time))
+
+
+def test_each_lag_has_rows_behind_it():
+    """Pieces of 45 rows have twenty for each of two lags, pieces of 400 for all that a noise may have."""
+    rows = noisy(40)
+    for length, lags in ((45, 2), (400, DEFAULT.noise.highest_order)):
+        covariance = _covariance(in_pieces(rows, length).piece, rows.error, DEFAULT.noise)
+        assert len(covariance) == 1 + lags

@@ -70,3 +70,22 @@ def test_records_that_cannot_carry_the_orders_are_refused(theta, orders, message
 def test_angles_and_signal_must_match():
     with pytest.raises(HdoptError, match=r"angles have shape \(100,\), the signal \(99,\)"):
         order_spectrum(turns(1), np.zeros(99), (1.0,))
+
+
+def test_what_the_orders_leave_is_an_rms():
+    """A sine of 0.3 beside the order that is fitted: 0.3/sqrt 2 over ten whole turns."""
+    theta = np.arange(3600) * 2 * np.pi / 360
+    found = order_spectrum(theta, 0.5 * np.cos(2 * theta) + 0.3 * np.sin(5 * theta) + 1.0, [2.0])
+    assert found.residual_rms == pytest.approx(0.3 / np.sqrt(2))
+    assert found.mean == pytest.approx(1.0)
+
+
+def test_neighbours_lie_within_a_cycle_of_the_record():
+    """Twenty turns tell 2 and 2.06, more than a cycle apart, and not 2 and 2.005. Nine orders of six tenths of a cycle
+    each hang together: what they do to each other grows with their number."""
+    theta = np.arange(20 * 100) * 2 * np.pi / 100
+    assert inseparable_groups(theta, [2.06, 2.0]) == ()
+    assert inseparable_groups(theta, [2.0, 2.005]) == ((2.0, 2.005),)
+    many = [2.0 + 0.03 * k for k in range(9)]
+    assert error_growth(theta, many).max() > 3
+    assert inseparable_groups(theta, many) == (tuple(many),)

@@ -22,7 +22,14 @@ from hdopt.tolerance.drive_inputs import drive_problem
 from hdopt.tolerance.linearise import linearise
 from hdopt.tolerance.screening import run_screening
 from hdopt.tolerance.space import InputSpace, Tolerance
-from hdopt.tolerance.tooth_field import CALIBRATION_SEED, ToothField, _normal_pairs, largest_single, tooth_field
+from hdopt.tolerance.tooth_field import (
+    CALIBRATION_SEED,
+    FAMILIES,
+    ToothField,
+    _normal_pairs,
+    largest_single,
+    tooth_field,
+)
 from hdopt.tolerance.worst_case import Unbounded, check_bounded
 from hdopt.workflow.explore import _notes
 from hdopt.workflow.stack import study_problem
@@ -85,6 +92,11 @@ def test_independent_teeth_give_one_over_the_root_of_those_in_mesh():
     # Without the common mean of Z teeth, Z_mp of them keep 1 - Z_mp/Z of their variance.
     expected = each / math.sqrt(z_mp) * math.sqrt((1 - z_mp / Z) * Z / (Z - 1))
     assert shared.std() == pytest.approx(expected, rel=0.02)
+
+
+def test_a_wave_of_its_own_adds_to_that_of_independent_teeth_as_a_square():
+    """Three times as large as any other beside it: the root of 1 + 9."""
+    assert FAMILIES["one_wave"].spread(np.array([1.0, 2.0, 9.0]), 3.0).tolist() == pytest.approx([10**0.5, 1.0, 1.0])
 
 
 def test_one_wave_is_a_sine_of_free_phase():

@@ -4,7 +4,7 @@ from math import pi
 
 import pytest
 
-from hdopt.recordings.units import CHANNEL_UNITS, parse_unit
+from hdopt.recordings.units import CHANNEL_UNITS, parse_unit, stated_unit
 
 SIZES = {
     "angle": {
@@ -48,3 +48,28 @@ def test_counts_and_a_gear_before_the_encoder():
     assert parse_unit("input", "counts/16384").factor * 16384 == pytest.approx(2 * pi)
     assert parse_unit("output", "counts/16384/gear3").factor * 16384 == pytest.approx(2 * pi / 3)
     assert parse_unit("input", "deg/gear0.5").factor == pytest.approx(pi / 90)
+
+
+WRITTEN = {
+    "angle": {
+        "deg": ["°", "degrees", "Deg", "grad", "[deg]"],
+        "rad": ["radians", "(rad)"],
+        "arcmin": ["'", "′", "arcminute"],
+        "arcsec": ['"', "″", "arcseconds"],
+        "urad": ["µrad", "μrad"],
+        "turn": ["turns", "rot"],
+        "rev": ["revs"],
+    },
+    "time": {"s": ["sec", "Seconds"], "ms": ["msec", "millis"], "us": ["µs", "μs", "usec"]},
+    "torque": {"Nm": ["nm", "N·m", "N*m", "N m", "NM"], "Nmm": ["mNm", "mnm"]},
+}
+"""Quantity -> unit -> how people and loggers write it."""
+
+
+@pytest.mark.parametrize("channel", OF_CHANNEL)
+def test_units_as_people_write_them(channel):
+    """Fault caught: a second's sign read as a minute's, a mNm as a Nm; both would be taken without a word."""
+    for unit, words in WRITTEN[OF_CHANNEL[channel]].items():
+        for word in words:
+            assert stated_unit(channel, word) == unit
+    assert stated_unit(channel, "furlong") == ""

@@ -1,0 +1,258 @@
+"""Numbers of single effects at the places where a sign, a shaft or a unit could be exchanged."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_effect_physics import RATE, RATIO, TURN, moving, spanned
+
+from hdopt.effects import EFFECTS
+from hdopt.effects._friction_law import Law
+from hdopt.effects.declared import Shaft
+from hdopt.effects.estimate import FitEstimate, Parameter
+from hdopt.effects.local_tooth_defect import NARROWEST_DEG, WIDEST_DEG, WIDEST_OUTPUT_DEG, Seat
+from hdopt.effects.met import Pulse, Spline, ZoneWaves
+from hdopt.effects.prior import outside_prior
+from hdopt.effects.probe import best_terms, strongest_orders
+from hdopt.effects.term import Term
+
+
+def test_play_varies_with_the_input():
+    """Its slots turn with the wave generator: step sin(2 theta) and step cos(2 theta), not by the output's angle."""
+    c = moving()
+    plain = EFFECTS["lost_motion"].term(c, {"ramp_arcmin": 9.0}).columns[:, 0]
+    columns = EFFECTS["lost_motion"].term(c, {"ramp_arcmin": 9.0, "order": 2}).columns
+    np.testing.assert_allclose(columns[:, 1], plain * np.sin(2 * c.theta), atol=1e-12)
+    np.testing.assert_allclose(columns[:, 2], plain * np.cos(2 * c.theta), atol=1e-12)
+
+
+def test_play_and_half_a_loop_are_sizes():
+    """Whichever way the error counts: a step of -0.4 arcmin is play of 0.4, as sure as it is."""
+    rows = moving()
+    play = EFFECTS["lost_motion"].parameters(
+        EFFECTS["lost_motion"].term(rows, {"ramp_arcmin": 9.0}), FitEstimate(np.array([-0.4]), np.array([[0.01]]))
+    )["lost_motion_arcmin"]
+    assert (play.value, play.low, play.high) == pytest.approx((0.4, 0.4 - 0.196, 0.4 + 0.196))
+    term = EFFECTS["hysteresis"].term(rows, {"transition_deg": 2.0, "model": Law.DAHL})
+    values = np.array([-0.3, *np.zeros(term.width - 1), 2.0])
+    found = EFFECTS["hysteresis"].parameters(term, FitEstimate(values, 1e-4 * np.eye(len(values))))
+    assert found["half_loop_arcmin"].value == pytest.approx(0.3)
+    assert found["transition_deg"].value == pytest.approx(2.0)
+
+
+def test_friction_does_not_know_where_a_recording_began():
+    """Beside the state that it would have had run in, what was else fades over the same length until the first
+    reversal; a recording that begins with one has none of it."""
+    c = moving()
+    columns = EFFECTS["hysteresis"].term(c, {"transition_deg": 5.0, "model": Law.DAHL}).columns
+    np.testing.assert_allclose(columns[:, 1], np.where(c.first, np.exp(-c.travel / 5.0), 0.0))
+    none = EFFECTS["hysteresis"].term(moving(first=np.zeros(len(c), bool)), {"transition_deg": 5.0, "model": Law.DAHL})
+    assert none.width == 1
+
+
+def test_both_directions_lie_a_whole_loop_apart():
+    half = {"half_loop_arcmin": Parameter(0.25, 0.2, 0.3, "arcmin"), "transition_deg": Parameter(2, 1, 3, "deg")}
+    said = EFFECTS["hysteresis"].sentence({"model": Law.DAHL}, half, 0.1)
+    assert "0.5 arcmin apart" in said
+    assert "2 deg of output" in said
+
+
+@pytest.mark.parametrize(("delay", "late"), [(0.002, "output"), (-0.002, "input")])
+def test_a_delay_names_the_channel_that_is_late(delay, late):
+    """The error of a late output is positive at positive speed: its delay counts positive."""
+    said = EFFECTS["channel_delay"].sentence({}, {"delay_s": Parameter(delay, 0, 0, "s")}, 0.1)
+    assert said.startswith(f"The {late} channel is read 2 ms later")
+
+
+def test_a_pulse_is_as_wide_as_its_seat_can_be():
+    """Six input turns' worth of a tooth on the output's side, a few degrees in a zone, and half a degree at least."""
+    c = moving((60,))
+    effect = EFFECTS["local_tooth_defect"]
+
+    def kept(width, seat):
+        return effect.term(c, {"centre": 1.0, "width_deg": width, "on": seat}).shape["width_deg"]
+
+    assert kept(100.0, Seat.OUTPUT) == 100.0
+    assert kept(1e4, Seat.OUTPUT) == WIDEST_OUTPUT_DEG * RATIO
+    assert kept(100.0, Seat.CIRCULAR_SPLINE) == WIDEST_DEG
+    assert kept(0.1, Seat.CIRCULAR_SPLINE) == NARROWEST_DEG
+
+
+def test_more_places_are_more_trials():
+    """A defect of the output is looked for over N input turns."""
+    c = moving((60,))
+    shape = {"centre": 1.0, "width_deg": 5.0}
+    once, output = (
+        EFFECTS["local_tooth_defect"].term(c, {**shape, "on": seat}).trials
+        for seat in (Seat.CIRCULAR_SPLINE_ONCE, Seat.OUTPUT)
+    )
+    assert output == pytest.approx(RATIO * once)
+
+
+def test_a_pulse_of_nine_degrees_rises_within_a_quarter_of_its_highest_orders_period():
+    assert EFFECTS["local_tooth_defect"].highest_order({"width_deg": 9.0}, RATIO) == pytest.approx(10.0)
+
+
+def test_a_defect_in_the_file_is_the_one_in_the_fit():
+    """deg, um and arcmin there; rad, mm and arcmin here; two heights where it is seen twice, each its own."""
+    effect, gear = EFFECTS["local_tooth_defect"], SimpleNamespace(ratio=RATIO)
+    keys = {"on": "flexspline", "angle_deg": 90.0, "width_deg": 5.0, "height_um": 4.0}
+    shape, coefficients = effect.values(keys, gear)
+    assert (shape["centre"], coefficients) == (pytest.approx(math.pi / 2), (pytest.approx(0.004),))
+    assert effect.keys(shape, coefficients, gear) == pytest.approx(keys)
+    twice = {
+        "on": "flexspline_twice",
+        "angle_deg": 90.0,
+        "width_deg": 5.0,
+        "height_arcmin": 0.3,
+        "height_2_arcmin": 0.1,
+    }
+    shape, coefficients = effect.values(twice, gear)
+    assert coefficients == (0.3, 0.1)
+    assert effect.keys(shape, coefficients, gear) == pytest.approx(twice)
+    term = effect.term(moving(), {"centre": 1.0, "width_deg": 5.0, "on": Seat.FLEXSPLINE})
+    found = effect.parameters(term, FitEstimate(np.array([0.004, 1.0, 5.0]), 1e-8 * np.eye(3)))
+    assert found["height_um"].value == pytest.approx(4.0)
+    assert found["angle_deg"].value == pytest.approx(math.degrees(1.0))
+    assert found["angle_deg"].high - found["angle_deg"].value == pytest.approx(math.degrees(1.96e-4), rel=1e-3)
+    assert found["width_deg"].value == 5.0
+
+
+def test_a_pulse_met_once_is_an_event():
+    """Passing a place counts; beginning beyond it does not."""
+    effect, coordinate = EFFECTS["local_tooth_defect"], np.linspace(0.5, 0.5 + 3 * TURN, 300)
+    assert effect.meetings(coordinate, TURN, 1.0) == 3
+    assert effect.meetings(coordinate[:120], TURN, 1.0) == 2
+    assert effect.meetings(coordinate[:90], TURN, 1.0) == 1
+
+
+def test_a_pulse_falls_beyond_its_centre():
+    """Its slope by central differences, of a sample and of a mean over a row."""
+    angle, step = np.linspace(1.8, 2.2, 41), 1e-6
+    for row in (0.0, 0.05):
+        pulse = Pulse(Spline.CIRCULAR, 2.0, 0.03, row)
+        sides = [pulse.added(angle + side, 0, np.array([0.004]))[0] for side in (-step, step)]
+        np.testing.assert_allclose(
+            pulse.added(angle, 0, np.array([0.004]))[1], (sides[1] - sides[0]) / (2 * step), atol=1e-7
+        )
+
+
+@pytest.mark.parametrize("zone", [0, 1])
+def test_waves_of_a_zone_are_counted_from_its_own_end(zone):
+    """sin(5.5 (x - pi zone)) for a zone's first coefficient, nothing of the other's; sum and columns agree."""
+    angle = np.linspace(0.0, 9.0, 50)
+    waves, coefficients = ZoneWaves(Spline.CIRCULAR, (5.5,)), np.array([1.0, 0.5, -2.0, 0.3])
+    own = coefficients[2 * zone : 2 * zone + 2]
+    expected = own[0] * np.sin(5.5 * (angle - math.pi * zone)) + own[1] * np.cos(5.5 * (angle - math.pi * zone))
+    np.testing.assert_allclose(waves.added(angle, zone, coefficients)[0], expected, atol=1e-12)
+    np.testing.assert_allclose(waves.columns(angle, zone) @ coefficients, expected, atol=1e-12)
+
+
+def test_a_number_is_certainly_outside_where_its_whole_interval_is():
+    """Of a resonance's gain, 0.7 to 1.3."""
+    effect = EFFECTS["resonance"]
+    for value, low, high, certainly in ((2.0, 1.4, 2.6, True), (2.0, 1.2, 2.8, False), (0.5, 0.3, 0.65, True)):
+        (found,) = outside_prior(effect, {"gain": Parameter(value, low, high, "1")})
+        assert found.certainly is certainly
+    assert outside_prior(effect, {"gain": Parameter(1.2, 0.1, 2.3, "1")}) == []
+
+
+def test_a_resonance_in_the_file_has_its_damper_as_a_share():
+    """Coefficients are the gain and gain times share; both ways round, and in the diagnosis."""
+    effect, gear = EFFECTS["resonance"], SimpleNamespace(ratio=RATIO)
+    keys = {"frequency_hz": 3.0, "damping_ratio": 0.05, "gain": 0.8, "output_share_of_damping": 0.25, "foot": "error"}
+    shape, coefficients = effect.values(keys, gear)
+    assert coefficients == pytest.approx((0.8, 0.2))
+    assert effect.keys(shape, coefficients, gear) == keys
+    term = Term("resonance", shape, columns=np.zeros((3, 2)), steps={"frequency_hz": 0.1, "damping_ratio": 0.01})
+    found = effect.parameters(term, FitEstimate(np.array([0.8, 0.2, 3.0, 0.05]), 1e-8 * np.eye(4)))
+    assert [one.value for one in found.values()] == pytest.approx([0.8, 0.25, 3.0, 0.05])
+
+
+def test_a_resonance_needs_speeds_that_differ():
+    """By 15 % between the slowest and the fastest rows, whatever the direction."""
+    effect = EFFECTS["resonance"]
+    speed = np.where(np.arange(18 * RATE) % 2, 1.0, 1.1)
+    assert effect.lacks(moving(speed=speed)) == "speeds that differ by more than 15 %"
+    assert effect.lacks(moving(speed=speed * np.where(speed > 1.05, -1.1, 1.0))) is None
+    assert effect.lacks(moving(time=None)) == "a time column"
+
+
+class Known:
+    """A probe whose gains and spectrum are written down."""
+
+    def __init__(self, gains=(), amplitude=None, rows=1000):
+        self.gains, self.amplitude = gains, amplitude
+        self.residual = np.zeros(rows)
+        self.samples = SimpleNamespace(span_turns=20.0, rows_per_turn=100.0)
+        self.order_range = (0.0, 45.0)
+
+    def gain(self, term):
+        return self.gains[term.shape["at"]]
+
+    def spectrum(self, orders):
+        return self.amplitude(np.asarray(orders))
+
+
+def variant(at, width=1, odds=0.0):
+    return Term("output_coupling", {"at": at}, columns=np.zeros((2, width)), odds=odds)
+
+
+def test_a_variant_pays_for_its_freedom_and_its_odds():
+    """log(1000) = 6.9 for each coefficient and twice its log odds, in noise variances."""
+    probe = Known((20.0, 26.0, 30.0, 22.0))
+    wide, likely, unlikely = variant(1, width=2), variant(3, odds=0.0), variant(2, odds=-6.0)
+    assert best_terms(probe, [variant(0), wide])[0].shape["at"] == 0
+    assert best_terms(Known((20.0, 27.5)), [variant(0), wide])[0].shape["at"] == 1
+    assert best_terms(probe, [unlikely, likely])[0].shape["at"] == 3
+    assert [term.shape["at"] for term in best_terms(probe, [variant(0), likely, unlikely], 2)] == [3, 0]
+
+
+def test_strongest_orders_are_separate_and_within_the_record():
+    """A line of 20 turns is 1/20 wide: its flanks are no lines. Below one cycle a record there is none."""
+
+    def amplitude(orders):
+        line = np.sinc(20 * (orders - 7.0))
+        return np.abs(line) + 0.5 * np.abs(np.sinc(20 * (orders - 3.0))) + 5.0 * (orders < 0.049)
+
+    found = strongest_orders(Known(amplitude=amplitude), 2)
+    assert found == pytest.approx([7.0, 3.0], abs=0.5 / 20 / 4)
+
+
+def test_an_encoders_second_cycle_is_that_of_half_its_lines():
+    """100 lines of one shaft are part of 200 of the same; 200 are none of 100, nor those of the other shaft."""
+    effect = EFFECTS["encoder_interpolation"]
+    few = {"lines": 100, "shaft": Shaft.INPUT}
+    assert effect.is_part_of(few, {"lines": 200, "shaft": Shaft.INPUT})
+    assert not effect.is_part_of({"lines": 200, "shaft": Shaft.INPUT}, few)
+    assert not effect.is_part_of(few, {"lines": 200, "shaft": Shaft.OUTPUT})
+
+
+def test_an_encoder_whose_second_cycle_stands_at_the_mesh_is_doubtful():
+    """102 teeth for N = 50: 51 lines a turn of the input, twice. One alone at 51 is none."""
+    effect, c = EFFECTS["encoder_interpolation"], moving()
+    lines = {"lines": 51, "shaft": Shaft.INPUT}
+    assert effect.term(c, {**lines, "cycles": (1, 2)}).doubtful
+    assert not effect.term(c, {**lines, "cycles": (1,)}).doubtful
+    assert spanned(effect.term(c, {**lines, "cycles": (1,)}).columns, np.sin(51 * c.theta + 0.2))
+
+
+def test_lobes_of_a_ring_act_by_the_tangent_there_and_back():
+    """30 deg, where sine and tangent are 0.500 and 0.577: 10 um of radius are 5.77 um of arc, and back."""
+    effect, gear = EFFECTS["circular_spline_lobing"], SimpleNamespace(pressure_angle=math.radians(30), ratio=RATIO)
+    shape, coefficients = effect.values({"lobes": 6, "radial_amplitude_um": 10.0, "phase_deg": 90.0}, gear)
+    assert coefficients == pytest.approx((0.0, 0.01 * math.tan(math.radians(30))), abs=1e-15)
+    written = effect.keys(shape, coefficients, gear)
+    assert written == pytest.approx({"lobes": 6, "radial_amplitude_um": 10.0, "phase_deg": 90.0})
+
+
+def test_warming_may_take_ten_records():
+    """And a hundredth of one at least."""
+    effect, c = EFFECTS["thermal_drift"], moving()
+    duration = np.ptp(c.time)
+    for asked, kept in ((5.0, 5.0), (50.0, 10.0), (1e-4, 0.01)):
+        term = effect.term(c, {"time_constant_s": asked * duration})
+        assert term.shape["time_constant_s"] == pytest.approx(kept * duration)
