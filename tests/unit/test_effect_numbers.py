@@ -17,6 +17,7 @@ from hdopt.effects.local_tooth_defect import NARROWEST_DEG, WIDEST_DEG, WIDEST_O
 from hdopt.effects.met import Pulse, Spline, ZoneWaves
 from hdopt.effects.prior import outside_prior
 from hdopt.effects.probe import best_terms, strongest_orders
+from hdopt.effects.resonance import Foot
 from hdopt.effects.term import Term
 
 
@@ -256,3 +257,104 @@ def test_warming_may_take_ten_records():
     for asked, kept in ((5.0, 5.0), (50.0, 10.0), (1e-4, 0.01)):
         term = effect.term(c, {"time_constant_s": asked * duration})
         assert term.shape["time_constant_s"] == pytest.approx(kept * duration)
+
+
+def test_a_resonance_is_looked_for_from_the_slowest_turn_to_sixteen_of_the_fastest(monkeypatch):
+    """Turns a second, not radians: at 10 and 20 of them from 8 Hz to 320 Hz, for each kind of foot."""
+    effect, asked = EFFECTS["resonance"], []
+    speed = TURN * np.where(np.arange(200) < 100, 10.0, -20.0)
+    monkeypatch.setattr(type(effect), "_of_foot", lambda self, probe, frequencies, foot: asked.append(frequencies))
+    monkeypatch.setattr("hdopt.effects.resonance.best_terms", lambda probe, terms, keep=1: [])
+    effect.search(SimpleNamespace(samples=SimpleNamespace(known_speed=speed)))
+    assert len(asked) == 2
+    assert (asked[0][0], asked[0][-1]) == pytest.approx((8.0, 320.0))
+
+
+def test_each_kind_of_foot_is_a_trial_more():
+    """Where the whole motion swings it, the error alone might have."""
+    effect, c = EFFECTS["resonance"], moving()
+    shape = {"frequency_hz": 3.0, "damping_ratio": 0.05}
+    alone, whole = (
+        effect.term(c, {**shape, "foot": foot}, np.zeros(len(c))).trials for foot in (Foot.ERROR, Foot.WHOLE_MOTION)
+    )
+    assert whole == 2 * alone
+
+
+# what the rows of a recording are
+
+
+def test_a_few_rows_the_other_way_are_no_reversal():
+    """One in fifty of each direction at least: an encoder's flutter is less."""
+    c = moving((40,))
+    for share, reverses in ((0.01, False), (0.03, True)):
+        way = np.where(np.arange(len(c)) < share * len(c), -1.0, 1.0)
+        assert moving((40,), direction=way).reverses is reverses
+
+
+def test_the_span_is_that_of_the_longest_recording():
+    """Two of six turns whose counts are a hundred turns apart."""
+    c = moving((6, 6))
+    record = (np.arange(len(c)) >= len(c) // 2).astype(int)
+    apart = moving((6, 6), theta=c.theta + 100 * TURN * record, record=record)
+    assert apart.span_turns == pytest.approx(6.0, abs=0.02)
+
+
+def test_rows_a_turn_are_the_usual_ones_within_a_piece():
+    """A gap of three turns between two pieces, and a tenth of the rows lost in them, change nothing."""
+    c = moving((12,))
+    kept = np.arange(len(c)) % 10 != 3
+    piece = (np.arange(len(c)) >= 700).astype(int)
+    theta = c.theta + 3 * TURN * piece
+    fewer = {k: v[kept] for k, v in vars(c).items() if isinstance(v, np.ndarray)}
+    lost = moving((12,), **fewer | {"theta": theta[kept], "piece": piece[kept]})
+    assert lost.rows_per_turn == pytest.approx(RATE)
+    assert lost.highest_order == pytest.approx(0.45 * RATE)
+    averaged = moving((12,), averaged=4.0)
+    assert averaged.are_averages and not moving((12,), averaged=1.1).are_averages
+    assert averaged.highest_order == pytest.approx(0.35 * RATE)
+
+
+def test_a_piece_begins_with_the_speed_of_its_first_rows():
+    """At a steady acceleration the line through five rows has the speed of their middle, the third."""
+    n, dt = 50, 0.01
+    time = dt * np.arange(n)
+    cut = {k: v[:n] for k, v in vars(moving()).items() if isinstance(v, np.ndarray)}
+    speed, beyond = moving(**cut | {"time": time, "theta": 3.0 + 0.5 * 4.0 * time**2}).starting_motion
+    assert speed == pytest.approx(np.full(n, 4.0 * 2 * dt))
+    assert beyond == pytest.approx(0.5 * 4.0 * time**2 - 4.0 * 2 * dt * time)
+
+
+# bearings
+
+
+def bearing(sizes, sigma=0.01, ratio=0.14, **shape):
+    """Whether every part of a bearing shows whose sines have these sizes, known to sigma."""
+    values = np.ravel([(size, 0.0) for size in sizes])
+    term = Term(
+        "bearing_pass",
+        {"ball_to_pitch_ratio": ratio, "balls": 20, **shape},
+        columns=np.zeros((3, len(values))),
+        steps={"ball_to_pitch_ratio": 1e-3},
+    )
+    covariance = np.diag(np.r_[np.full(len(values), sigma**2), 1e-9])
+    return EFFECTS["bearing_pass"].every_part_shows(term, FitEstimate(np.r_[values, ratio], covariance))
+
+
+def test_named_lines_of_a_bearing_must_all_be_there():
+    """Four standard deviations, and a tenth of the strongest; a ball is between 0.04 and 0.35 of the pitch circle."""
+    lines = {"lines": (0, 3)}
+    assert bearing((0.2, 0.045), **lines)
+    assert not bearing((0.2, 0.035), **lines)
+    assert not bearing((0.2, 0.0008), sigma=1e-4, **lines)
+    assert not bearing((0.2, 0.015), sigma=1e-4, **lines)
+    assert not bearing((0.2, 0.2), ratio=0.03, **lines)
+    assert not bearing((0.2, 0.2), ratio=0.36, **lines)
+
+
+def test_of_many_waves_of_unequal_balls_half_must_show():
+    """Of ten waves five; of three all."""
+    shown, hidden = 0.05, 0.03
+    assert bearing([shown] * 5 + [hidden] * 5, zones=tuple(range(1, 11)))
+    assert not bearing([shown] * 4 + [hidden] * 6, zones=tuple(range(1, 11)))
+    assert not bearing([shown] * 2 + [hidden], zones=(1, 2, 3))
+    assert bearing([shown] * 3, zones=(1, 2, 3))

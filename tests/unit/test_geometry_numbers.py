@@ -15,6 +15,7 @@ from scipy import integrate
 from hdopt.errors import HdoptError
 from hdopt.geometry import areas, budget, digits, materials, screws
 from hdopt.geometry.arcs import enclosed_area, outline_of
+from hdopt.geometry.bought import bought
 from hdopt.geometry.budget import Budget, Joint, Share
 from hdopt.geometry.cam_table import cam_table
 from hdopt.geometry.compare import CamFit, fit_cam
@@ -253,8 +254,8 @@ def test_what_the_fits_leave_is_shared_out_and_rounded_down():
     found = budget._filled("wg_eccentricity", "mm", 0.05, shares, [("hub", "place", 0.5), ("cam", "place", 0.5)])
     assert [share.zone for share in found.shares] == [None, 0.0299, 0.0299]
     assert found.met
-    tight = budget._filled("wg_eccentricity", "mm", 0.0503, shares, [("hub", "place", 0.5), ("cam", "place", 0.25)])
-    assert [share.zone for share in tight.shares] == [None, 0.0302, 0.0604]
+    tight = budget._filled("wg_eccentricity", "mm", 0.05035, shares, [("hub", "place", 0.5), ("cam", "place", 0.25)])
+    assert [share.zone for share in tight.shares] == [None, 0.0302, 0.0605]
     with pytest.raises(HdoptError, match="which no shop holds"):
         budget._filled("wg_eccentricity", "mm", 0.0203, shares, [("hub", "place", 0.5)])
 
@@ -266,6 +267,30 @@ def test_a_budget_is_kept_to_its_last_digit_and_said_in_its_unit():
     assert "is kept: 0.1 of 0.1 deg" in kept.verdict
     assert "NOT KEPT: 0.101 of 0.1 deg; fit (H7/h6) takes 0.101 deg, 0.1 deg are left" in over.verdict
     assert kept.to_dict()["spent"] == pytest.approx(0.1)
+
+
+def test_a_fit_may_use_half_of_its_share_of_a_bound():
+    """Of an eccentricity of 0.024 mm that two joints share each 0.006, or 0.012 on diameter; of a tilt half over the
+    length and the joints that lean."""
+    joint = Joint("shaft", "hub", "shaft", 10.0, 8.0)
+    none = budget.Bounds()
+    assert budget._fit(joint, 1, 1, 0.024, none).name == "H7/h6"
+    assert budget._fit(joint, 1, 1, 0.0239, none).name == "H6/h5"
+    assert budget._fit(joint, 2, 1, 0.030, none).name == "H6/h5"
+    assert budget._fit(joint, 1, 1, None, budget.Bounds(tilt=0.0061)).name == "H7/h6"
+    assert budget._fit(joint, 1, 1, None, budget.Bounds(tilt=0.0059)).name == "H6/h5"
+    assert budget._fit(joint, 1, 2, None, budget.Bounds(tilt=0.0119)).name == "H6/h5"
+    assert budget._fit(joint, 1, 1, None, none).name == budget.USUAL_FIT
+
+
+def test_a_bought_screw_engages_what_stands_out_of_the_cam():
+    """7 mm of cam on a flange of 5: M5 x 12, 5 mm of it in the thread."""
+    bolts = SimpleNamespace(count=4, hole=5.5, radius=12.0)
+    hub = SimpleNamespace(name="hub", bolts=bolts, body=(), bottom=-5.0, top=0.0)
+    cam = SimpleNamespace(name="cam", bolts=bolts, body=(), bottom=0.0, top=7.0)
+    (found,) = bought(SimpleNamespace(made=[(hub, None), (cam, None)]))
+    assert (found.thread, found.length, found.engaged) == ("M5", 12, 5.0)
+    assert found.words[0] == "screw, 4 off, 5 mm in thread"
 
 
 def test_sizes_have_the_digits_that_their_tolerance_leaves():

@@ -1,0 +1,278 @@
+"""What the search over sets of effects takes, keeps and leaves, with fits whose evidence is written down."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hdopt.diagnosis.search import explore as exploring
+from hdopt.diagnosis.search import refinement, search_state, subset_search
+from hdopt.diagnosis.search.candidates import Candidate, RankedSubset
+from hdopt.diagnosis.search.search_state import SearchPlan, SearchState
+from hdopt.diagnosis.settings import DEFAULT
+
+SETTINGS = DEFAULT.search
+PROBLEM = SimpleNamespace(settings=DEFAULT, base="a base", rows=SimpleNamespace(highest_order=20.0), explanations=None)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """As much of a term as a search asks for."""
+
+    effect: str
+    width: int = 2
+    freedom: float = 2.0
+    doubtful: bool = False
+    trials: float = 1.0
+
+
+@dataclass(frozen=True)
+class Told:
+    """A fit with a log Bayes factor that was written down."""
+
+    evidence: float
+    terms: tuple = ()
+    gain: float = 0.0
+    objective: float = 1.0
+    problem: object = field(default_factory=lambda: PROBLEM)
+    errors: object = None
+    offsets: object = None
+    coefficients: tuple = ()
+    motion: object = None
+    may_be_said: bool = True
+
+    def all_but(self, index):
+        return tuple(i for i in range(len(self.terms)) if i != index)
+
+
+def of(evidence, *names, **more):
+    return Told(evidence, tuple(Effect(name) for name in names), **more)
+
+
+@pytest.fixture(autouse=True)
+def weighed(monkeypatch):
+    """Evidence is what a fit says, less a tenth of what the best gains beyond it where that is asked for."""
+
+    def weigh(fit, base, scale, top=None):
+        return Candidate(fit, fit.evidence - 0.1 * max((top or fit.gain) - fit.gain, 0.0), fit.gain)
+
+    monkeypatch.setattr(search_state, "weigh", weigh)
+    monkeypatch.setattr(search_state, "penalty_scale", lambda *about: "scale")
+    monkeypatch.setattr(search_state, "FitProbe", lambda fit, keep=None, order_range=None: (fit, keep))
+    monkeypatch.setattr(search_state, "search_terms", lambda probe, skip: [Effect("found beside")])
+    for module in (subset_search, refinement):
+        monkeypatch.setattr(module, "is_acceptable", lambda fit: fit.may_be_said)
+
+
+def state_of(*fits, plan=None, inflation=2.0, base=None):
+    state = SearchState(base or Told(0.0), plan or SearchPlan(), inflation, np.random.default_rng(0))
+    return state.taking(fits)
+
+
+def test_the_leader_has_the_most_evidence_and_some(weighed):
+    assert state_of(of(5.0, "a"), of(9.0, "b"), of(7.0, "a", "b")).leader.fit.evidence == 9.0
+    assert state_of(of(-1.0, "a")).leader is None
+    assert state_of().leader is None
+
+
+def test_of_one_set_the_better_fit_is_kept():
+    """Better by the least that counts; as good is not."""
+    known = of(5.0, "a", "b")
+    for evidence, kept in ((5.0 + 2 * SETTINGS.better, True), (5.0, False), (4.0, False)):
+        state = state_of(known, of(evidence, "b", "a"))
+        assert len(state.fits) == 1
+        assert (next(iter(state.fits.values())).evidence == evidence) == (kept or evidence == 5.0)
+    state = state_of(known)
+    assert state.taking([of(4.0, "a", "b")]) is state
+
+
+def test_two_fits_of_one_set_are_weighed_against_the_larger_gain():
+    """What the better explains may be the misfit of the other: 50 noise variances more are worth 5 here."""
+    state = state_of()
+    assert state.is_better(of(12.0, "a", gain=0.0), of(6.0, "a", gain=50.0), by=0.5)
+    assert not state.is_better(of(12.0, "a", gain=0.0), of(6.0, "a", gain=50.0), by=1.5)
+    assert not state.is_better(of(12.0, "a", gain=0.0), of(8.0, "a", gain=50.0), by=0.0)
+    assert state.is_better(of(5.0, "a"), of(6.0, "a"), by=-1.5)
+
+
+def test_what_is_skipped_and_what_is_there_is_not_looked_for(monkeypatch):
+    asked = []
+    monkeypatch.setattr(search_state, "search_terms", lambda probe, skip: asked.append(list(skip)) or [])
+    state_of(plan=SearchPlan(skip=("bearing_pass",))).terms_for(None, "a", "b")
+    assert asked == [["bearing_pass", "a", "b"]]
+
+
+def test_candidates_are_those_that_may_be_said_as_far_as_they_lead_or_come_close():
+    """Within ten of the leader a rival must be one too; farther behind it does not matter."""
+    first = [
+        Candidate(of(90.0, "a", may_be_said=False), 90.0, 1.0),
+        Candidate(of(50.0, "b"), 50.0, 1.0),
+        Candidate(of(41.0, "c", may_be_said=False), 41.0, 1.0),
+        Candidate(of(39.0, "d", may_be_said=False), 39.0, 1.0),
+        Candidate(Told(0.0), 0.0, 0.0),
+    ]
+    kept = subset_search.acceptable_first(first, 10.0)
+    assert [candidate.log_bayes_factor for candidate in kept] == [50.0, 39.0, 0.0]
+
+
+def test_ranked_has_the_base_and_other_variants_of_leaders_that_may_not_be_said(monkeypatch):
+    asked = []
+
+    def other(fit, skip, order_range):
+        asked.append(fit.evidence)
+        return [of(45.0, "a", "as another")]
+
+    monkeypatch.setattr(subset_search, "otherwise_acceptable", other)
+    state = state_of(of(60.0, "a", may_be_said=False), of(50.0, "b"), of(40.0, "c", may_be_said=False), of(-5.0, "d"))
+    assert [c.log_bayes_factor for c in subset_search.ranked(state)] == [60.0, 50.0, 45.0, 40.0, 0.0, -5.0]
+    assert asked == [60.0]
+
+
+def test_singles_are_looked_beside_where_the_leader_bends_to_anything():
+    """From a fifth of its evidence on, the three best, neither it nor a description without physics."""
+    wide = Told(100.0, (Effect("wide", width=40),))
+    few = [of(evidence, name) for evidence, name in ((50, "a"), (40, "b"), (30, "c"), (25, "d"), (15, "e"))]
+    found = subset_search.single_effects_worth_a_second(state_of(wide, *few, of(90.0, "_jump"), of(60.0, "a", "b")))
+    assert [fit.evidence for fit in found] == [50, 40, 30]
+    assert subset_search.single_effects_worth_a_second(state_of(of(100.0, "stiff"), *few)) == []
+    doubtful = Told(100.0, (Effect("stiff", doubtful=True),))
+    assert [fit.evidence for fit in subset_search.single_effects_worth_a_second(state_of(doubtful, *few))] == [
+        50,
+        40,
+        30,
+    ]
+    little = subset_search.single_effects_worth_a_second(state_of(doubtful, of(15.0, "e"), of(25.0, "d")))
+    assert [fit.evidence for fit in little] == [25.0]
+
+
+@pytest.fixture
+def refitted(monkeypatch):
+    """Sets of effects that were fitted jointly, with the evidence that comes of it."""
+    seen = []
+
+    def joint_fit(start, terms, rng=None):
+        seen.append(tuple(term.effect for term in terms))
+        return Told(1.0, tuple(terms))
+
+    monkeypatch.setattr(subset_search, "joint_fit", joint_fit)
+    monkeypatch.setattr(subset_search, "each", lambda work, items: [work(item) for item in items])
+    monkeypatch.setattr(subset_search, "with_a_plain_term", lambda *about: [[Effect("plain")]])
+    return seen
+
+
+def test_rivals_close_behind_are_fitted_from_the_leaders_drive(refitted):
+    """From eight tenths of its evidence on; what only adds to the leader's effects shares its drive already."""
+    state = state_of(of(100.0, "a"), of(95.0, "a", "b"), of(90.0, "c"), of(85.0, "d", "c"), of(79.0, "e"))
+    subset_search.refit_close_rivals(state)
+    assert refitted == [("c",), ("d", "c"), ("plain",)]
+
+
+def test_a_gear_without_a_base_has_no_other_drives(refitted):
+    state = state_of(
+        of(100.0, "a"), of(90.0, "c"), base=Told(0.0, problem=SimpleNamespace(**vars(PROBLEM) | {"base": None}))
+    )
+    assert subset_search.refit_close_rivals(state) is state
+    assert refitted == []
+
+
+@pytest.mark.parametrize(("lost", "left"), [(0.9, 1), (1.1, 2)])
+def test_parts_that_do_not_show_may_cost_a_little_of_the_gain(monkeypatch, lost, left):
+    """Half a per cent of the gain over the inflation: 2000 noise variances, twice as rough, may lose 5."""
+    full = Told(100.0, (Effect("a"), Effect("b")), gain=2000.0)
+    may = SETTINGS.lost_by_trimming * 2000.0 / 2.0
+    few = replace(full, evidence=100.0 - lost * may, terms=(Effect("a"), Effect("b", width=1)))
+    monkeypatch.setattr(subset_search, "trimmed", lambda fit: few)
+    (kept,) = subset_search.leave_out_hidden_parts(state_of(full)).fits.values()
+    assert kept.terms[1].width == left
+
+
+def test_a_base_beside_the_leader_is_the_one_to_beat_where_it_is_better(monkeypatch):
+    monkeypatch.setattr(subset_search, "evaluate", lambda problem, errors, offsets, terms, parts: "bare")
+    for alone, expected in ((0.5, 0.5), (2.0, 1.0)):
+        monkeypatch.setattr(subset_search, "refine", lambda fit, iterations, alone=alone: Told(0.0, objective=alone))
+        assert subset_search.base_beside_leader(state_of(of(9.0, "a"))).base.objective == expected
+
+
+def test_a_first_look_is_the_leaders_evidence_or_nothing(monkeypatch):
+    for found, evidence in (([of(30.0, "a"), of(20.0, "b")], 30.0), ([of(-3.0, "a")], 0.0), ([], 0.0)):
+        monkeypatch.setattr(subset_search, "explore_base", lambda state, found=found: state.taking(found))
+        assert subset_search.first_look(Told(0.0), 2.0, np.random.default_rng(0), SearchPlan()) == evidence
+
+
+def test_shorter_runs_are_tried_as_long_as_they_are_better(monkeypatch):
+    tried = []
+
+    def shorter(fit, rng):
+        for evidence in (11.0, 12.0, 11.5, 13.0):
+            tried.append(evidence)
+            yield of(evidence, "a")
+
+    monkeypatch.setattr(subset_search, "shortened", shorter)
+    state = subset_search.shorten_wide_terms(state_of(of(10.0, "a")))
+    assert tried == [11.0, 12.0, 11.5]
+    assert state.leader.fit.evidence == 12.0
+
+
+@pytest.fixture
+def chosen(monkeypatch):
+    """Effects of the sets that are fitted of a pool with these gains, about a centre."""
+
+    def of_gains(subsets, exact=(), afresh=False):
+        names = sorted({i for indices, _ in subsets for i in indices})
+        pool = [Effect(f"e{i}") for i in names]
+        ranked = [RankedSubset(gain, gain, indices) for indices, gain in subsets]
+        monkeypatch.setattr(exploring, "rank_subsets", lambda *about: ranked)
+        monkeypatch.setattr(exploring, "behind_a_resonance", lambda *about: [])
+        monkeypatch.setattr(exploring, "has_exact_shape", lambda term: term.effect in exact)
+        sets = exploring._worth_a_fit(state_of(), Told(0.0), pool, afresh)
+        return [tuple(term.effect for term in terms) for terms in sets]
+
+    return of_gains
+
+
+def test_leaders_and_single_effects_of_a_quarter_of_the_best_gain_are_fitted(chosen):
+    """The three best sets, then singles of a quarter of the gain and more; at the first look any of exact shape."""
+    subsets = [((0, 1), 100.0), ((0, 2), 90.0), ((0,), 80.0), ((1, 2), 70.0), ((1,), 30.0), ((2,), 20.0), ((3,), 10.0)]
+    assert chosen(subsets) == [("e0", "e1"), ("e0", "e2"), ("e0",), ("e1",)]
+    assert chosen(subsets, exact=("e3",), afresh=True) == [("e0", "e1"), ("e0", "e2"), ("e0",), ("e1",), ("e3",)]
+    assert chosen(subsets, exact=("e3",)) == chosen(subsets)
+
+
+@pytest.mark.parametrize(("more", "taken"), [(0.9, 2), (1.1, 3)])
+def test_a_wider_variant_must_pay_for_its_coefficients_and_more(monkeypatch, more, taken):
+    """Half its gain over the inflation, less half the logarithm of the rows and the trials, by ten more than the one
+    that stands."""
+    rows, inflation = 1000.0, 2.0
+    wide = Effect("a", width=3, freedom=3.0, trials=np.e)
+    needed = more * SETTINGS.tie_of_variants + np.log(rows) / 2 + 1.0
+    monkeypatch.setattr(refinement, "FitProbe", lambda *about, **limits: None)
+    monkeypatch.setattr(refinement, "search_terms", lambda probe, only: [Effect("a", width=1), wide])
+    monkeypatch.setattr(
+        refinement, "joint_fit", lambda fit, terms: Told(0.0, tuple(terms), 50.0 + 2 * inflation * needed)
+    )
+    monkeypatch.setattr(refinement, "penalty_scale", lambda *about: SimpleNamespace(rows=rows))
+    monkeypatch.setattr(refinement, "weigh", lambda fit, base, scale: fit)
+    found = refinement.widened_where_it_pays(of(1.0, "a", gain=50.0), Told(0.0), inflation, (0.0, 20.0))
+    assert found.terms[0].width == taken
+
+
+def test_a_plain_term_takes_the_place_of_a_wide_one_that_turns(monkeypatch):
+    """The three that gain most of what turns, is narrow and not doubtful; neither of what is skipped nor there."""
+    asked = []
+
+    def found(probe, skip):
+        asked.append(list(skip))
+        return [Effect(f"p{i}", width=2) for i in range(5)] + [Effect("wide", width=9), Effect("slow", width=2)]
+
+    gains = {f"p{i}": gain for i, gain in enumerate((3.0, 9.0, 1.0, 7.0, 5.0))}
+    probe = SimpleNamespace(gain=lambda term: gains[term.effect])
+    monkeypatch.setattr(refinement, "FitProbe", lambda *about, **limits: probe)
+    monkeypatch.setattr(refinement, "search_terms", found)
+    monkeypatch.setattr(refinement, "kind_of", lambda term: "slow" if term.effect == "slow" else "turning")
+    fit = Told(1.0, (Effect("bent", width=20), Effect("narrow", width=2)))
+    sets = refinement.with_a_plain_term(fit, ("skipped",), (0.0, 20.0))
+    assert [[term.effect for term in one] for one in sets] == [["narrow", "p1"], ["narrow", "p3"], ["narrow", "p4"]]
+    assert asked == [["skipped", "bent", "narrow"]]
