@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hdopt.compensation.path import crossing_of, half_about, half_return, path_of, paths_of
-from hdopt.compensation.surface import AT_ONCE, Crossing, Harmonics, nothing, surface_of
+from hdopt.compensation.surface import AT_ONCE, Crossing, Harmonics, grid_angles, nothing, surface_of
 from hdopt.compensation.writers import crosses, homing_arcmin
 from hdopt.compensation.zones import zone_values
 from hdopt.workflow.compensate import _per_recording, _predicted, _worth
@@ -147,8 +147,12 @@ def test_a_surface_has_no_mean_and_no_line_at_half_its_cells():
     constant = Harmonics(np.array([0, 2]), np.array([0, 1]), np.array([5.0, 0.4]), np.zeros(2))
     surface = surface_of([constant])
     assert surface.values.mean() == pytest.approx(0.0, abs=1e-12)
-    rows = surface.values.shape[0]
-    alternating = surface_of([], np.tile(np.where(np.arange(rows) % 2, 1.0, -1.0)[:, None], (1, 96)))
+    inputs, outputs = grid_angles((8, 6))
+    assert inputs[:, 0] == pytest.approx(np.arange(8) * np.pi / 4)
+    assert outputs[0] == pytest.approx(np.arange(6) * np.pi / 3)
+    rows, columns = surface.values.shape
+    waves = np.cos(np.arange(rows) * 2 * np.pi / rows), np.where(np.arange(columns) % 2, 1.0, -1.0)
+    alternating = surface_of([], np.outer(*waves))
     assert np.abs(alternating.harmonics(5).cos).max() < 1e-12
 
 

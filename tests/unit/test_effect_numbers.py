@@ -130,6 +130,17 @@ def test_a_pulse_met_once_is_an_event():
     assert effect.meetings(coordinate[:90], TURN, 1.0) == 1
 
 
+def test_a_defect_is_looked_for_where_it_is_met_again(monkeypatch):
+    """Fault caught: an event, which nothing repeats, named a tooth."""
+    effect = EFFECTS["local_tooth_defect"]
+    monkeypatch.setattr(type(effect), "_candidates", lambda self, probe, at, period, seat: [(1.0, 5.0)])
+    monkeypatch.setattr("hdopt.effects.local_tooth_defect.best_terms", lambda probe, terms, keep=1: list(terms)[:keep])
+    for turns, found in ((1, 0), (3, 2)):
+        c = moving((turns,))
+        asked = effect.search(SimpleNamespace(samples=c, has_base=False))
+        assert len(asked) == found
+
+
 def test_a_pulse_falls_beyond_its_centre():
     """Its slope by central differences, of a sample and of a mean over a row."""
     angle, step = np.linspace(1.8, 2.2, 41), 1e-6
@@ -219,7 +230,7 @@ def test_strongest_orders_are_separate_and_within_the_record():
         line = np.sinc(20 * (orders - 7.0))
         return np.abs(line) + 0.5 * np.abs(np.sinc(20 * (orders - 3.0))) + 5.0 * (orders < 0.049)
 
-    found = strongest_orders(Known(amplitude=amplitude), 2)
+    found = strongest_orders(Known(amplitude=amplitude), 2, lowest=0.01)
     assert found == pytest.approx([7.0, 3.0], abs=0.5 / 20 / 4)
 
 

@@ -70,11 +70,12 @@ def test_a_line_far_above_the_wander_beside_it_has_its_period_and_size():
     assert wave.rms == pytest.approx(2.5 / np.sqrt(2), rel=0.1)
     assert line_of(0.0) is None
     assert line_of(0.3) is None
+    assert line_of(1.6) is None  # thirty times the wander beside it, of sixty that are asked
 
 
 def test_a_line_is_not_of_fewer_than_three_periods_nor_faster_than_a_turn():
     """Two periods are a trend; of four means a turn 100 turns hold 100 cycles at most."""
-    assert line_of(5.0, cycles=2) is None
+    assert line_of(20.0, cycles=2) is None
     assert line_of(5.0, cycles=130) is None
     assert line_of(5.0, cycles=90) is not None
     assert line_of(5.0, cycles=5, n=WANDER.fewest_means - 1) is None
