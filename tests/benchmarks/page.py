@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from datetime import date
 from math import radians
 from pathlib import Path
 
@@ -250,6 +251,7 @@ TOP = """# Benchmarks
 Written by `python -m tests.benchmarks.page`, which `make benchmark` runs first. Processor time of one thread, best of
 a few, in one run: on another machine the seconds differ, the ratios less.
 
+- Measured {date}.
 - Machine: {machine}.
 - Peak of one thread in this run: {single:.0f} multiply-adds a nanosecond in single precision, {double:.0f} in double
   (chains of sixteen over 4096 numbers, `tests/benchmarks/peak.py`).
@@ -286,8 +288,8 @@ def page() -> str:
     """The page, measured now."""
     with engine_in_force("process"):
         single, double = multiply_adds_per_ns(seconds_of), multiply_adds_per_ns(seconds_of, np.float64)
-        lines = [TOP.format(machine=machine(), single=single, double=double), *table(drives(), "ns a drive", single)]
-        lines += [ON_DRIVES, *table(stacks(), "ns a drive", single)]
+        lines = [TOP.format(date=date.today(), machine=machine(), single=single, double=double)]
+        lines += [*table(drives(), "ns a drive", single), ON_DRIVES, *table(stacks(), "ns a drive", single)]
         lines += [ON_INDICES, *table(indices(), "ms", None), ON_GROWTH]
         for name, sizes in (*growth_of_stacks(), *growth_with_effects()):
             of, seconds = ", ".join(f"{n:,}" for n, _ in sizes), ", ".join(f"{s:.3g}" for _, s in sizes)
