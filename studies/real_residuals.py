@@ -33,12 +33,12 @@ TRAIL_COLUMNS = ("altair", "trail2_V6.25", "omi_aql")
 
 def recordings_folder() -> Path:
     """Where the real recordings are: $HDOPT_RECORDINGS, else ../shared/recordings."""
-    for path in (os.environ.get("HDOPT_RECORDINGS"), "../shared/recordings"):
-        if path and Path(path).is_dir():
-            return Path(path)
+    path = Path(os.environ.get("HDOPT_RECORDINGS") or "../shared/recordings")
+    if all((path / name).is_file() for name in (REVERSING, TRAILS)):
+        return path
     raise HdoptError(
-        "no recordings: real-residuals works on recordings of others, which are not part of hdopt; set "
-        "HDOPT_RECORDINGS to their folder"
+        f"no recordings: real-residuals works on {REVERSING} and {TRAILS}, recordings of others, which are not part of "
+        f"hdopt and not in {path}; set HDOPT_RECORDINGS to their folder"
     )
 
 

@@ -69,6 +69,19 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
+RECORDINGS = ("csf-17-100-mount.csv", "planetary-7to1-reversing.csv", "planetary-7to1-stiffness.csv")
+
+
+@pytest.fixture(scope="session")
+def recordings() -> Path:
+    """Folder of the real recordings: HDOPT_RECORDINGS where it is set, else ../shared/recordings. What asks for it is
+    skipped, visibly, unless all of them are there."""
+    folder = Path(os.environ.get("HDOPT_RECORDINGS") or Path(__file__).parents[2] / "shared/recordings").resolve()
+    if not all((folder / name).is_file() for name in RECORDINGS):
+        pytest.skip("no recordings: set HDOPT_RECORDINGS to the folder that holds all of them")
+    return folder
+
+
 @dataclass(frozen=True)
 class ShippedRun:
     """What `hdopt run csf-25-80 --json -` left: its `folder`, exit `status` and JSON."""

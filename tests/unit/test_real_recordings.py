@@ -1,8 +1,6 @@
 """Real recordings of others: what the diagnosis says of them, and what it leaves unsaid."""
 
-import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -40,20 +38,11 @@ TRAILS = ("altair", "trail2_V6.25", "omi_aql")
 MOUNT = "time=time_s:s,input=wg_angle_deg(sidereal):deg,error={}:arcsec"
 
 
-@pytest.fixture(scope="module")
-def folder():
-    root = Path(__file__).resolve().parents[2]
-    for path in (os.environ.get("HDOPT_RECORDINGS"), root / "../shared/recordings"):
-        if path and Path(path).is_dir():
-            return Path(path)
-    pytest.skip("no recordings: set HDOPT_RECORDINGS to their folder")
-
-
-def test_planetary_reversing(folder):
+def test_planetary_reversing(recordings):
     """Half an input turn back and forth: what depends on the angle is a free curve. The directions differ in
     proportion to the speed and meet where it stands still, before each reversal: a delay, not friction or play. A slow
     drift may be named beside it; the record is too short for its time constant, and the interval says so."""
-    diagnosis = diagnose(folder / "planetary-7to1-reversing.csv", ratio=PLANETARY, columns=REVERSING)
+    diagnosis = diagnose(recordings / "planetary-7to1-reversing.csv", ratio=PLANETARY, columns=REVERSING)
     assert any("sign has been turned around" in warning for warning in diagnosis.warnings)
     assert any("steps of 1.3 arcmin" in warning for warning in diagnosis.warnings)
     assert any(warning.startswith("encoder_output_eccentricity cannot be seen") for warning in diagnosis.warnings)
@@ -68,9 +57,9 @@ def test_planetary_reversing(folder):
     assert fit["heldout_rms_extended_arcmin"] < 0.8 * fit["heldout_rms_base_arcmin"]
 
 
-def test_passes_hidden_from_the_tool_are_predicted(folder):
+def test_passes_hidden_from_the_tool_are_predicted(recordings):
     """The tool gets the first ten passes, with their first reversals; the rest score it by its own held-out numbers."""
-    whole = read_recording(folder / "planetary-7to1-reversing.csv", PLANETARY, REVERSING)
+    whole = read_recording(recordings / "planetary-7to1-reversing.csv", PLANETARY, REVERSING)
     pass_of = find_passes(whole.input_angle).index
     shown = pass_of < 10
     assert pass_of[-1] >= 14
@@ -91,18 +80,18 @@ def test_passes_hidden_from_the_tool_are_predicted(folder):
     assert rms[True] == pytest.approx(diagnosis.fit["heldout_rms_extended_arcmin"], rel=0.1)
 
 
-def test_planetary_stiffness(folder):
+def test_planetary_stiffness(recordings):
     """Torque against a locked input: the windup, softer in the middle than beyond its knee."""
-    diagnosis = diagnose(folder / "planetary-7to1-stiffness.csv", ratio=PLANETARY, columns=STIFFNESS)
+    diagnosis = diagnose(recordings / "planetary-7to1-stiffness.csv", ratio=PLANETARY, columns=STIFFNESS)
     assert "torsional_windup" in {found.id for found in diagnosis.effects}
     parameters = next(f for f in diagnosis.effects if f.id == "torsional_windup").parameters
     assert parameters["stiffness_2"].value > parameters["stiffness_1"].value > 0
 
 
-def test_loop_of_the_stiffness_record_is_friction_ahead_of_the_spring(folder):
+def test_loop_of_the_stiffness_record_is_friction_ahead_of_the_spring(recordings):
     """Windup with friction of some Nm leaves a fifth of what windup alone leaves, and is named: no single curve of the
     torque makes a loop."""
-    diagnosis = diagnose(folder / "planetary-7to1-stiffness.csv", ratio=PLANETARY, columns=STIFFNESS)
+    diagnosis = diagnose(recordings / "planetary-7to1-stiffness.csv", ratio=PLANETARY, columns=STIFFNESS)
     fits = {frozenset(c.effects): c.fit for c in diagnosis.evidence.selection.candidates}
     both, alone = fits[frozenset({"torsional_windup", "hysteresis"})], fits[frozenset({"torsional_windup"})]
     assert np.std(both.residual) < 0.2 * np.std(alone.residual)
@@ -113,11 +102,11 @@ def test_loop_of_the_stiffness_record_is_friction_ahead_of_the_spring(folder):
 
 @pytest.mark.parametrize("drive", ["none", "scaled"])
 @pytest.mark.parametrize("nuisance", [(), ("drift", "time-warp")])
-def test_mount_is_too_short_to_name_anything(folder, tmp_path, drive, nuisance):
+def test_mount_is_too_short_to_name_anything(recordings, tmp_path, drive, nuisance):
     """Five half-turns of the wave generator cannot part order 2 from 2 (1 + 1/N): no name is claimed."""
     column = MOUNT.format("ra_error_arcsec_mean")
     diagnosis = diagnose(
-        folder / "csf-17-100-mount.csv", mount_drive(tmp_path, drive), 100.0, column, nuisance=nuisance
+        recordings / "csf-17-100-mount.csv", mount_drive(tmp_path, drive), 100.0, column, nuisance=nuisance
     )
     assert diagnosis.verdict == "insufficient"
     assert diagnosis.effects == ()
@@ -125,10 +114,15 @@ def test_mount_is_too_short_to_name_anything(folder, tmp_path, drive, nuisance):
     assert len(beats) == (drive == "scaled")
 
 
-def test_order_2_of_the_mount_is_the_largest(folder):
+def test_order_2_of_the_mount_is_the_largest(recordings):
     """What five half-turns do show: order 2 stands above every other whole order, at about 20 arcsec."""
     diagnosis = diagnose(
-        folder / "csf-17-100-mount.csv", None, 100.0, MOUNT.format("ra_error_arcsec_mean"), 1, ("drift", "time-warp")
+        recordings / "csf-17-100-mount.csv",
+        None,
+        100.0,
+        MOUNT.format("ra_error_arcsec_mean"),
+        1,
+        ("drift", "time-warp"),
     )
     orders = {name: p for name, p in diagnosis.nuisances.items() if name.startswith("order_")}
     second = orders.pop("order_2_arcmin")
@@ -137,10 +131,10 @@ def test_order_2_of_the_mount_is_the_largest(folder):
 
 
 @pytest.mark.parametrize("hidden", TRAILS)
-def test_a_trail_hidden_from_the_tool_scores_its_fit(folder, tmp_path, hidden):
+def test_a_trail_hidden_from_the_tool_scores_its_fit(recordings, tmp_path, hidden):
     """Fitted to two trails, scored on the third, whose column the tool never gets: what it left unexplained there is
     what it left in the trails that it saw, and the reading of the third (0.8 to 1.6 arcsec) beside it."""
-    table = pd.read_csv(folder / "csf-17-100-mount.csv")
+    table = pd.read_csv(recordings / "csf-17-100-mount.csv")
     seen = table[[name for name in TRAILS if name != hidden]].mean(axis=1)
     given = pd.DataFrame({"time_s": table.time_s, "wg_angle_deg(sidereal)": table.iloc[:, 1], "seen": seen})
     recording = recording_from_table(given, 100.0, MOUNT.format("seen"))
@@ -160,10 +154,11 @@ def mount_drive(tmp_path, name):
     return load_study(tmp_path / "csf-17-100.toml").drive
 
 
-def test_trails_hidden_from_the_tool_agree_with_the_one_it_saw(folder):
+def test_trails_hidden_from_the_tool_agree_with_the_one_it_saw(recordings):
     """The three trails are one motion read three times: they must agree within the 1 to 2 arcsec of their origin."""
     read = [
-        read_recording(folder / "csf-17-100-mount.csv", 100.0, MOUNT.format(name)).error_arcmin * 60 for name in TRAILS
+        read_recording(recordings / "csf-17-100-mount.csv", 100.0, MOUNT.format(name)).error_arcmin * 60
+        for name in TRAILS
     ]
     for trail in read[1:]:
         difference = trail - read[0]

@@ -1,7 +1,5 @@
 """The study `real-residuals`: a small part of it on the real recordings, and how a case is judged."""
 
-import os
-from pathlib import Path
 from types import SimpleNamespace
 
 import pandas as pd
@@ -15,14 +13,8 @@ from hdopt.workflow.steps import Context, find_step
 
 @pytest.mark.slow
 @pytest.mark.recordings
-def test_known_physics_in_real_noise(tmp_path, monkeypatch):
-    root = Path(__file__).resolve().parents[2]
-    folder = next(
-        (p for p in (os.environ.get("HDOPT_RECORDINGS"), root / "../shared/recordings") if p and Path(p).is_dir()), None
-    )
-    if folder is None:
-        pytest.skip("no recordings: set HDOPT_RECORDINGS to their folder")
-    monkeypatch.setenv("HDOPT_RECORDINGS", str(folder))
+def test_known_physics_in_real_noise(recordings, tmp_path, monkeypatch):
+    monkeypatch.setenv("HDOPT_RECORDINGS", str(recordings))
     size = (
         "residuals.nothing=1",
         "residuals.severities=[1.0]",
@@ -61,9 +53,14 @@ def test_how_a_case_is_judged(hidden, answer, exact, among, unknown, wrong):
     assert (case["exact"], case["among"], case["unknown"], case["wrong"]) == (exact, among, unknown, wrong)
 
 
-def test_without_recordings_it_says_where_they_should_be(tmp_path, monkeypatch):
+@pytest.mark.parametrize("given", [None, "", "empty"])
+def test_without_recordings_it_says_where_they_should_be(given, tmp_path, monkeypatch):
+    """Would catch a folder that is taken because it exists, whatever is in it."""
+    (tmp_path / "empty").mkdir()
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("HDOPT_RECORDINGS", raising=False)
+    if given is not None:
+        monkeypatch.setenv("HDOPT_RECORDINGS", given)
     with pytest.raises(HdoptError, match="set HDOPT_RECORDINGS to their folder"):
         recordings_folder()
 
