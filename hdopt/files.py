@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, Protocol  # Any: values of JSON
 
 from hdopt.errors import HdoptError
+from hdopt.interruption import interruption
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,8 +79,6 @@ class FilesOfWork:
 
     values: Callable[[str], tuple[str, ...]] | None = None
     """Says where the values and keys stand that a message shows or names; None for work without a study."""
-    came: list[BaseException] = field(default_factory=list)
-    """What signals have raised so far."""
 
     def place_of_numbers(self) -> str:
         """Where the numbers of this work stand: in its study, else in its inputs."""
@@ -352,15 +351,15 @@ def replacing_all(paths: Iterable[Path]) -> Iterator[list[Path]]:
         check_output(path)
     reals = {path: _real(path) for path in targets}
     passing = {path: _passing_name(real) for path, real in reals.items()}
-    work = _of_work.get()
-    before = len(work.came) if work is not None else 0
+    noted = interruption()
+    before = len(noted.came)
     _under_way.update(passing.values())
     try:
         for path in targets:
             _create(passing[path], reals[path])
         yield [passing[path] for path in targets]
-        if work is not None and len(work.came) > before:
-            raise work.came[-1]  # a signal that compiled code swallowed
+        if len(noted.came) > before:
+            raise noted.came[-1]  # a signal that compiled code swallowed
         _finish(targets, passing, reals)
     except OSError as error:
         if isinstance(error, BrokenPipeError):
@@ -389,6 +388,10 @@ def _drop(names: Iterable[Path]) -> None:
         _under_way.discard(name)
 
 
+names_change = threading.RLock()
+"""Held while files take their names, which the end of the process would leave half done."""
+
+
 @contextmanager
 def _signals_wait() -> Iterator[None]:
     """SIGINT and SIGTERM come at the end of the block instead of within it, where this thread is the one they reach."""
@@ -401,7 +404,8 @@ def _signals_wait() -> Iterator[None]:
         for number in (signal.SIGINT, signal.SIGTERM):
             if signal.getsignal(number) not in (None, signal.SIG_IGN):
                 handlers[number] = signal.signal(number, lambda number, frame: came.append(number))
-        yield
+        with names_change:
+            yield
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)

@@ -5,17 +5,15 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
-from types import FrameType
+from collections.abc import Sequence
+from contextlib import suppress
 from typing import NoReturn
+
+from hdopt.cli.signals import Terminated, signals_raise
+from hdopt.interruption import Interruption, noting_interruptions
 
 DONE, UNUSABLE, INTERRUPTED, TERMINATED = 0, 2, 130, 143
 """Exit statuses besides 1, which is an answer: "no"."""
-
-
-class Terminated(BaseException):
-    """SIGTERM came: whatever is half-written is cleaned up on the way out, as on Ctrl-C."""
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -24,20 +22,18 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     `arguments` stand in for those of the process. HDOPT_TRACEBACK=1 in the environment shows where a fault arose.
     """
     _open_streams()
-    came: list[BaseException] = []
+    noted = Interruption()
     try:
-        with _signals_raise(came):
-            status = _run(arguments, came)
+        with noting_interruptions() as noted, signals_raise(noted, _end if arguments is None else None):
+            status = _run(arguments)
             sys.stdout.flush()
-    except KeyboardInterrupt:
-        _leave(INTERRUPTED, "interrupted", at_once=arguments is None)
-    except Terminated:
-        _leave(TERMINATED, "ended by SIGTERM", at_once=arguments is None)
+    except (KeyboardInterrupt, Terminated) as came:
+        _leave(came, at_once=arguments is None)
     except BrokenPipeError:
         _drop_output()
         sys.exit(DONE)
     except Exception as error:
-        _leave_if_interrupted(error, came, at_once=arguments is None)
+        _leave_if_interrupted(error, noted.came, at_once=arguments is None)
         if os.environ.get("HDOPT_TRACEBACK"):
             raise
         _drop_broken_output(error)
@@ -58,7 +54,7 @@ def _open_streams() -> None:
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")
 
 
-def _run(arguments: Sequence[str] | None, came: list[BaseException]) -> int:
+def _run(arguments: Sequence[str] | None) -> int:
     import warnings
 
     import click
@@ -72,7 +68,6 @@ def _run(arguments: Sequence[str] | None, came: list[BaseException]) -> int:
         warnings.filterwarnings("ignore", category=RuntimeWarning)
     try:
         with watching_files() as work, numbers_of(work.place_of_numbers):
-            work.came = came
             status = cli.main(args=arguments, prog_name="hdopt", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as help_text:
         help_text.show()
@@ -108,9 +103,15 @@ def _say(message: str) -> None:
         print(f"hdopt: {message}", file=sys.stderr, flush=True)
 
 
-def _leave(status: int, message: str, at_once: bool) -> NoReturn:
+def _ending(came: BaseException) -> tuple[int, str]:
+    """Exit status and message after what a signal raised."""
+    return (TERMINATED, "ended by SIGTERM") if isinstance(came, Terminated) else (INTERRUPTED, "interrupted")
+
+
+def _leave(came: BaseException, at_once: bool) -> NoReturn:
     """End after an interruption. A process of our own ends `at_once`: threads under way and the unloading of compiled
     libraries, which an interruption may have left in any state, are not waited for."""
+    status, message = _ending(came)
     if at_once:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     _say(message)
@@ -124,6 +125,18 @@ def _leave(status: int, message: str, at_once: bool) -> NoReturn:
     sys.exit(status)
 
 
+def _end(came: BaseException) -> None:
+    """The same, from another thread than the interrupted one, which does not come back."""
+    from hdopt.files import drop_passing_files, names_change
+
+    status, message = _ending(came)
+    with names_change:
+        with suppress(OSError):
+            os.write(2, f"hdopt: {message}\n".encode())
+        drop_passing_files()
+        os._exit(status)
+
+
 def _leave_if_interrupted(error: Exception, came: Sequence[BaseException], at_once: bool) -> None:
     """End as on an interruption where one `came` or is what `error` came from: a compiled library that is interrupted,
     in a callback or while it is imported, raises an error of its own."""
@@ -133,37 +146,8 @@ def _leave_if_interrupted(error: Exception, came: Sequence[BaseException], at_on
         if isinstance(cause, KeyboardInterrupt | Terminated):
             hidden.append(cause)
         cause = cause.__cause__ or cause.__context__
-    if hidden and isinstance(hidden[-1], Terminated):
-        _leave(TERMINATED, "ended by SIGTERM", at_once)
-    elif hidden:
-        _leave(INTERRUPTED, "interrupted", at_once)
-
-
-@contextmanager
-def _signals_raise(came: list[BaseException]) -> Iterator[None]:
-    """SIGTERM as an exception, as SIGINT is, so that what is half-written goes; what `came` is noted.
-    Only the main thread may ask for that, and a SIGINT that is ignored stays so."""
-
-    def terminate(number: int, frame: FrameType | None) -> None:
-        came.append(Terminated())
-        raise came[-1]
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        came.append(KeyboardInterrupt())
-        raise came[-1]
-
-    try:
-        before = {signal.SIGTERM: signal.signal(signal.SIGTERM, terminate)}
-    except ValueError:  # not the main thread
-        yield
-        return
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        before[signal.SIGINT] = signal.signal(signal.SIGINT, interrupt)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    if hidden:
+        _leave(hidden[-1], at_once)
 
 
 def _drop_broken_output(error: Exception) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
+from hdopt.interruption import answering_interruptions
 from hdopt.optimize.evaluation import record, record_of
 from hdopt.optimize.fronts import Progress, front_objectives, trace_front
 from hdopt.optimize.minimax import GLOBAL, LOCAL
@@ -26,6 +27,7 @@ class Interrupted(Exception):
         self.solution = solution
 
 
+@answering_interruptions()
 def search_designs(
     setup: Setup,
     seed: int = 1,

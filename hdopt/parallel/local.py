@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -113,7 +115,9 @@ class Processes:
             ) from error
 
         def submit(item: T) -> Future[R]:
-            return pool.submit(_call, cloudpickle.dumps((function, item)))
+            pickled = cloudpickle.dumps((function, item))
+            with _ctrl_c_later():
+                return pool.submit(_call, pickled)
 
         try:
             yield from in_order(pool, submit, items, WAITING * self.workers)
@@ -141,10 +145,22 @@ def in_order(pool: Executor, submit: Callable[[T], Future[R]], items: Iterable[T
         pool.shutdown(wait=finished, cancel_futures=True)
 
 
+@contextmanager
+def _ctrl_c_later() -> Iterator[None]:
+    """SIGINT comes after the block, and never to the processes that are started in it: a terminal sends Ctrl-C to them
+    too, and one that still imports would print its own traceback."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _start_process() -> None:
     """A worker's share of the machine; Ctrl-C is the parent's to answer."""
-    import signal
-
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     become_worker()
     threading.current_thread().name = "hdopt worker"

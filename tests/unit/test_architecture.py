@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 LAYERS = [
-    {"arrays"},
+    {"arrays", "interruption"},
     {"bench", "errors", "figures", "files", "keywords", "late", "parallel"},
     {"drive"},
     {"effects", "recordings", "kinematics", "mechanics"},
@@ -34,7 +34,17 @@ BESIDE = {
 }
 """Imports between rooms of one layer, with the reason."""
 
-TOP = {"__init__.py", "__main__.py", "arrays.py", "errors.py", "figures.py", "files.py", "keywords.py", "late.py"}
+TOP = {
+    "__init__.py",
+    "__main__.py",
+    "arrays.py",
+    "errors.py",
+    "figures.py",
+    "files.py",
+    "interruption.py",
+    "keywords.py",
+    "late.py",
+}
 
 HEAVY = {"cadquery", "plotly", "cvxpy", "SALib", "openturns", "distributed", "dask", "nlopt", "pymoo", "vtk", "OCP"}
 

@@ -25,6 +25,7 @@ from hdopt.files import (
     watching_files,
     write_text,
 )
+from hdopt.interruption import noting_interruptions
 
 
 def names(folder):
@@ -147,10 +148,11 @@ SLOW_WRITER = """
 import signal, sys, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background work begins with it ignored
 from pathlib import Path
-from hdopt.cli import _signals_raise, Terminated
+from hdopt.cli.signals import Terminated, signals_raise
 from hdopt.files import replacing
+from hdopt.interruption import Interruption
 try:
-    with _signals_raise([]), replacing(Path(sys.argv[1])) as passing:
+    with signals_raise(Interruption(), None), replacing(Path(sys.argv[1])) as passing:
         passing.write_text("half")
         print("writing", flush=True)
         time.sleep(30)
@@ -232,12 +234,12 @@ def test_an_interruption_at_any_line_leaves_all_files_or_none(tmp_path, monkeypa
 
 
 def test_a_signal_that_compiled_code_swallows_stops_the_names(tmp_path):
-    with watching_files() as work, pytest.raises(KeyboardInterrupt), replacing(tmp_path / "a") as passing:
+    with noting_interruptions() as noted, pytest.raises(KeyboardInterrupt), replacing(tmp_path / "a") as passing:
         passing.write_text("whole")
-        work.came.append(KeyboardInterrupt())
+        noted.came.append(KeyboardInterrupt())
     assert names(tmp_path) == []
-    with watching_files() as work:
-        work.came.append(KeyboardInterrupt())  # one that a search has answered with its best so far
+    with noting_interruptions() as noted:
+        noted.came.append(KeyboardInterrupt())  # one that a search has answered with its best so far
         write_text(tmp_path / "a", "whole")
     assert names(tmp_path) == ["a"]
 
