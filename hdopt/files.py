@@ -150,7 +150,10 @@ def read_text(path: Path, wanted: str, foreign: bool = False) -> str:
         with suppress(UnicodeDecodeError):
             if foreign and not utf_16:
                 return content.decode("cp1252")
-        raise HdoptError(f"{path} is not a text file (byte {error.start} is not UTF-8); give {wanted}") from error
+        line = content.count(b"\n", 0, error.start) + 1
+        raise HdoptError(
+            f"{path} is not a text file: line {line}, byte {error.start} is not UTF-8; give {wanted}"
+        ) from error
 
 
 DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*")

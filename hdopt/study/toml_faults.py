@@ -17,7 +17,8 @@ def why_no_toml(error: tomllib.TOMLDecodeError, text: str) -> str:
     """What is wrong with `text`, which the parser refused with `error`, and what to write instead."""
     place = _AT_LINE.search(str(error))
     if place is None:
-        return f"is not valid TOML: {error}"
+        last = text.rstrip("\n").count("\n") + 1
+        return f"is not valid TOML: {error}".replace("at end of document", f"at the end, line {last}")
     number, column = int(place[1]), int(place[2])
     line = text.split("\n")[number - 1].strip() if number <= text.count("\n") + 1 else ""
     hint = _hint(str(error), line, column)

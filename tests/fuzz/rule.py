@@ -36,8 +36,10 @@ def held(arguments: list[str], *places: str) -> int:
 
 
 def study(content: bytes, folder: Path) -> None:
+    """A refusal says at which line to look, or what stands nowhere."""
     (folder / "s.toml").write_bytes(content)
-    held(["profile", str(folder / "s.toml"), "--json", "-"], "s.toml")
+    no_toml = ("s.toml is not a text file: line ", "TOML, line ", "(at line ", "(at the end, line ")
+    held(["profile", str(folder / "s.toml"), "--json", "-"], "s.toml, line ", *no_toml, " missing", "does not have")
 
 
 def number(content: tuple[str, list[str]], folder: Path) -> None:

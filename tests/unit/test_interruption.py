@@ -78,6 +78,7 @@ LOST = [
 def command(monkeypatch, capfd):
     """Runs `work` as a command of this process; its exit status, seconds and what stands on standard error."""
     monkeypatch.setattr(signals, "AGAIN_S", 0.05)
+    monkeypatch.setattr(sys, "unraisablehook", sys.__unraisablehook__)  # pytest's own prints nothing
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def run(work):

@@ -176,7 +176,14 @@ def test_every_fault_of_a_study_file_is_one_clear_message(write, old, new, messa
 
 def test_files_that_cannot_be_read(tmp_path):
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00\x01")
-    for name, message in (("none.toml", "cannot read"), ("binary.toml", "is not a text file (byte 0 is not UTF-8)")):
+    (tmp_path / "latin.toml").write_bytes(b'drive = "csf-25-80"\n# 3 \xb5m\n')
+    (tmp_path / "cut.toml").write_text('drive = "csf-25-80"\n[errors]\naxis_tilt_x_deg')
+    for name, message in (
+        ("none.toml", "cannot read"),
+        ("binary.toml", "is not a text file: line 1, byte 0 is not UTF-8"),
+        ("latin.toml", "is not a text file: line 2, byte 24 is not UTF-8"),
+        ("cut.toml", "(at the end, line 3)"),
+    ):
         with pytest.raises(HdoptError) as caught:
             load_study(tmp_path / name)
         assert message in str(caught.value)
