@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import click
 from click.core import ParameterSource
 
+from hdopt.errors import shown
 from hdopt.files import FilesOfWork
 from hdopt.study.named import shows
 
@@ -43,8 +44,10 @@ def _options(message: str, context: click.Context) -> Iterator[str]:
         value = context.params.get(parameter.name)
         default = context.get_parameter_source(parameter.name) is not ParameterSource.COMMANDLINE
         for one in value if isinstance(value, tuple) else (value,):
-            quoted = isinstance(one, str) and not default and repr(one) in message
-            if quoted or shows(message, one, name):
+            given = isinstance(one, str) and not default
+            if given and repr(one) != shown(one) and shown(one) in message:
+                yield option  # the message shows of its long text what there is room for
+            elif (given and repr(one) in message) or shows(message, one, name):
                 yield f"{option} {one}" + (" (the default)" if default else "")
 
 

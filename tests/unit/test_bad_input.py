@@ -60,6 +60,7 @@ COMMANDS = {
     "tail": (["stack", "-n", "4096", "--tail", "nan"], "finite number"),
     "grid": (["ke", "--sampling-deg", "1e-300"], "take a coarser grid"),
     "engine": (["stack", "--engine", "x" * 5000], "unknown engine"),
+    "drive": (["ke", "--drive", "x" * 5000], "--drive: unknown drive 'xx"),
     "nowhere": (["ke", "--json", "no/such/folder.json"], "there is no folder"),
 }
 
