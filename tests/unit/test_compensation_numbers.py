@@ -188,9 +188,10 @@ def test_what_is_expected_is_the_mean_with_the_usual_spread():
 def test_each_recording_has_its_own_extremes_and_its_speed_by_the_minute():
     """60 r/min are 2 pi rad/s, whichever way."""
     record = np.repeat([0, 1], 3)
-    rows = SimpleNamespace(record=record, speed=2 * np.pi * np.array([1.0, 1, 1, -2, -2, -2]))
+    rows = SimpleNamespace(record=record, records=2, speed=2 * np.pi * np.array([1.0, 1, 1, -2, -2, -2]))
     held = np.array([0.0, 1.0, 0.5, 0.0, 4.0, 1.0]), np.array([0.0, 0.2, 0.1, 0.0, 0.5, 1.0])
     names = [SimpleNamespace(name="a"), SimpleNamespace(name="b")]
     a, b = _per_recording(names, rows, held, [(0.3, 0.1), (1.1, 0.1)])
     assert (a.name, a.speed_rpm, a.before, a.after, a.expected) == ("a", pytest.approx(60.0), 1.0, 0.2, 0.3)
+    assert (a.low, a.high) == (pytest.approx(0.3 - 0.196, rel=1e-3), pytest.approx(0.3 + 0.196, rel=1e-3))
     assert (b.name, b.speed_rpm, b.before, b.after, b.expected) == ("b", pytest.approx(120.0), 4.0, 1.0, 1.1)
