@@ -1,5 +1,8 @@
 """What changes in time as no noise does: steps, slips, slow waves; and slow effects against slow wander."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -97,6 +100,31 @@ def test_slips_give_themselves_away_and_noise_does_not():
     assert steps.rms > 0.03
     assert not sudden_steps(fit_of(noise)).any
     assert not sudden_steps(fit_of(np.cumsum(rng.normal(0, 0.01, ROWS)))).any
+
+
+def read_in_steps(error, step):
+    """`fit_of` an `error` as an encoder of this `step` reads it."""
+    fit = fit_of(step * np.round(error / step))
+    return replace(fit, problem=replace(fit.problem, rows=replace(fit.problem.rows, output_step=step)))
+
+
+@pytest.mark.parametrize("steps_of_noise", [0.2, 0.3, 0.37, 0.45, 0.6, 1.0])
+def test_noise_that_crosses_an_encoders_steps_does_not_slip(steps_of_noise):
+    """The error moves in steps of the encoder: where its noise crosses two at once that is no event, whatever the noise
+    is in units of the step.
+    """
+    step = 0.04
+    noise = coloured(np.random.default_rng(6), 0.5, steps_of_noise * step * math.sqrt(1 - 0.5**2))
+    assert not sudden_steps(read_in_steps(noise, step)).any
+
+
+@pytest.mark.parametrize("steps_of_noise", [0.45, 0.6, 1.0])
+def test_slips_of_many_steps_of_an_encoder_are_found(steps_of_noise):
+    """Where the noise crosses steps at all: below that the creeping between slips is steps itself."""
+    step, rng = 0.04, np.random.default_rng(6)
+    noise = coloured(rng, 0.5, steps_of_noise * step * math.sqrt(1 - 0.5**2))
+    wander = 0.1 * np.sin(THETA / 40)
+    assert sudden_steps(read_in_steps(noise + wander + stick_slip(rng, 12 * step), step)).any
 
 
 def test_a_glitch_of_the_readout_or_a_pulse_at_an_angle_is_no_slip():

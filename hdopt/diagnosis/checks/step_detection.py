@@ -61,8 +61,13 @@ def sudden_steps(fit: Fit) -> Steps:
 
 
 def _of_the_encoder(fit: Fit) -> Mask:
-    """Rows at which what `fit` leaves jumps by no more than a step of the encoder may."""
-    reach = fit.problem.settings.encoder_steps.told * fit.problem.rows.output_step
+    """Rows at which what `fit` leaves jumps by no more than the encoder may. Reading in steps adds up to one of them to
+    a jump: only what is beyond one counts against the noise, which may have crossed two.
+    """
+    settings, step = fit.problem.settings, fit.problem.rows.output_step
+    if step == 0:
+        return np.zeros(len(fit.residual), bool)
+    reach = max(settings.encoder_steps.told * step, step + settings.steps.out * fit.problem.noise.sigma)
     return np.asarray(np.abs(np.diff(fit.residual, prepend=fit.residual[:1])) < reach)
 
 
