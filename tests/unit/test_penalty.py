@@ -6,6 +6,7 @@ import pytest
 from hdopt.diagnosis.search.penalty import Scale, SubtractedTerms, is_cycle_of, penalty
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.effects.declared import Shaft
+from hdopt.effects.met import Spline, Waves
 from hdopt.effects.term import Term
 
 COSTS = DEFAULT.penalty
@@ -35,6 +36,28 @@ def test_two_of_which_one_is_in_the_other_pay_for_it():
     pair = [term("cs_tooth_harmonics"), term("circular_spline_lobing")]
     other = [term("cs_tooth_harmonics"), term("fs_tooth_harmonics")]
     assert paid(pair) - paid(other) == pytest.approx(COSTS.one_in_the_other)
+
+
+def test_waves_of_both_splines_teeth_pay_once_for_bending():
+    """Teeth of both splines with an error each: the second's waves pay for what they could make of the first's misfit,
+    and not for being waves as well. A stiff term beside them is charged as alike, and so is another that bends.
+    """
+
+    def teeth(effect, spline, count=COSTS.many_coefficients // 2):
+        return Term(effect, {}, met=Waves(spline, tuple(range(2, 2 + count))))
+
+    circular = teeth("cs_tooth_harmonics", Spline.CIRCULAR)
+    flexspline = teeth("fs_tooth_harmonics", Spline.FLEX)
+    mesh = Term("tooth_mesh", {}, columns=np.zeros((4, COSTS.many_coefficients)))
+    for pair, inexact in [
+        ([circular], 1),
+        ([circular, flexspline], 2),
+        ([circular, teeth("fs_tooth_harmonics", Spline.FLEX, 2)], 2),
+        ([circular, flexspline, term("bearing_pass")], 3),
+        ([circular, mesh], 3),
+    ]:
+        own = sum(one.width * np.log(100.0) / 2 + COSTS.effect_cost for one in pair)
+        assert paid(pair, gain=1e4) == pytest.approx(own + inexact * COSTS.discrepancy * 1e4 / 2)
 
 
 def test_a_doubtful_term_must_win_clearly():

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from hdopt.diagnosis.inference.catalogue import is_outside, properties_of
 from hdopt.diagnosis.settings import DEFAULT, PenaltySettings
+from hdopt.effects.met import Waves
 from hdopt.effects.term import Term
 
 KINDS = {
@@ -84,13 +85,15 @@ def is_cycle_of(term: Term, found: Sequence[Term]) -> bool:
 
 def discrepancy(terms: Sequence[Term], settings: PenaltySettings = DEFAULT.penalty) -> float:
     """Share of the explained power that a set of `terms` pays for the inexactness of its shapes; a description
-    without physics could be the misfit of anything. `settings` are the thresholds.
+    without physics could be the misfit of anything. Many waves of both splines' teeth pay for bending, each to the
+    misfit of the other, and not for being alike too. `settings` are the thresholds.
     """
     kinds = {kind_of(term) for term in terms if not is_outside(term.effect)}
-    alike = max(len(terms) - max(len(kinds), 1), 0)
+    flexible = sum(flexibility(term, settings) for term in terms)
+    of_teeth = sum(flexibility(term, settings) for term in terms if isinstance(term.met, Waves))
+    alike = max(len(terms) - max(len(kinds), 1) - max(of_teeth - 1, 0), 0)
     # Sines of known orders leave nothing for each other: their shape is exact.
     each_alike = settings.other_kind if all(has_exact_shape(term) for term in terms) else settings.discrepancy
-    flexible = sum(flexibility(term, settings) for term in terms)
     return max(len(kinds) - 1, 0) * settings.other_kind + alike * each_alike + flexible * settings.discrepancy
 
 
@@ -117,4 +120,4 @@ def kind_of(term: Term) -> str:
     like no other's.
     """
     effect = properties_of(term.effect)
-    return "swing" if effect.driven else KINDS.get(effect.domain, "way")
+    return "swing" if effect.driven and effect.domain not in KINDS else KINDS.get(effect.domain, "way")
