@@ -43,6 +43,9 @@ class Explanation(ABC):
     driven: ClassVar[bool] = False
     """Whether its columns follow the drive's own motion (`response`)."""
 
+    aside: ClassVar[bool] = False
+    """Whether the search asks for it once, when all others are weighed, and not among them."""
+
     special_case_of: ClassVar[str] = ""
     """The effect of which this one is a special case: both at once are unlikely."""
 
@@ -64,6 +67,14 @@ class Explanation(ABC):
     def every_part_shows(self, term: Term, estimate: FitEstimate) -> bool:
         """Whether a fit has all that the term stands for; asked only where `has_parts`."""
         return True
+
+    def may_imitate(self, term: Term, estimate: FitEstimate) -> bool:
+        """Whether the `term`, as it imitates another effect, has numbers that it may have."""
+        return self.every_part_shows(term, estimate)
+
+    def beyond_search(self, probe: Probe) -> Sequence[Term]:
+        """Further terms by which it could imitate what `probe` sees, that no search need look at: none for most."""
+        return ()
 
     def trimmed(self, term: Term, coefficients: Array) -> Shape | None:
         """The shape of what shows of a fitted term, or None where all of it does."""

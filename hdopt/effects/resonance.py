@@ -34,6 +34,12 @@ from hdopt.effects.term import Shape, Term
 
 TRIALS = 40.0
 """Different shapes that a search looks at, for each kind of foot."""
+HIGHEST_HZ = 2e3
+"""Of a drive's output on its spring."""
+MOST_DAMPING = 0.3
+"""Of critical: above it nothing swings."""
+MOST_GAIN = 1.3
+"""The whole inertia, and what a gain is off by."""
 EACH = np.eye(2)
 """The two columns, alone."""
 LEAST_SPEED_RANGE = 1.15
@@ -61,9 +67,11 @@ class Resonance(Effect):
         "run up slowly through the speed range, or repeat at three speeds: a resonance stays at one frequency in Hz"
     )
     declared = (
-        Quantity("frequency_hz", "Hz", "of the output's inertia on the drive's spring", "f", (1.0, 2e3), above=0.0),
-        Quantity("damping_ratio", "1", "of critical", "ζ", (0.002, 0.3), above=0.0, below=1.0),
-        Quantity("gain", "1", "1: the whole inertia takes part", "g", (0.7, 1.3), 1.0),
+        Quantity(
+            "frequency_hz", "Hz", "of the output's inertia on the drive's spring", "f", (1.0, HIGHEST_HZ), above=0.0
+        ),
+        Quantity("damping_ratio", "1", "of critical", "ζ", (0.002, MOST_DAMPING), above=0.0, below=1.0),
+        Quantity("gain", "1", "1: the whole inertia takes part", "g", (0.7, MOST_GAIN), 1.0),
         Quantity(
             "output_share_of_damping",
             "1",
@@ -123,6 +131,22 @@ class Resonance(Effect):
         damping that lets nothing swing, it bends to a delay, a drift or a loop.
         """
         return not any(one.certainly for one in outside_prior(self, self.parameters(term, estimate)))
+
+    def may_imitate(self, term: Term, estimate: FitEstimate) -> bool:
+        """Whether what drags is besides a part of its damping, of 0 to 1, and of an inertia of a gain that drives
+        have.
+        """
+        drag = estimate.parameter(1, "1")
+        return drag.low <= MOST_GAIN and drag.high >= 0 and self.every_part_shows(term, estimate)
+
+    def beyond_search(self, probe: Probe) -> Sequence[Term]:
+        """Stiff ones, that swing too fast to be seen and only drag, as a delay does."""
+        lowest = 16 * float(np.quantile(np.abs(probe.samples.known_speed), 0.95)) / TURN
+        shapes = [
+            {"frequency_hz": float(f), "damping_ratio": MOST_DAMPING, "foot": Foot.WHOLE_MOTION}
+            for f in np.geomspace(lowest, max(HIGHEST_HZ, lowest), 12)
+        ]
+        return [self.term(probe.samples, shape, probe.motion) for shape in shapes]
 
     def _excitation(self, motion: Array | None) -> Array:
         if motion is None:

@@ -1,16 +1,27 @@
 """Confounded pairs, computed: what cannot be told apart on one record, and which second record parts it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from hdopt.diagnosis.checks.confounding import confounded_with, remaining_span, share_in_span, smallest_angle_deg
+from hdopt.diagnosis.checks.confounding import (
+    _may_be_itself,
+    confounded_with,
+    remaining_span,
+    share_in_span,
+    smallest_angle_deg,
+)
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.nuisance import nuisances_for
-from hdopt.diagnosis.search.candidates import joint_fit
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.search.candidates import joint_fit, search_terms
+from hdopt.drive.geometry import ARCMIN
 from hdopt.effects import EFFECTS
 from hdopt.effects._friction_law import Law
 from hdopt.effects.declared import Shaft
+from hdopt.effects.resonance import Foot
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.recordings.rows import gather
 from hdopt.study import load_study
@@ -90,6 +101,37 @@ def test_two_speeds_part_a_delay_from_play(study, name, other):
     assert two.imitates == pytest.approx(0.8, abs=0.01)
     assert far.imitates == pytest.approx(100 / 164, abs=0.01)
     assert 20 * one.evidence_apart < two.evidence_apart < far.evidence_apart
+
+
+@pytest.mark.parametrize(("delay_s", "imitated"), [(2e-3, True), (0.5, False), (-2e-3, False)])
+def test_a_resonance_imitates_a_delay_only_with_the_numbers_of_an_inertia(study, delay_s, imitated):
+    """A spring damped at its output lags by 2 zeta/w: at 48 Hz and a damping of 0.3 by 2 ms, and swings too fast to be
+    seen at half a turn a second. One that lags by half a second would swing at a fifth of a hertz, in sight, and
+    none runs ahead.
+    """
+
+    def late(state):
+        return delay_s * state["speed"] / 80 / ARCMIN
+
+    fit = fitted(study, ["channel_delay"], hidden={"channel_delay": late}, speeds=(1.0, 3.0))
+    pairs = confounded_with(fit, 0, others=["resonance"])
+    assert (max([pair.imitates for pair in pairs], default=0.0) > 0.99) is imitated
+
+
+def test_a_resonance_may_be_itself_and_a_drag_may_not(study):
+    fit = fitted(
+        study, ["channel_delay"], hidden={"channel_delay": lambda s: 0.5 * s["speed"] / 80 / ARCMIN}, speeds=(1.0, 3.0)
+    )
+    samples = fit.problem.rows
+    swing = EFFECTS["resonance"].term(
+        samples, {"frequency_hz": 3.0, "damping_ratio": 0.05, "foot": Foot.ERROR}, fit.base_value
+    )
+    swinging = replace(samples, error=fit.base_value + swing.columns @ [0.9, 0.0])
+    again = joint_fit(replace(fit, problem=replace(fit.problem, rows=swinging)), [swing])
+    probe = FitProbe(again, keep=())
+    assert _may_be_itself(probe, again.terms[0])
+    drag = replace(fit, terms=(), coefficients=())
+    assert not _may_be_itself(FitProbe(drag), search_terms(FitProbe(drag), only=["resonance"])[0])
 
 
 def test_a_steady_drift_is_three_quarters_a_step(study):

@@ -16,12 +16,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdopt.arrays import Array
+from hdopt.diagnosis.inference.base_excitation import is_driven
+from hdopt.diagnosis.inference.catalogue import properties_of
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import SPAN_RANK
 from hdopt.diagnosis.search.candidates import search_terms
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.effects import EFFECTS
+from hdopt.effects.estimate import FitEstimate
 from hdopt.effects.term import Term
 
 RIGHT_ANGLE_DEG = 90.0
@@ -107,7 +110,9 @@ def confounded_with(
             candidates = [fit.terms[fitted[name]]]
         else:
             seen = probe
-            candidates = search_terms(probe, only=[name])
+            searched = search_terms(probe, only=[name])
+            further = EFFECTS[name].beyond_search(probe) if searched else ()
+            candidates = [term for term in (*searched, *further) if _may_be_itself(probe, term)]
         own = _basis(seen, term)
         contribution = seen.white_residual
         compared = [
@@ -131,6 +136,20 @@ def _only_contribution(fit: Fit, index: int, without: Sequence[int]) -> Fit:
         coefficients=tuple(fit.coefficients[i] for i in kept),
         prediction=fit.problem.rows.error - fit.contribution(index),
     )
+
+
+def _may_be_itself(probe: FitProbe, term: Term) -> bool:
+    """Whether `term`, one that follows the drive's motion, imitates what `probe` sees with numbers that it may have: an
+    inertia of no gain that only drags is another's name for a delay.
+    """
+    if not is_driven(term):
+        return True
+    variance = probe.noise.sigma**2
+    numbers = [float(term.shape[name]) for name in term.steps]
+    covariance = np.zeros((term.freedom, term.freedom))
+    covariance[: term.width, : term.width] = variance * np.linalg.pinv(probe.table(term)[0])
+    estimate = FitEstimate(np.r_[probe.solve(term)[1], numbers], covariance)
+    return properties_of(term.effect).may_imitate(term, estimate)
 
 
 def _basis(probe: FitProbe, term: Term) -> Array:
