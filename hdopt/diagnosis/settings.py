@@ -251,6 +251,14 @@ class AlternativeSettings:
     scale_turns: float = threshold(2.0, "input turns", "choice: a ratio or gain needs a slope over some turns")
     scale_odds: float = threshold(-1.0, "1", "choice: log prior odds of a ratio or gain that is off, about 1 in 3")
     skew_odds: float = threshold(-3.0, "1", "choice: log prior odds of two clocks that run apart, 1 in 20")
+    zero_odds: float = threshold(
+        -3.0, "1", "choice: log prior odds of a zero set anew by less than told at once, 1 in 20"
+    )
+    contact_waves: int = threshold(
+        4, "1/input turn", "choice: two ends of the wave generator, their double and between"
+    )
+    contact_odds: float = threshold(-1.0, "1", "choice: log prior odds of a k_e that varies, about 1 in 3")
+    contact_most: float = threshold(0.5, "1", "choice: share of k_e beyond which no contact varies")
 
 
 @dataclass(frozen=True)
@@ -491,6 +499,9 @@ class VerdictSettings:
         1.4, "1", "choice: a base error over its prior from which the study's tolerances are left"
     )
     smallest_share: float = threshold(0.02, "1", "choice: share of the held-out power that is worth a name")
+    unconfirmed_share: float = threshold(
+        0.05, "1", "measured: clean drives of run-002 reach 0.014, what pulses of random height showed was 0.148"
+    )
     most_is_carried: float = threshold(
         1.0, "1", "choice: held-out power that effects predict over what is left, from which they are named beside more"
     )

@@ -6,9 +6,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from hdopt.diagnosis.checks.confounding import Confounding
+from hdopt.diagnosis.inference.catalogue import properties_of
+from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.verdict.facts import Facts, Findings, sparse, unseen_rms
-from hdopt.diagnosis.verdict.named_effect import NamedEffect
+from hdopt.diagnosis.verdict.named_effect import NamedEffect, main_orders
 from hdopt.diagnosis.verdict.residual_structure import in_what_way, locate_remainder, locate_repeated
 from hdopt.diagnosis.verdict.rivals import Sets, separating_measurement, tied_pairs
 from hdopt.diagnosis.verdict.where import Where
@@ -92,6 +96,13 @@ def too_much_for_noise(facts: Facts) -> bool:
     `facts` are those of the recording.
     """
     return facts.turns_suffice and facts.noise_over_neighbours > facts.settings.noise_over_neighbours
+
+
+def not_confirmed(facts: Facts) -> bool:
+    """More than chance explains, and by more than clean drives show, but turns that no stage saw do not bear out what:
+    neither a name nor nothing. `facts` are those of the recording.
+    """
+    return facts.found and not facts.said and facts.own_gain > facts.settings.unconfirmed_share
 
 
 def others_are_as_good(facts: Facts) -> bool:
@@ -181,6 +192,32 @@ def unstable(findings: Findings) -> Conclusion:
     return Conclusion("unknown", says, effects, separating_test=test, where=where)
 
 
+def unconfirmed(findings: Findings) -> Conclusion:
+    """Something is there, and what looked most like it did not bear out. `findings` hold the facts and the evidence
+    behind them.
+    """
+    evidence = findings.evidence
+    gain = evidence.base_held_out.variance - evidence.extended_held_out.variance
+    best = evidence.selection.best
+    largest = max(range(len(best.fit.terms)), key=lambda i: float(np.var(best.fit.contribution(i))))
+    contribution = best.fit.contribution(largest)
+    where: Where = {
+        "domain": properties_of(best.effects[largest]).domain,
+        "orders_per_input_turn": main_orders(best.fit, contribution),
+        "direction": "both",
+        "share_of_residual": float(min(gain / max(evidence.base_held_out.variance, TINY), 1.0)),
+        "rms_arcmin": math.sqrt(max(gain, 0.0)),
+    }
+    like = " and ".join(name for name in best.effects if name in EFFECTS) or "none of the catalogue's effects"
+    return Conclusion(
+        "unknown",
+        f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that most resembles {like}; but turns that no "
+        "stage saw do not bear that out: what it is, is not known.",
+        separating_test="record more turns of the same motion: what is there stays, whichever of them are left out",
+        where=where,
+    )
+
+
 def ambiguous(findings: Findings) -> Conclusion:
     """The best explanation, those that are as good, and the measurement that would part them. `findings` hold the
     facts and the evidence behind them.
@@ -260,6 +297,7 @@ RULES = (
     Rule("too much for noise", too_much_for_noise, no_noise),
     Rule("more than noise is left", more_than_noise_is_left, named_and_more),
     Rule("not found again", not_found_again, unstable),
+    Rule("not confirmed", not_confirmed, unconfirmed),
     Rule("others are as good", others_are_as_good, ambiguous),
     Rule("named", lambda facts: facts.said, named),
     Rule("too little", lambda facts: facts.too_little, insufficient),
