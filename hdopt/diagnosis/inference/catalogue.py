@@ -24,9 +24,13 @@ SCALE = "_scale"
 """The instruments' own explanation: a ratio or an encoder's gain that is off."""
 SKEW = "_skew"
 """The instruments' own too: two clocks that run apart."""
-INSTRUMENTS = frozenset({SCALE, SKEW})
-"""Ids of what the instruments may do without any physics of the drive: told, never named."""
-OUTSIDE = frozenset(explanations()) - frozenset(EFFECTS) - INSTRUMENTS
+NEW_ZERO = "_zero"
+"""The instruments' too: recordings that begin with a zero of their own."""
+VARYING_CONTACT = "_varying_contact"
+"""The drive's own as it was built: a k_e that varies round the input's turn."""
+TOLD = frozenset({SCALE, SKEW, NEW_ZERO, VARYING_CONTACT})
+"""Ids of what instruments do, and a drive as built, without a finding: told, never named."""
+OUTSIDE = frozenset(explanations()) - frozenset(EFFECTS) - TOLD
 """Ids of the descriptions without physics."""
 
 

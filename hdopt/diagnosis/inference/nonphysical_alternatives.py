@@ -18,9 +18,10 @@ from hdopt.diagnosis.settings import DEFAULT, AlternativeSettings
 from hdopt.drive.geometry import ARCMIN
 from hdopt.effects.base import Explanation, terms_at
 from hdopt.effects.conditions import Conditions
+from hdopt.effects.estimate import FitEstimate
 from hdopt.effects.probe import Probe, best_terms, strongest_orders
 from hdopt.effects.sines import sine_columns
-from hdopt.effects.term import Term
+from hdopt.effects.term import Shape, Term
 from hdopt.recordings.read import TURN
 
 
@@ -173,8 +174,9 @@ class Jump(Event):
     def term(self, samples: Conditions, shape: Mapping[str, float], base_value: Array | None = None) -> Term:
         rows = np.array(list(shape.values()))
         trials = float(len(samples)) ** len(rows)
-        # A jump at a reversal could be the misfit of any loop; elsewhere nothing of the catalogue jumps.
-        reversals = np.flatnonzero(np.diff(samples.direction) != 0) + 1
+        # A jump at a reversal could be the misfit of any loop, at a recording's start a new zero; elsewhere nothing of
+        # the catalogue jumps.
+        reversals = np.flatnonzero((np.diff(samples.direction) != 0) | (np.diff(samples.record) != 0)) + 1
         near = np.abs(rows[:, None] - reversals[None, :]) < self.settings.at_a_reversal * samples.rows_per_turn
         columns = step_columns(len(samples), rows)
         return Term(
@@ -333,6 +335,69 @@ class Skew(Alternative):
         return Term(self.id, {}, columns=columns, odds=self.settings.skew_odds)
 
 
+class NewZero(Alternative):
+    """Recordings of which one or more were begun with a zero of their own, a little off the first's: larger ones are
+    seen before anything is fitted, and are always free.
+    """
+
+    id = "_zero"
+    domain = "time"
+    exact_shape = True
+    aside = True
+
+    def lacks(self, samples: Conditions) -> str | None:
+        return None if samples.records > 1 else "two recordings"
+
+    def search(self, probe: Probe) -> list[Term]:
+        return [self.term(probe.samples, {})]
+
+    def term(self, samples: Conditions, shape: Mapping[str, float], motion: Array | None = None) -> Term:
+        """The columns are in arcmin, one for each recording but the first. What differs from recording to recording by
+        direction, speed or load is an effect's first.
+        """
+        columns = (samples.record[:, None] == np.arange(1, samples.records)).astype(float)
+        return Term(self.id, {}, columns=columns, odds=self.settings.zero_odds, doubtful=True)
+
+
+class VaryingContact(Alternative):
+    """A k_e that varies round the input's turn, as the number of teeth in mesh does where the wave generator's two ends
+    differ: the drive's own error, larger and smaller with the input angle. Drives as built are so, and it is told.
+    """
+
+    id = "_varying_contact"
+    domain = "angle"
+    needs_base = True
+    exact_shape = True
+    aside = True
+    has_parts = True
+    driven = True
+
+    def lacks(self, samples: Conditions) -> str | None:
+        least = self.settings.least_turns
+        return None if not samples.locked and samples.span_turns >= least else f"at least {least:g} input turns"
+
+    def search(self, probe: Probe) -> list[Term]:
+        shapes = [{"waves": float(waves)} for waves in range(1, self.settings.contact_waves + 1)]
+        return best_terms(probe, [self.term(probe.samples, shape, probe.motion) for shape in shapes])
+
+    def term(self, samples: Conditions, shape: Mapping[str, float], motion: Array | None = None) -> Term:
+        """The columns are in arcmin for a share of one: sine and cosine of each of 1 to `waves` waves a turn."""
+        if motion is None:
+            raise ValueError(f"{self.id} follows the drive's motion, which was not given")
+        columns = motion[:, None] * self._waves(samples, shape)
+        return Term(self.id, dict(shape), columns=columns, odds=self.settings.contact_odds)
+
+    def every_part_shows(self, term: Term, estimate: FitEstimate) -> bool:
+        """Whether it is no more than a contact varies."""
+        return bool(np.abs(estimate.values[: term.width]).max() < self.settings.contact_most)
+
+    def response(self, conditions: Conditions, shape: Shape, coefficients: Array, motions: Array) -> Array:
+        return motions * (self._waves(conditions, shape) @ coefficients)[:, None]
+
+    def _waves(self, samples: Conditions, shape: Shape) -> Array:
+        return sine_columns(samples.theta, [float(k) for k in range(1, int(shape["waves"]) + 1)])
+
+
 ALTERNATIVES: tuple[type[Alternative], ...] = (
     AnyOrder,
     AnyFrequency,
@@ -343,6 +408,8 @@ ALTERNATIVES: tuple[type[Alternative], ...] = (
     EvenSpeed,
     Scale,
     Skew,
+    NewZero,
+    VaryingContact,
 )
 
 

@@ -58,13 +58,15 @@ def penalty_scale(
 
 
 def search_terms(probe: FitProbe, skip: Sequence[str] = (), only: Sequence[str] | None = None) -> list[Term]:
-    """Every effect's best terms for the residual of `probe`: of all but those of `skip`, or of `only` these."""
+    """Every effect's best terms for the residual of `probe`: of all but those to `skip` and those that are asked for
+    aside, or of `only` these.
+    """
     base = probe.fit.problem.base
     effects = [
         effect
         for effect in probe.fit.problem.explanations.values()
         if effect.id not in skip
-        and (only is None or effect.id in only)
+        and (not effect.aside if only is None else effect.id in only)
         and not (effect.needs_base and base is None)
         and effect.lacks(probe.samples) is None
     ]

@@ -17,7 +17,7 @@ import numpy as np
 from hdopt.diagnosis.inference.catalogue import is_outside
 from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
 from hdopt.diagnosis.search.acceptance import is_acceptable
-from hdopt.diagnosis.search.candidates import Candidate, joint_fit, without_each
+from hdopt.diagnosis.search.candidates import Candidate, joint_fit, search_terms, without_each
 from hdopt.diagnosis.search.explore import explore
 from hdopt.diagnosis.search.penalty import flexibility
 from hdopt.diagnosis.search.refinement import (
@@ -184,6 +184,23 @@ def refit_close_rivals(state: SearchState) -> SearchState:
     return state.taking(each(fitted, zip(sets, state.rng.spawn(len(sets)), strict=True)))
 
 
+def beside_what_is_told(state: SearchState) -> SearchState:
+    """What a drive as built and its bench may do without a finding, in place of the leader and beside it; where that
+    leads, the search goes on about it. `state` is where the work stands.
+    """
+    before = state.leader
+    for effect in state.base.problem.explanations.values():
+        if not effect.aside or effect.id in state.plan.skip or (before is not None and effect.id in before.effects):
+            continue
+        for start in (state.base, *([before.fit] if before is not None else [])):
+            found = search_terms(state.probe(start), only=[effect.id])
+            state = state.taking([joint_fit(start, [*start.terms, term]) for term in found])
+    after = state.leader
+    if after is None or (before is not None and after.fit is before.fit):
+        return state
+    return search_about_leader(state)
+
+
 def leave_out_hidden_parts(state: SearchState) -> SearchState:
     """Parts of terms that do not show are left out: without them a set may be acceptable, with them not. `state` is
     where the work stands.
@@ -243,6 +260,7 @@ STAGES: tuple[Callable[[SearchState], SearchState], ...] = (
     look_beside_flexible_leader,
     search_about_leader,
     refit_close_rivals,
+    beside_what_is_told,
     leave_out_hidden_parts,
     shorten_wide_terms,
     leave_out_each_term,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.localization import locate
 from hdopt.diagnosis.inference.base_fit import base_estimate, beat_warning
-from hdopt.diagnosis.inference.catalogue import SKEW, is_effect
+from hdopt.diagnosis.inference.catalogue import NEW_ZERO, SKEW, VARYING_CONTACT, is_effect
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.nuisance import estimated, notes
 from hdopt.diagnosis.inference.residual_gains import FitProbe
@@ -54,6 +55,8 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
             *orientation_notes(evidence.orientation),
             *scale_notes(evidence),
             *skew_notes(evidence),
+            *zero_notes(evidence),
+            *contact_notes(evidence),
             *base_notes(model),
             *prior_notes(conclusion.effects),
             *beat_notes(evidence),
@@ -126,6 +129,28 @@ def skew_notes(evidence: Evidence) -> tuple[str, ...]:
         f"the output's clock runs {rate * MICRO:.3g} millionths {'slow' if rate > 0 else 'fast'} against the input's: "
         "the delay between them grows steadily; sample both by one clock"
         for rate in rates
+    )
+
+
+def zero_notes(evidence: Evidence) -> tuple[str, ...]:
+    """What the `evidence` says of recordings that begin with a zero of their own."""
+    fit = evidence.selection.best.fit
+    offs = [c for term, c in zip(fit.terms, fit.coefficients, strict=True) if term.effect == NEW_ZERO]
+    return tuple(
+        "the output's zero lies off the first recording's, as where it was set anew or the clamping gave way: "
+        + ", ".join(f"{off:.3g} arcmin in recording {i}" for i, off in enumerate(one, 2))
+        for one in offs
+    )
+
+
+def contact_notes(evidence: Evidence) -> tuple[str, ...]:
+    """What the `evidence` says of a k_e that varies round the input's turn."""
+    fit = evidence.selection.best.fit
+    shares = [c for term, c in zip(fit.terms, fit.coefficients, strict=True) if term.effect == VARYING_CONTACT]
+    return tuple(
+        "the drive's own error grows and shrinks with the input angle, as where k_e varies round its turn: "
+        + ", ".join(f"{100 * math.hypot(*wave):.2g} % at {k} a turn" for k, wave in enumerate(share.reshape(-1, 2), 1))
+        for share in shares
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding
-from hdopt.diagnosis.inference.catalogue import INSTRUMENTS
+from hdopt.diagnosis.inference.catalogue import TOLD
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.settings import VerdictSettings
@@ -152,7 +152,7 @@ def find(evidence: Evidence) -> Findings:
     facts = Facts(
         settings=settings,
         turns_suffice=suffice,
-        explained=any(name not in INSTRUMENTS for name in best.effects),
+        explained=any(name not in TOLD for name in best.effects),
         false_alarm_p=evidence.false_alarm_p,
         own_gain=own_gain(evidence),
         high=high is not None,
@@ -203,7 +203,7 @@ def found_again(evidence: Evidence, effects: Sequence[NamedEffect]) -> bool:
 def effect_powers(candidate: Candidate) -> list[float]:
     """Power (arcmin^2) of each term of `candidate` but a scale or clock that is off."""
     powers = term_powers(candidate.fit)
-    return [power for power, name in zip(powers, candidate.effects, strict=True) if name not in INSTRUMENTS]
+    return [power for power, name in zip(powers, candidate.effects, strict=True) if name not in TOLD]
 
 
 def above_resolution(evidence: Evidence) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding, confounded_with
-from hdopt.diagnosis.inference.catalogue import INSTRUMENTS, is_effect
+from hdopt.diagnosis.inference.catalogue import TOLD, is_effect
 from hdopt.diagnosis.inference.cross_validation import paired_t
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.high_order import ripple_orders
@@ -48,7 +48,7 @@ def scale_is_as_good(evidence: Evidence) -> bool:
     `evidence`.
     """
     best = evidence.selection.best
-    alone = (one for one in evidence.selection.candidates if one.effects and INSTRUMENTS.issuperset(one.effects))
+    alone = (one for one in evidence.selection.candidates if one.effects and TOLD.issuperset(one.effects))
     tie = evidence.settings.verdict.tie
     return any(best.log_bayes_factor - one.log_bayes_factor <= tie for one in alone)
 
