@@ -10,6 +10,9 @@ from dataclasses import dataclass, field
 from functools import cache
 from types import CodeType, FrameType
 
+FIRST = 2
+"""The first convex model that is timed: the one before it may compile."""
+
 
 @cache
 def _stages() -> dict[CodeType, str]:
@@ -29,12 +32,14 @@ def _stages() -> dict[CodeType, str]:
     return {work.__code__: words for work, words in says.items()}
 
 
-def models_left(change: float) -> float:
-    """How many more convex models of an allocation there will be about, where the last one changed a tolerance by
-    `change`, a logarithm: each reach shrinks by the same factor from one model to the next."""
-    from hdopt.allocation.rules import ARRIVED, SHRINK
+def models_left(step: int, change: float) -> tuple[float, float]:
+    """How many more convex models of an allocation there will be, from and to, where the one of number `step` changed a
+    tolerance by `change`, a logarithm: each reach shrinks at best by the same factor from one model to the next, and
+    there is a last one."""
+    from hdopt.allocation.rules import ARRIVED, MAX_STEPS, SHRINK
 
-    return max(math.log(max(change, ARRIVED) / ARRIVED) / math.log(1 / SHRINK), 1.0)
+    most = max(MAX_STEPS - step + 1.0, 1.0)
+    return min(max(math.log(max(change, ARRIVED) / ARRIVED) / math.log(1 / SHRINK), 1.0), most), most
 
 
 @dataclass
@@ -45,8 +50,9 @@ class AllocationWatch:
     begun: float = field(default_factory=time.monotonic)
     names: Sequence[str] = ()
     done: int = 0
-    models: tuple[int, float] = (0, 0.0)
-    """Whose convex models are under way (the `id` of a frame), and since when."""
+    models: tuple[int, int, float] = (0, 0, 0.0)
+    """Whose convex models are under way (the `id` of a frame), the first that was seen at work, and when: not the very
+    first, which compiles."""
 
     def rules(self, names: Sequence[str]) -> Iterable[str]:
         """The `progress` of `hdopt.allocate`."""
@@ -56,7 +62,7 @@ class AllocationWatch:
             self.done += 1
 
     def words(self) -> str:
-        """'rss rule (1 of 4): model 5, about 6 s more; about 40 s more for all rules'."""
+        """'rss rule (2 of 4): model 5, 6 to 40 s more; about 40 s more for all rules'."""
         stage, models = self._looked()
         if not stage:
             return ""
@@ -69,17 +75,19 @@ class AllocationWatch:
         return f"{stage}{of}{self._model(models, now)}{others}"
 
     def _model(self, frame: FrameType | None, now: float) -> str:
-        """', model 5, about 6 s more' of the work of `frame`, which renews its convex model until it stays."""
+        """': model 5, 6 to 40 s more' of the work of `frame`, which renews its convex model until it stays."""
         if frame is None:
             return ""
-        if self.models[0] != id(frame):
-            self.models = id(frame), now
         held = frame.f_locals
-        step, change = held.get("step", 0), held.get("change")
-        if step < 2 or change is None:
-            return f": model {max(step, 1)}"
-        each = (now - self.models[1]) / (step - 1)
-        return f": model {step}, about {each * models_left(change):.0f} s more"
+        step, change = max(held.get("step", 0), 1), held.get("change")
+        if self.models[0] != id(frame) or self.models[1] < FIRST:
+            self.models = id(frame), step, now
+        begun, since = self.models[1:]
+        if step <= begun or change is None:
+            return f": model {step}"
+        each = (now - since) / (step - begun)
+        low, high = models_left(step, change)
+        return f": model {step}, {each * low:.0f} to {each * high:.0f} s more"
 
     def _looked(self) -> tuple[str, FrameType | None]:
         """The outermost part of the work under way, and the frame of its convex models if there is one."""

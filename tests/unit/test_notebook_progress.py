@@ -45,17 +45,17 @@ def test_an_allocation_in_a_notebook_says_rule_model_and_time(cell, monkeypatch,
         """The work is left here: what follows costs, and says no more."""
 
     def successive(problem, constraint, measured):
-        step, change = 3, 0.1
-        _until(cell, f"model {step}, about")
+        step, change = 2, 0.1
+        _until(cell, f": model {step}, ")
+        step = 3
+        _until(cell, f": model {step}, ")
         raise Enough(change)
 
     monkeypatch.setattr(rules, "_successive", successive)
     with pytest.raises(Enough):
         hdopt.allocate("csf-25-80-tolerances", "rss", compare=compare, curve=())
     rule = r"rss rule \(1 of 4\)" if compare else "rss rule"
-    assert any(
-        re.fullmatch(rf"hdopt\.allocate: {rule}: model 3, about \d+ s more, \d+ s so far", text) for text in cell
-    )
+    assert any(re.fullmatch(rf"hdopt\.allocate: {rule}: model 3, 0 to \d+ s more, \d+ s so far", text) for text in cell)
     assert cell[-1] == ""
 
 
@@ -78,9 +78,29 @@ def test_a_run_in_a_notebook_counts_its_steps(cell, monkeypatch):
 
 
 def test_what_is_left_of_an_allocation_follows_from_how_its_reaches_shrink():
-    """Each reach is 0.6 of the one before, until 0.005 is left: from 0.5 that is ln 100 / ln (1 / 0.6) = 9 models."""
-    assert models_left(0.5) == pytest.approx(9.015, abs=0.001)
-    assert models_left(0.005) == models_left(1e-9) == 1.0
+    """Each reach is at best 0.6 of the one before, until 0.005 is left: from 0.5 that is ln 100 / ln (1 / 0.6) = 9
+    models; there are 60 at most."""
+    assert models_left(11, 0.5) == (pytest.approx(9.015, abs=0.001), 50.0)
+    assert models_left(11, 0.005) == models_left(11, 1e-9) == (1.0, 50.0)
+    assert models_left(58, 0.5) == (3.0, 3.0)
+
+
+def test_models_are_timed_from_the_second_on(monkeypatch):
+    """Thirty seconds for the first model, which compiles, and one for each of the others: after the fifth, whose last
+    change was 0.5, 9 to 56 s are left. Would catch a first model's time that is taken for every one's."""
+    clock = [0.0]
+    monkeypatch.setattr(allocation_stages.time, "monotonic", lambda: clock[0])
+    watch, said = AllocationWatch(threading.get_ident(), begun=0.0), []
+
+    def successive():
+        for step in range(1, 6):
+            said.append(watch._model(sys._getframe(), clock[0]))
+            clock[0] += 30.0 if step == 1 else 1.0
+            change = 0.5
+        return change
+
+    successive()
+    assert said == [": model 1", ": model 2", *(f": model {n}, 9 to {61 - n} s more" for n in (3, 4, 5))]
 
 
 def test_a_watch_says_what_the_other_rules_take(monkeypatch):
