@@ -81,9 +81,10 @@ def _line_of_a_cell() -> Callable[[], Line] | None:
         return None
 
     def begin() -> Line:
-        from IPython.display import HTML, display
+        import IPython.display
 
-        handle = display(HTML(""), display_id=True)
-        return lambda text: handle.update(HTML(f"<small>{html.escape(text)}</small>" if text else ""))
+        shown: Any = IPython.display  # types there depend on whether it is installed
+        handle = shown.display(shown.HTML(""), display_id=True)
+        return lambda text: handle.update(shown.HTML(f"<small>{html.escape(text)}</small>" if text else ""))
 
     return begin
