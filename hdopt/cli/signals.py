@@ -2,7 +2,8 @@
 
 Compiled libraries that call back, destructors and hooks of imports drop what is raised inside of them, some with a
 traceback on the terminal. A thread therefore sends the signal again for as long as the command goes on, and what is on
-its way already is not raised twice. No exception reaches compiled code that does not come back: after `GRACE_S` the
+its way already is not raised twice. Into a compiled module that is being imported nothing is raised: some crash. No
+exception reaches compiled code that does not come back: after `GRACE_S` the
 thread ends the process itself.
 """
 
@@ -15,11 +16,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.machinery import ExtensionFileLoader
 from types import FrameType
 from typing import Any  # Any: what Python gives to its hooks
 
 from hdopt.interruption import Interruption
 
+LOADING = (ExtensionFileLoader.create_module.__code__, ExtensionFileLoader.exec_module.__code__)
+"""What imports a compiled module."""
 AGAIN_S = 1.0
 """From one signal to the next: a command that cleans up in order is through by then, mostly."""
 GRACE_S = 15.0
@@ -67,32 +71,45 @@ class _Watch:
         self.noted, self.end, self.ended = noted, end, False
         self.main = _thread.get_ident()
         self.sending = _thread.allocate_lock()
+        self.later = False
 
     def caught(self, number: int, frame: FrameType | None) -> None:
         """Python's handler of both signals."""
         if _on_its_way(self.noted.came):
             return  # the second Ctrl-C of somebody in a hurry, or a signal sent again for nothing
-        first = not self.noted.came
-        self.noted.came.append(RAISED[number]())
+        first = not (self.noted.came or self.later)
+        self.later = _is_loading(frame)
+        if not self.later:
+            self.noted.came.append(RAISED[number]())
         if first:
             # Not `threading`, one of whose locks the interrupted code may hold.
             _thread.start_new_thread(self.send_again, (number,))
-        raise self.noted.came[-1]
+        if not self.later:
+            raise self.noted.came[-1]
 
     def send_again(self, number: int) -> None:
         """The signal, time and again, until the command has ended or has answered it."""
         last = time.monotonic() + GRACE_S
-        while self.noted.came and not self.ended:
-            time.sleep(AGAIN_S)
-            if self.noted.answers:
+        while (self.noted.came or self.later) and not self.ended:
+            time.sleep(AGAIN_S / 20 if self.later else AGAIN_S)
+            if self.noted.answers and not self.later:
                 last = time.monotonic() + GRACE_S
                 continue
             with self.sending:
-                if not self.noted.came or self.ended:
+                if not (self.noted.came or self.later) or self.ended:
                     return
                 signal.pthread_kill(self.main, number)
             if self.end and time.monotonic() > last:
-                self.end(self.noted.came[-1])
+                self.end(RAISED[number]())
+
+
+def _is_loading(frame: FrameType | None) -> bool:
+    """Whether `frame` runs within the import of a compiled module."""
+    while frame is not None:
+        if frame.f_code in LOADING:
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _on_its_way(came: list[BaseException]) -> bool:

@@ -1,5 +1,6 @@
 """SIGINT and SIGTERM: wherever the exception gets lost, the command ends soon, and says one line."""
 
+import _imp
 import ctypes
 import os
 import signal
@@ -8,6 +9,8 @@ import threading
 import time
 import weakref
 from contextlib import suppress
+from importlib.machinery import ExtensionFileLoader, ModuleSpec
+from types import ModuleType
 
 import pytest
 
@@ -109,6 +112,34 @@ def test_wherever_an_interruption_gets_lost_the_command_ends_soon(command, lost,
     assert (code, said) == (status, f"hdopt: {'interrupted' if status == 130 else 'ended by SIGTERM'}\n")
     assert took < ENOUGH_S
     assert hooks == (sys.excepthook, sys.unraisablehook, threading.excepthook)
+
+
+@pytest.mark.parametrize("step", ["create_dynamic", "exec_dynamic"])
+def test_nothing_is_raised_into_a_compiled_module_that_is_imported(command, monkeypatch, step):
+    """Would catch the crash of a library whose start does not expect an exception: an export that loads its solids'
+    library. What comes meanwhile ends the command once the module is there."""
+    loaded = []
+
+    def load(module, *_):
+        arrive(signal.SIGINT)
+        loaded.append(module)
+        return module
+
+    def work():
+        loader = ExtensionFileLoader("compiled", "compiled.so")
+        with monkeypatch.context() as patch:
+            patch.setattr(_imp, step, load)
+            if step == "create_dynamic":
+                loader.create_module(ModuleSpec("compiled", loader))
+            else:
+                loader.exec_module(ModuleType("compiled"))
+        until = time.monotonic() + 2 * ENOUGH_S
+        while time.monotonic() < until:
+            time.sleep(0.01)
+
+    code, took, _ = command(work)
+    assert (code, len(loaded)) == (130, 1)
+    assert took < ENOUGH_S
 
 
 def test_clean_up_is_not_interrupted_again(command):
