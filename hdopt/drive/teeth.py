@@ -36,12 +36,12 @@ class MeasuredTeeth:
 
     @classmethod
     def of(
-        cls, values: Array, kind: str = "cumulative", first_angle: float = 0.0, recentre: bool = False, source: str = ""
+        cls, values: Array, kind: str = "cumulative", first_angle: float = 0.0, recentre: bool = True, source: str = ""
     ) -> MeasuredTeeth:
         """From the deviations `values` (mm, (n,)) of teeth 1 to n, of the `kind` "cumulative" or "single".
 
-        The sum of single deviations is spread over all teeth: a circle closes. `recentre` takes the first harmonic out;
-        `first_angle` (rad) and `source` as in the class.
+        The sum of single deviations is spread over all teeth: a circle closes. `recentre` takes the first harmonic out,
+        which no table tells from a part held off-centre; `first_angle` (rad) and `source` as in the class.
         """
         require(kind in KINDS, f"the deviations are said to be {kind!r}; they must be one of {', '.join(KINDS)}")
         values = np.asarray(values, float)

@@ -164,8 +164,8 @@ class TeethSection(Section):
     """Which flank carries, where the file has both."""
     first_tooth_deg: float = 0.0
     """Where tooth 1 lies, clockwise from the major axis at input angle 0."""
-    recentre: bool = False
-    """Take the first harmonic out: the part was measured off-centre."""
+    recentre: bool = True
+    """Take the first harmonic out, which a part held off-centre shows; false keeps it, where centring is trusted."""
     sine: Literal["instead", "beside"] = "instead"
     """Whether the table stands instead of the spline's tooth amplitude in [errors] and [tolerances], or beside it."""
 

@@ -28,6 +28,7 @@ from hdopt.simulation.extremes import peak_to_peak_arcmin as extended_peak_to_pe
 from hdopt.study import AnyStudy, Study, as_study, study_of_drive
 from hdopt.workflow.effect_selection import inclusion
 from hdopt.workflow.effect_table import effect_table, remarks, walked_extended_arcmin
+from hdopt.workflow.measured_parts import words_on_measured_parts
 from hdopt.workflow.placed import numbers_named
 from hdopt.workflow.waveform import WaveformResult, converged_extremes_arcmin, held_arcmin, model_of, waveform_of
 
@@ -244,7 +245,7 @@ def kinematic_error(
         homogenization_coefficient=k_e,
         orders=_order_rows(shown, spectrum),
         lag_arcmin=None if lost is None else lost.to_dict(),
-        notes=(*notes.notes, *said, *_words_on_teeth(drive)),
+        notes=(*notes.notes, *said, *words_on_measured_parts(drive)),
         base_peak_to_peak_arcmin=base,
         effects=effects,
         measured_teeth=_measured(drive),
@@ -310,25 +311,6 @@ def _roundness(drive: Drive) -> dict[str, object] | None:
         "eccentricity_um": 1000 * ring.eccentricity,
         "recentred": ring.recentred,
     }
-
-
-def _words_on_teeth(drive: Drive) -> list[str]:
-    """That a table was re-centred, or shows what a part measured off-centre shows."""
-    found = []
-    for name, teeth in (("cs_teeth", drive.cs_teeth), ("fs_teeth", drive.fs_teeth)):
-        if teeth is None:
-            continue
-        as_offset = 1000 * teeth.eccentricity / math.tan(drive.geometry.pressure_angle)
-        size = f"{name}: a first harmonic of {1000 * teeth.eccentricity:.2f} um, as of {as_offset:.1f} um eccentricity,"
-        done = "was taken out" if teeth.recentred else "is kept; recentre = true takes it out, for a part off-centre"
-        found.append(f"{size} {done}")
-    ring = drive.cs_roundness
-    if ring is not None:
-        size = f"cs_roundness: {1000 * ring.peak_to_valley:.2f} um from peak to valley up to {ring.cutoff} UPR;"
-        centre = f"an eccentricity of {1000 * ring.eccentricity:.2f} um"
-        done = "was taken out" if ring.recentred else "is kept and adds to axis_eccentricity_mm"
-        found.append(f"{size} {centre} {done}")
-    return found
 
 
 def _effects(study: Study, method: str, whole: float, base: float) -> tuple[tuple[dict[str, Any], ...], list[str]]:

@@ -15,6 +15,7 @@ from hdopt.optimize.search import search_designs
 from hdopt.study import AnyStudy, Study, as_study
 from hdopt.study.search import SearchSection
 from hdopt.study.tolerances import TolerancesBase
+from hdopt.workflow.measured_parts import words_on_measured_parts
 from hdopt.workflow.output_files import Files, checked_files, write_table_files
 from hdopt.workflow.placed import numbers_named
 from hdopt.workflow.search_setup import setup_of
@@ -90,8 +91,8 @@ def words_on_model(result: SearchResult) -> tuple[str, ...]:
 
 
 def _notes(study: Study) -> tuple[str, ...]:
-    """What is to be said of the study's teeth that are drawn, and of its effects."""
-    notes = _on_drawn_teeth(study)
+    """What is to be said of the study's teeth that are drawn or measured, and of its effects."""
+    notes = (*_on_drawn_teeth(study), *words_on_measured_parts(study.drive))
     if not study.effects:
         return notes
     from hdopt.workflow.effect_selection import inclusion

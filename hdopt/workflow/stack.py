@@ -29,6 +29,7 @@ from hdopt.tolerance.screening import Screening, run_screening
 from hdopt.tolerance.space import InputSpace
 from hdopt.tolerance.stack import StackRequest, run_stack
 from hdopt.tolerance.worst_case import WorstCase
+from hdopt.workflow.measured_parts import words_on_measured_parts
 from hdopt.workflow.placed import numbers_named
 
 STACK_N = 2**18
@@ -116,6 +117,7 @@ def study_problem(study: AnyProblem) -> ToleranceProblem:
         notes.append(f"callouts take the place of the tolerances of {', '.join(problem.replaced)}")
     notes += _freed(problem.freed)
     notes += words_on_graded_teeth(problem)
+    notes += words_on_measured_parts(study.drive)
     response, said = with_effects(study, problem.response)
     return ToleranceProblem(
         study.name,

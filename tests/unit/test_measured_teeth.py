@@ -23,7 +23,7 @@ Z_CS, Z_FS = 162, 160
 
 def sine(teeth: int, amplitude: float, phase: float, waves: int = 1) -> MeasuredTeeth:
     angles = 2 * np.pi * np.arange(teeth) / teeth
-    return MeasuredTeeth.of(amplitude * np.sin(waves * angles + phase))
+    return MeasuredTeeth.of(amplitude * np.sin(waves * angles + phase), recentre=False)
 
 
 def shared(waves: int = 1, teeth: int = Z_CS) -> float:
@@ -113,16 +113,18 @@ def test_search_over_all_phases_finds_what_a_walk_of_the_beat_finds():
 def test_recentring_takes_out_what_a_part_measured_off_centre_shows():
     true = np.random.default_rng(1).normal(0, 0.002, Z_CS)
     angles = 2 * np.pi * np.arange(Z_CS) / Z_CS
-    off_centre = MeasuredTeeth.of(true + 0.01 * np.sin(angles + 0.4), recentre=True)
-    centred = MeasuredTeeth.of(true, recentre=True)
+    off_centre, centred = MeasuredTeeth.of(true + 0.01 * np.sin(angles + 0.4)), MeasuredTeeth.of(true)
     assert off_centre.deviations == pytest.approx(centred.deviations, abs=1e-12)
     assert off_centre.eccentricity == pytest.approx(0.01, rel=0.05)
+    assert MeasuredTeeth.of(true, recentre=False).deviations == pytest.approx(true - true.mean(), abs=1e-15)
 
 
 def test_single_and_cumulative_deviations_are_the_same_teeth():
     cumulative = np.random.default_rng(2).normal(0, 0.002, Z_FS)
     single = cumulative - np.roll(cumulative, 1)
-    one, other = MeasuredTeeth.of(cumulative), MeasuredTeeth.of(single, "single")
+    one, other = (
+        MeasuredTeeth.of(v, kind, recentre=False) for v, kind in ((cumulative, "cumulative"), (single, "single"))
+    )
     assert one.deviations == pytest.approx(other.deviations, abs=1e-12)
     assert one.largest_single == pytest.approx(np.abs(single).max())
     off = MeasuredTeeth.of(single + 0.0005, "single")  # a gauge's own zero: a circle closes

@@ -37,7 +37,7 @@ def points_of(problem, n, seed=2):
 
 def measured(drive, deviations, i):
     """`drive` with the teeth of row `i` measured."""
-    teeth = {name: MeasuredTeeth.of(values[i], "cumulative") for name, values in deviations.items()}
+    teeth = {name: MeasuredTeeth.of(values[i], "cumulative", recentre=False) for name, values in deviations.items()}
     return replace(drive, **teeth)
 
 

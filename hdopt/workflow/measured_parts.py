@@ -1,0 +1,31 @@
+"""What is to be said of a drive's measured parts wherever they count."""
+
+from __future__ import annotations
+
+import math
+
+from hdopt.drive.geometry import Drive
+
+
+def words_on_measured_parts(drive: Drive) -> list[str]:
+    """That a table of `drive` was re-centred, and by how much, or that it was not: a sentence each, [] where no part
+    was measured."""
+    found = []
+    for name, teeth in (("cs_teeth", drive.cs_teeth), ("fs_teeth", drive.fs_teeth)):
+        if teeth is None:
+            continue
+        as_offset = 1000 * teeth.eccentricity / math.tan(drive.geometry.pressure_angle)
+        size = f"{name}: a first harmonic of {1000 * teeth.eccentricity:.2f} um, as of {as_offset:.1f} um eccentricity,"
+        done = (
+            f"was taken out, as of a part held off-centre; {name}.recentre = false keeps it"
+            if teeth.recentred
+            else f"is kept; {name}.recentre = true takes it out, for a part held off-centre"
+        )
+        found.append(f"{size} {done}")
+    ring = drive.cs_roundness
+    if ring is not None:
+        size = f"cs_roundness: {1000 * ring.peak_to_valley:.2f} um from peak to valley up to {ring.cutoff} UPR;"
+        centre = f"an eccentricity of {1000 * ring.eccentricity:.2f} um"
+        done = "was taken out" if ring.recentred else "is kept and adds to axis_eccentricity_mm"
+        found.append(f"{size} {centre} {done}")
+    return found
