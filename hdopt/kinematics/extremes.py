@@ -15,7 +15,7 @@ from hdopt.arrays import Array
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics.branches import Branches, deepest
-from hdopt.kinematics.load_sharing import mesh_tables
+from hdopt.kinematics.load_sharing import mesh_tables, misalignment_share
 from hdopt.kinematics.waveform import (
     BRANCHES,
     DEFAULT_METHOD,
@@ -92,6 +92,19 @@ def converged_peak_to_peak_arcmin(drive: Drive, errors: DriveErrors, geometry: s
     """Essential supremum less essential infimum of `drive` with scalar `errors`, arcmin, k_e = 1; `geometry` is "exact"
     or "closed form"."""
     low, high = extremes_arcmin(drive, errors, geometry)
+    return high - low
+
+
+def evened_out_arcmin(drive: Drive, errors: DriveErrors, k_e: float, geometry: str = DEFAULT_METHOD) -> float:
+    """The same of `drive` with scalar `errors`, by `geometry`, where the teeth in contact even it out, arcmin: by `k_e`
+    of all; but with measured teeth each term in its own way, misalignment, common to all teeth, by its mean, sines by
+    k_e, measured teeth by the mean in their table."""
+    if not drive.has_measured_teeth:
+        return k_e * converged_peak_to_peak_arcmin(drive, errors, geometry)
+    sines = errors.with_(
+        cs_tooth_amplitude=k_e * errors.cs_tooth_amplitude, fs_tooth_amplitude=k_e * errors.fs_tooth_amplitude
+    )
+    low, high = extremes_arcmin(drive, sines, geometry, misalignment_share(drive))
     return high - low
 
 

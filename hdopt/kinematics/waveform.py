@@ -70,14 +70,23 @@ def zone_deviation(drive: Drive, errors: DriveErrors, theta: ArrayLike, geometry
     return deviation_at(drive, errors, theta, geometry_for(drive, geometry)(drive, errors, theta))
 
 
-def deviation_at(drive: Drive, errors: DriveErrors, theta: ArrayLike, points: DeepestPoints) -> Array:
+def deviation_at(
+    drive: Drive,
+    errors: DriveErrors,
+    theta: ArrayLike,
+    points: DeepestPoints,
+    misalignment: float = 1.0,
+    sine_share: float = 1.0,
+) -> Array:
     """tau_1 and tau_2 of `drive` with `errors` at `theta` (rad) for deepest `points` that are known already, mm of arc,
-    shape (2, ...)."""
-    deviation: Array = (
-        points.depth * np.tan(drive.geometry.pressure_angle)
-        + circular_spline_term(errors, points, theta)
-        + flexspline_term(drive, errors, points, theta)
-    )
+    shape (2, ...).
+
+    Where the teeth in contact share a term, `misalignment` multiplies what misalignment makes and `sine_share` the
+    sines; measured teeth are shared in their table.
+    """
+    sines = circular_spline_term(errors, points, theta) + flexspline_term(drive, errors, points, theta)
+    tan_alpha = misalignment * np.tan(drive.geometry.pressure_angle)
+    deviation: Array = points.depth * tan_alpha + sine_share * sines
     return deviation + measured_term(drive, points, theta) if drive.has_measured_teeth else deviation
 
 

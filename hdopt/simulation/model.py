@@ -33,8 +33,9 @@ class ExtendedModel:
 
     Effects of the meshing zones add to the deviation of each zone before the larger one drives (Jia 2021, Eqs. (31),
     (32)), those of the splines where the zone's deepest point meets them, as the base's own teeth do; the others add to
-    the kinematic error itself. `homogenization` is k_e, which evens out the driving deviation only. `geometry` is that
-    of `hdopt.kinematics.waveform`. Raises `MissingValue` where an effect needs a number that `operation` does not have.
+    the kinematic error itself. `homogenization` is k_e, which evens out the driving deviation only; where teeth
+    are measured, each of its terms in its own way (`kinematics.load_sharing`). `geometry` is that of
+    `hdopt.kinematics.waveform`. Raises `MissingValue` where an effect needs a number that `operation` does not have.
     """
 
     drive: Drive
@@ -90,9 +91,21 @@ class ExtendedModel:
     def driven(self, theta: Array, points: DeepestPoints, direction: float = 1.0) -> Array:
         """What the driving zone makes of the base's deviation and the zones' effects, arcmin, shape (n,); `points` are
         the deepest ones at `theta`, rad."""
-        deviation = deviation_at(self.drive, self.errors, theta, points)
-        driving = np.max(deviation + self.in_zones(theta, points, direction), axis=0)
-        return np.asarray(self.homogenization * self.drive.geometry.arcmin_per_mm * driving)
+        misalignment, sines, zones, whole = self._shares
+        deviation = deviation_at(self.drive, self.errors, theta, points, misalignment, sines)
+        driving = np.max(deviation + zones * self.in_zones(theta, points, direction), axis=0)
+        return np.asarray(whole * self.drive.geometry.arcmin_per_mm * driving)
+
+    @cached_property
+    def _shares(self) -> tuple[float, float, float, float]:
+        """What the teeth in contact leave of misalignment, of sines, of the zones' effects, and of all together: k_e
+        of all; but where teeth are measured, whose mean stands in their table, misalignment by its own mean."""
+        k_e = self.homogenization
+        if k_e == 1 or not self.drive.has_measured_teeth:
+            return 1.0, 1.0, 1.0, k_e
+        from hdopt.kinematics.load_sharing import misalignment_share
+
+        return misalignment_share(self.drive), k_e, k_e, 1.0
 
     def in_zones(self, theta: Array, points: DeepestPoints, direction: float = 1.0) -> Array:
         """What effects add to the deviation of each meshing zone, mm of arc, shape (2, n); `points` are the

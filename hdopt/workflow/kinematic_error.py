@@ -16,8 +16,7 @@ from hdopt.drive.profiles import perimeter_error, tip_radius_of_curvature
 from hdopt.errors import HdoptError
 from hdopt.figures import drawn
 from hdopt.files import ShownAsTable
-from hdopt.kinematics.extremes import extremes_arcmin, walked_peak_to_peak_arcmin
-from hdopt.kinematics.load_sharing import misalignment_share
+from hdopt.kinematics.extremes import evened_out_arcmin, extremes_arcmin, walked_peak_to_peak_arcmin
 from hdopt.kinematics.waveform import DEFAULT_METHOD, geometry_for
 from hdopt.mechanics.bending import curvature_change, max_bending_stress, max_curvature_change
 from hdopt.mechanics.contact_model import contact_of, mean_flank_pressure
@@ -239,7 +238,7 @@ def kinematic_error(
         minimum_arcmin=low,
         maximum_arcmin=high,
         sampled_peak_to_peak_arcmin=_sampled(study, sampling_deg, turns, method),
-        nonuniform_arcmin=None if k_e is None else _nonuniform(study, method, k_e, high - low),
+        nonuniform_arcmin=None if k_e is None else _nonuniform(study, method, k_e),
         contact_angle_deg=None if contact is None else math.degrees(contact.angle),
         meshing_teeth=None if contact is None else contact.teeth,
         homogenization_coefficient=k_e,
@@ -262,24 +261,11 @@ def _check_method(drive: Drive, method: str) -> None:
         raise HdoptError(str(error)) from None
 
 
-def _nonuniform(study: Study, method: str, k_e: float, single: float) -> float:
-    """Peak-to-peak with the driving deviation evened out by `k_e`; `single` is that of a single tooth pair, arcmin."""
-    if study.drive.has_measured_teeth:
-        return _shared(study, method, k_e)
-    if not study.effects:
-        return k_e * single
-    return extended_peak_to_peak_arcmin(replace(model_of(study, method), homogenization=k_e))
-
-
-def _shared(study: Study, method: str, k_e: float) -> float:
-    """Peak-to-peak (arcmin) where the teeth in contact share each term in its own way: misalignment, common to all, by
-    its mean; sines of teeth that were not measured by k_e; measured teeth by the mean that is in their table."""
+def _nonuniform(study: Study, method: str, k_e: float) -> float:
+    """Peak-to-peak (arcmin) with the driving deviation evened out by `k_e`."""
     if study.effects:
-        raise HdoptError("measured teeth and effects are not evened out together; leave [effects] out for that figure")
-    drive, e = study.drive, study.errors
-    sines = e.with_(cs_tooth_amplitude=k_e * e.cs_tooth_amplitude, fs_tooth_amplitude=k_e * e.fs_tooth_amplitude)
-    low, high = extremes_arcmin(drive, sines, method, misalignment_share(drive))
-    return high - low
+        return extended_peak_to_peak_arcmin(replace(model_of(study, method), homogenization=k_e))
+    return evened_out_arcmin(study.drive, study.errors, k_e, method)
 
 
 def _measured(drive: Drive) -> dict[str, dict[str, Any]]:

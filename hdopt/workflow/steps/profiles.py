@@ -12,7 +12,7 @@ import pandas as pd
 from hdopt.drive.geometry import Drive
 from hdopt.drive.profiles import Ellipse, Resal, TwoDisk, WaveGeneratorProfile, perimeter_error
 from hdopt.errors import MissingValue
-from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin
+from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin, evened_out_arcmin
 from hdopt.mechanics.bending import curvature_change, max_bending_stress
 from hdopt.mechanics.contact_model import contact_of
 from hdopt.report.sections.profiles import profiles_section
@@ -64,12 +64,11 @@ def _merits(drive: Drive, study: Study) -> dict[str, float]:
     profile = drive.wave_generator.profile
     angle = _given(lambda: contact_of(drive).angle)
     k_e = _given(lambda: contact_of(drive).homogenization())
-    single = converged_peak_to_peak_arcmin(drive, study.errors)
     return {
         "contact_angle_deg": math.degrees(angle),
         "homogenization_coefficient": k_e,
-        "peak_to_peak_arcmin": single,
-        "evened_out_arcmin": k_e * single,
+        "peak_to_peak_arcmin": converged_peak_to_peak_arcmin(drive, study.errors),
+        "evened_out_arcmin": k_e if math.isnan(k_e) else evened_out_arcmin(drive, study.errors, k_e),
         "max_bending_stress_mpa": _given(lambda: max_bending_stress(drive)),
         "perimeter_error_um": 1000 * perimeter_error(profile, drive.geometry.flexspline_inner_radius),
     }
