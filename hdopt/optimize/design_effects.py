@@ -58,7 +58,11 @@ class DesignEffects:
 
     def peak_to_peak_arcmin(self, drive: Drive, row: Array, homogenization: float = 1.0) -> float:
         """Converged peak-to-peak of a design with errors `row` (12) and the effects, arcmin."""
-        return float(matrix_peak_to_peak_arcmin(drive, row[None, :], self.table(drive), homogenization)[0])
+        return float(self.peaks_to_peaks_arcmin(drive, row[None, :], homogenization)[0])
+
+    def peaks_to_peaks_arcmin(self, drive: Drive, rows: Array, homogenization: float = 1.0) -> Array:
+        """The same of drives with errors as `rows` (n, 12) and the same effects in each, (n,)."""
+        return matrix_peak_to_peak_arcmin(drive, rows, self.table(drive), homogenization)
 
     def spans_near(self, drive: Drive, row: Array, most: int) -> Callable[[Drive, Array], Array]:
         """A function of designs near `drive` and of their errors near `row` (12): every one of its highest maxima less

@@ -302,8 +302,8 @@ class PeakToPeakQuantile:
     """Quantile of the converged peak-to-peak under the tolerances, from a fixed sample (common random numbers).
 
     A weighted mean of the sample's upper order statistics, so that it moves smoothly; its slopes are the same mean of
-    the drives' own. Teeth that are known one by one, measured or drawn, have no slopes in closed form: those of the
-    drives that count are central differences.
+    the drives' own. With effects, or teeth that are known one by one, there are no slopes in closed form: those of
+    the drives that count are central differences.
     """
 
     title: str = "Peak-to-peak quantile"
@@ -315,6 +315,8 @@ class PeakToPeakQuantile:
         rows = trade.of(trade.drawn() if chosen is None else trade.drawn()[chosen], design)
         if trade.teeth is not None:
             return trade.teeth.peak_to_peak_arcmin(design.drive, rows, chosen)
+        if trade.added is not None:
+            return trade.added.peaks_to_peaks_arcmin(design.drive, rows)
         return matrix_peak_to_peak_arcmin(design.drive, rows)
 
     def value(self, trade: DesignConditions, design: Design) -> float:
@@ -331,7 +333,7 @@ class PeakToPeakQuantile:
         counts = weights > 2e-3 * weights.max()
         chosen, share = order[counts], weights[counts]
         value, rows = float(weights @ values[order]), trade.drawn()[chosen]
-        if point.design.drive.has_measured_teeth or trade.teeth is not None:
+        if point.design.drive.has_measured_teeth or trade.teeth is not None or trade.added is not None:
             each = point.slopes(lambda design: self._sample(trade, design, chosen)).T
             return np.array([value]), (share @ each / share.sum())[None, :]
         found, features = _envelope(point.design, trade.of(rows, point.design)), point.slopes(tip_features)

@@ -98,7 +98,8 @@ def tabulate(drive: Drive, effects: Sequence[EffectValues], operation: Operation
         )
     if drive.has_measured_teeth:
         raise HdoptError(
-            "effects and measured teeth go together in ke only; leave either out, as with operation.include=none"
+            "effects and measured teeth go together in ke and stack only; leave either out, as with "
+            "operation.include=none"
         )
     if not drive.wave_generator.profile.tip_is_smooth:
         raise HdoptError(

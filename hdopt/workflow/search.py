@@ -102,7 +102,14 @@ def _notes(study: Study) -> tuple[str, ...]:
         "the effects found on the study's drive are carried over to every design: a radial one follows the pressure "
         "angle, the others stay; the lag is without them"
     )
-    return (*notes, *chosen.says, carried) if chosen.counted else (*notes, *chosen.says)
+    if not chosen.counted:
+        return (*notes, *chosen.says)
+    if "tolerances" not in study.sections:
+        return (*notes, *chosen.says, carried)
+    same = "under the tolerances the effects are the same in every drive: they have no tolerance"
+    if drive_problem_of(study).response.teeth:
+        same = "no quantile over fresh drives verifies the choice: drawn teeth go without effects in a search"
+    return (*notes, *chosen.says, carried, same)
 
 
 def _on_drawn_teeth(study: Study) -> tuple[str, ...]:
