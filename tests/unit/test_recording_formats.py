@@ -415,6 +415,18 @@ def test_what_is_given_beside_a_bench_file_is_not_silently_stronger(truth, tmp_p
         ("[columns.input]\ncolumn = 'a'\ncounts_per_turn = -1", "give a finite number above 0"),
         ("[columns.input]\ncolumn = 'a'\ncalibration = [[10, 1], [5, 1]]", "its angles rising"),
         ("[columns.input", "cannot be read as TOML"),
+        ("ratio = 0", "ratio is 0; give a finite number above 0"),
+        ("ratio = -80.0", "ratio is -80.0; give a finite number above 0"),
+        ("ratio = true", "ratio is True; give a finite number above 0"),
+        ("[columns.input]\ncolumn = 'a'\nstep_deg = -0.1", "step_deg is -0.1; give a finite number, 0 or above"),
+        (
+            "[columns.input]\ncolumn = 'a'\ncalibration = [[0, 1], [360, 2]]",
+            "runs from 0 to 360 deg; keep to 0 to below",
+        ),
+        (
+            "[columns.input]\ncolumn = 'a'\ncalibration = [[-1, 1], [90, 2]]",
+            "runs from -1 to 90 deg; keep to 0 to below",
+        ),
         ("ratio = 1" + 400 * "0", "ratio is 10000.*; give a finite number above 0"),
         ("ratio = 1" + 5000 * "0", "cannot be read as TOML"),
         ("ratio = " + 2000 * "[" + 2000 * "]", "b.toml"),
