@@ -13,7 +13,7 @@ from hdopt.recordings import figures
 from hdopt.recordings.capability import gauge, outliers, performance
 from hdopt.recordings.channels import mapped_channels, sensor_uncertainty_arcmin
 from hdopt.recordings.clocks import on_one_clock, seconds_of
-from hdopt.recordings.columns import Column
+from hdopt.recordings.columns import Column, parse_columns
 from hdopt.recordings.decision import decide, parse_limits
 from hdopt.recordings.orders import model_orders, order_spectrum
 from hdopt.recordings.passes import find_passes, synchronous_average
@@ -21,7 +21,7 @@ from hdopt.recordings.ratio import measured_scale
 from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.recording import Recording
 from hdopt.recordings.repairs import Checks, unwrap_counter
-from hdopt.recordings.rows import gather
+from hdopt.recordings.rows import gather, quiet
 from hdopt.recordings.stiffness import torsion_of
 from hdopt.recordings.table import Channel, Table
 
@@ -175,6 +175,43 @@ def test_speed_does_not_reach_over_a_gap():
     assert rows.speed == pytest.approx(TURN)
 
 
+def test_a_slow_channel_loses_its_noise_and_nothing_else():
+    """A drift of 3 K loses nine tenths of its read-out noise; a torque that swings in forty rows is left as it is; on
+    both sides of a gap the record stands."""
+    n = 6000
+    noise = np.random.default_rng(4).normal(0, 0.05, n)
+    one = np.zeros(n, np.int64)
+    drift = 20 + 3 * np.linspace(0, 1, n)
+    assert np.std(quiet(drift + noise, one) - drift) < 0.1 * 0.05 * 1.3
+    swing = 5 * np.sin(TURN * np.arange(n) / 40)
+    assert np.abs(quiet(swing + noise, one) - swing).max() < 0.3
+    gap = np.arange(n) >= 3000
+    stepped = np.where(gap, 10.0, 0.0) + noise
+    found = quiet(stepped, gap.astype(np.int64))
+    assert np.abs(found - np.where(gap, 10.0, 0.0)).max() < 5 * 0.05
+    assert np.std((found - np.where(gap, 10.0, 0.0))[:2500]) < 0.2 * 0.05
+
+
+def test_the_rest_of_a_turn_belongs_to_the_turn_before():
+    """Ten turns and a fifth are ten blocks; ten and a half are eleven, in each of two recordings."""
+    for more, blocks in ((20, 10), (50, 11)):
+        theta = (np.arange(1000 + more) + 0.5) * TURN / 100
+        rows = gather([recording(np.zeros(len(theta)), theta)] * 2)
+        assert len(np.unique(rows.block)) == 2 * blocks
+        assert rows.block[0] == 0 and (np.diff(rows.block) >= 0).all()
+
+
+def test_the_coarsest_encoder_is_that_of_all_recordings():
+    steps = [recording(np.zeros(1440), there_and_back(2), quantum_arcmin=q, output_step_arcmin=q) for q in (0.3, 0.1)]
+    assert (gather(steps).quantum, gather(steps[::-1]).quantum) == (0.3, 0.3)
+    assert gather(steps).output_step == 0.3
+
+
+def test_a_unit_with_a_minus_turns_its_channel_round():
+    columns = parse_columns("input=a:deg,output=b:-rad")
+    assert [(c.name, c.unit, c.sign) for c in columns.values()] == [("a", "deg", 1.0), ("b", "rad", -1.0)]
+
+
 def test_synchronous_average_has_the_error_of_its_means():
     rng = np.random.default_rng(0)
     angle = rng.uniform(0, 200, 40_000)
@@ -198,14 +235,27 @@ def test_amplitude_and_phase_of_a_cosine():
     assert found.mean == pytest.approx(0.7)
 
 
-def test_model_orders_are_what_their_symbols_say():
-    n = 80.0
-    values = {one.symbol: one.order for one in model_orders(n)}
-    assert values["1/N"] == 1 / n and values["2(1+1/N)"] == 2 * (1 + 1 / n) and values["2/N"] == 2 / n
-    assert values["2(1+1/2N)"] == pytest.approx(2 * (1 + 1 / (2 * n)))
-    assert values["4(1+1/4N)"] == pytest.approx(4 * (1 + 1 / (4 * n)))
-    assert values["4(1+1/2N)"] == pytest.approx(4 * (1 + 1 / (2 * n)))
-    assert values["1-1/N"] == 1 - 1 / n and values["3+1/N"] == 3 + 1 / n
+def test_every_model_order_stands_where_its_symbol_says():
+    """Eightieths of a cycle, worked out by hand for N = 80."""
+    eightieths = {
+        "1/N": 1,
+        "2/N": 2,
+        "1-1/N": 79,
+        "1": 80,
+        "1+1/N": 81,
+        "2-1/N": 159,
+        "2": 160,
+        "2(1+1/2N)": 161,
+        "2(1+1/N)": 162,
+        "3": 240,
+        "3+1/N": 241,
+        "4": 320,
+        "4(1+1/4N)": 321,
+        "4(1+1/2N)": 322,
+        "5": 400,
+        "5+1/N": 401,
+    }
+    assert {one.symbol: one.order * 80 for one in model_orders(80.0)} == pytest.approx(eightieths)
 
 
 # figures and decisions
