@@ -251,7 +251,12 @@ def _decisions(found: Inspection, limits: Mapping[str, float], slope_sigma: floa
     doubt = found.uncertainty
     for name, limit in limits.items():
         value, sigma, note = _figure(found, name, doubt, slope_sigma)
-        made.append(decide(name, value, sigma, limit, note))
+        decision = decide(name, value, sigma, limit, note)
+        if name == "peak_to_peak" and decision.met is not False:
+            recorded = found.recording_peak_to_peak or None
+            part = decide(name, recorded, doubt, limit, "over the part recorded: the whole beat has no less")
+            decision = part if part.met is False else decision
+        made.append(decision)
     return tuple(made)
 
 

@@ -244,8 +244,16 @@ def test_command_check_ends_with_1_for_missed_only(tmp_path, capsys):
     gear = ("inspect", path, "--drive", "none", "--ratio", "80")
     assert run(*gear, "--limit", "recording=0.5arcmin", "--check") == 1
     assert run(*gear, "--limit", "recording=0.5arcmin") == 0
-    assert run(*gear, "--limit", "recording=0.7arcmin,peak_to_peak=0.1arcmin", "--check") == 0
+    assert run(*gear, "--limit", "recording=0.7arcmin,peak_to_peak=0.8arcmin", "--check") == 0
     assert "peak_to_peak: not decidable, too little of the beat was recorded" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("limit", "met"), [(0.4, False), (0.8, None)])
+def test_a_beat_has_no_less_than_the_part_of_it_that_was_recorded(limit, met):
+    """0.6 arcmin in six of 80 turns: missed where less is asked, whatever the rest holds; else the rest decides."""
+    (decision,) = inspect([recorded(wave)], limits={"peak_to_peak": limit}).limits
+    assert decision.met is met
+    assert ("the whole beat has no less" in decision.note) is (met is False)
 
 
 def test_command_writes_json_csv_report_and_bench(tmp_path, capsys):
