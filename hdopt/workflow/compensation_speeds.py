@@ -18,10 +18,11 @@ WORTH = 0.15
 
 def speeds_rpm(rows: Rows) -> list[float | None]:
     """The usual input speed of each of the records in `rows`, r/min; None without a clock."""
+    records = range(int(rows.record.max()) + 1)
     if rows.speed is None:
-        return [None] * rows.records
+        return [None for _ in records]
     size = np.abs(rows.speed) * 60 / TURN
-    return [float(np.median(size[rows.record == n])) for n in range(rows.records)]
+    return [float(np.median(size[rows.record == n])) for n in records]
 
 
 def of_one_speed(rows: Rows, left: Array) -> tuple[str, ...]:
