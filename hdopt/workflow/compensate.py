@@ -28,6 +28,7 @@ from hdopt.workflow.compensation_trials import (
     centred,
     choose,
     folds,
+    met_elsewhere,
     model_of,
     neighbours_of,
     said_of,
@@ -227,9 +228,9 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
     nested, method = choose(trials, fold)
     found, off = candidates(rows, whole, terms, paths)[method]
     worth, evidence = _worth(before, nested, rows)
-    # Parts of one recording are extrapolated in angle when held out; a fresh run over the same angles is not.
+    # What no other recording met is extrapolated in angle when held out; a fresh run over the same angles is not.
     again = centred(rows.error - said_of(found, rows), rows, np.zeros_like(fold))
-    left = again if rows.records == 1 else trials[method]
+    left = np.where(met_elsewhere(rows), trials[method], again)
     rng = np.random.default_rng(seed)
     each = [peak_to_peak_again(left[rows.record == n], rows.block[rows.record == n], rng) for n in range(rows.records)]
     predicted, low, high = _predicted(each)

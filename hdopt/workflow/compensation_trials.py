@@ -31,7 +31,7 @@ PLAIN_SIGN = 2.0
 ROWS_PER_TURN, MOST_ROWS = 128, 40_000
 """Rows an input turn that show single teeth, and how many rows there may be for their sake."""
 MEETS_AGAIN = 0.8
-"""Share of the stretches that a pass back must reach over to be one with the pass there."""
+"""Share of the stretches that a pass back, or another recording, must reach over to have met them too."""
 BOTH_WAYS = "stretches of either direction"
 STRETCHES = "stretches of the one output turn"
 
@@ -69,6 +69,16 @@ def folds(rows: Rows) -> tuple[Index, str]:
         # What is held out on the way there is met on the way back: nothing round the splines is left to guess.
         return np.asarray((piece + FOLDS // 2 * back) % FOLDS, np.int64), BOTH_WAYS
     return np.asarray(piece % FOLDS, np.int64), STRETCHES
+
+
+def met_elsewhere(rows: Rows) -> Mask:
+    """Which of the `rows` (n,) are of a recording whose input turns of the beat other recordings turned over too."""
+    turn = np.floor(np.mod(rows.theta / TURN, rows.ratio))
+    met = np.zeros(len(rows), np.bool_)
+    for record in range(rows.records):
+        mine = rows.record == record
+        met[mine] = np.isin(turn[mine], turn[~mine]).mean() > MEETS_AGAIN
+    return met
 
 
 def tried(

@@ -24,7 +24,7 @@ from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.rows import gather
 from hdopt.study import load_study
 from hdopt.workflow.compensate import _too_few, _worth, compensate
-from hdopt.workflow.compensation_trials import folds
+from hdopt.workflow.compensation_trials import folds, met_elsewhere
 
 RATIO, TURN, NOISE = 80.0, 2 * np.pi, 0.01
 ERRORS = DriveErrors(
@@ -332,6 +332,21 @@ def test_an_error_that_grows_with_speed_asks_for_a_table_of_each(grows):
     asked = [found.groups() for said in made.warnings if (found := re.search(told, said))]
     assert [float(speed) for speed, _ in asked] == pytest.approx([150, 300] if grows else [], rel=0.01)
     assert [float(left) for _, left in asked] == pytest.approx([NOISE] * len(asked), rel=0.2)
+
+
+def test_a_recording_where_no_other_turned_is_not_judged_by_what_the_others_guess():
+    """Two halves of an output turn, each recorded once: held out, each is a guess from the other, and what was expected
+    of a fresh run was three times what it left. The first half once more, a beat on, was met."""
+
+    def part(first, last, seed):
+        frame = table(lambda t: 0.2 * np.sin(2 * t), last - first, per_turn=40, seed=seed)
+        moved = {"input_angle_deg": 360.0 * first, "output_angle_deg": 360.0 * first / RATIO}
+        return recording_from_table(frame.assign(**{name: frame[name] + by for name, by in moved.items()}), RATIO)
+
+    halves = [part(0, 40, 1), part(40, 80, 2)]
+    assert not met_elsewhere(gather(halves)).any()
+    rows = gather([*halves, part(82, 118, 3)])
+    assert [met_elsewhere(rows)[rows.record == n].all() for n in range(3)] == [True, False, True]
 
 
 def test_what_follows_the_outputs_angle_is_no_drift():
