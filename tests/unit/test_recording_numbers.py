@@ -20,7 +20,7 @@ from hdopt.recordings.passes import find_passes, synchronous_average
 from hdopt.recordings.ratio import measured_scale
 from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.recording import Recording
-from hdopt.recordings.repairs import Checks, unwrap_counter
+from hdopt.recordings.repairs import Checks, drop_incomplete_rows, drop_outliers, find_gaps, unwrap_counter
 from hdopt.recordings.rows import gather, quiet
 from hdopt.recordings.stiffness import torsion_of
 from hdopt.recordings.table import Channel, Table
@@ -385,3 +385,37 @@ def test_mountings_scatter_beyond_their_repeats():
     alike = gauge(np.tile([1.0, 1.2, 0.9, 1.1], 3), np.repeat(["a", "b", "c"], 4))
     assert alike.reproducibility == 0.0
     assert replace(found, repeats=3).total == found.total
+
+
+# repairs
+
+
+def rows_read(n=1000, **channels):
+    return Checks({"time": 0.01 * np.arange(n), "input": np.arange(n) * TURN / 100, **channels}, RATIO, "record")
+
+
+@pytest.mark.parametrize(("steps", "parts"), [(3.5, 1), (6.0, 2)])
+def test_a_gap_is_longer_than_four_usual_steps(steps, parts):
+    time = 0.01 * np.arange(1000) + 0.01 * (steps - 1) * (np.arange(1000) >= 500)
+    assert find_gaps(rows_read(time=time, error=np.zeros(1000)))[-1] + 1 == parts
+
+
+@pytest.mark.parametrize(("every", "dropped"), [(100, True), (25, False)])
+def test_single_samples_far_out_are_dropped_where_they_are_few(every, dropped):
+    """One in a hundred of 20 arcmin; one in 25 is no fault of the read-out, but what the recording is."""
+    error = np.random.default_rng(0).normal(0, 0.1, 1000)
+    error[10::every] += 20.0
+    checks = rows_read(error=error * ARCMIN)
+    drop_outliers(checks, np.zeros(1000, np.int64))
+    assert (len(checks) < 1000) is dropped
+
+
+def test_a_torque_of_which_nine_tenths_are_missing_is_not_filled():
+    """Half of it is filled in between; of a twentieth the rows without are dropped, and then too few are left."""
+    half = np.where(np.arange(1000) % 2, np.nan, 5.0)
+    checks = rows_read(error=np.zeros(1000), torque=half)
+    drop_incomplete_rows(checks)
+    assert len(checks) == 1000 and np.isfinite(checks.channels["torque"]).all()
+    few = np.where(np.arange(1000) % 20, np.nan, 5.0)
+    with pytest.raises(HdoptError, match="950 of 1000 rows hold missing values"):
+        drop_incomplete_rows(rows_read(error=np.zeros(1000), torque=few))
