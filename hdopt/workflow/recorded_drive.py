@@ -13,6 +13,7 @@ from hdopt.recordings.bench import Bench, load_bench
 from hdopt.recordings.read import read_recording
 from hdopt.recordings.recording import Recording
 from hdopt.study import Study, load_study, shipped_drives
+from hdopt.workflow.measured_parts import words_on_measured_parts
 
 SAME_RATIO = 1e-9
 """Ratios that differ by less are one: they are quotients of tooth counts."""
@@ -40,11 +41,11 @@ class RecordedDrive:
 
     def recordings(self, given: AnyRecordings) -> list[Recording]:
         """The recordings of this drive: those `given` as records stay, files are read. The first one read warns of what
-        was `overruled`."""
+        was `overruled`, and says what was done to tables of measured parts."""
         if isinstance(given, Recording | str | Path):
             given = [given]
         found = []
-        said = self.overruled
+        said = (*self.overruled, *(words_on_measured_parts(self.drive) if self.drive is not None else ()))
         for item in given:
             if isinstance(item, Recording):
                 found.append(item)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from cases import BASE_ERRORS, drive
 
@@ -15,6 +16,7 @@ from hdopt.kinematics.waveform import kinematic_error_arcmin
 from hdopt.optimize.objectives import Point, find_quantity
 from hdopt.study import load_study
 from hdopt.workflow.kinematic_error import kinematic_error
+from hdopt.workflow.recorded_drive import recorded_drive
 from hdopt.workflow.search_setup import setup_of
 
 SINES = BASE_ERRORS.with_(cs_tooth_amplitude=0.0005, fs_tooth_amplitude=0.0004)
@@ -101,3 +103,17 @@ def test_no_table_leaves_a_fit_as_it_is():
     bare, flat = CartesianModel.of(drive()), CartesianModel.of(replace(drive(), cs_teeth=MeasuredTeeth((0.0,) * 162)))
     at = to_cartesian(DriveErrors(axis_eccentricity=0.01), bare.half_width)
     assert np.array_equal(bare.evaluate(theta, at)[0], flat.evaluate(theta, at)[0])
+
+
+def test_recordings_of_a_drive_with_tables_say_what_was_done_to_them(study, tmp_path):
+    """With the first file alone: a table that was re-centred is another one than was measured."""
+    theta = np.linspace(0, 720, 400)
+    angles = {"input_angle_deg": theta, "output_angle_deg": theta / 80 - np.sin(np.radians(2 * theta)) / 60}
+    pd.DataFrame(angles).to_csv(tmp_path / "a.csv", index=False)
+    first, second = recorded_drive(study).recordings([tmp_path / "a.csv", tmp_path / "a.csv"])
+    assert [name for name in ("cs_teeth", "fs_teeth") if any(name in said for said in first.warnings)] == [
+        "cs_teeth",
+        "fs_teeth",
+    ]
+    assert sum("was taken out" in said for said in first.warnings) == 2
+    assert not any("_teeth" in said for said in second.warnings)
