@@ -87,6 +87,11 @@ def _lines(found: Compensated, output: Path) -> Iterator[str]:
         yield homing_words(found.homing)
         yield f"void {VOID}"
         yield f"written: {output}"
+    elif not found.judged:
+        yield (
+            f"nothing written: {found.stretches} stretches of an eighth of an output turn are too few to say whether "
+            "that is chance; record three of them at least, better two output turns"
+        )
     else:
         yield (
             f"nothing written: no better than no compensation beyond chance ({found.evidence:.2g} standard errors on "

@@ -47,6 +47,8 @@ SURE = 2.0
 """Standard errors by which the held-out squares must fall for a compensation to be worth writing (one-sided 98 %)."""
 GROUPS_PER_BEAT = 8
 """Stretches an output turn over which held-out squares are taken together: neighbouring turns hang together."""
+FEWEST_STRETCHES = 3
+"""Of which a standard error of the fall is taken."""
 NONE = "none"
 
 
@@ -70,7 +72,8 @@ class Compensated(ShownAsTable):
 
     `before` and `after` of the held-out parts together, each part scored by a choice made without it; `predicted` for a
     fresh recording of the same length, with its 95 % interval `low`, `high`; `both` the same for each direction.
-    `worth` says whether the fall is beyond chance (`evidence` standard errors).
+    `worth` says whether the fall is beyond chance (`evidence` standard errors, over so many `stretches` of the record;
+    fewer than three say nothing).
     """
 
     found: Found
@@ -89,6 +92,12 @@ class Compensated(ShownAsTable):
     homing: tuple[float, float]
     ratio: float
     warnings: tuple[str, ...] = field(default=())
+    stretches: int = 0
+
+    @property
+    def judged(self) -> bool:
+        """Whether the record is long enough to say that the fall is beyond chance, or is not."""
+        return self.stretches >= FEWEST_STRETCHES
 
     def facts(self) -> dict[str, Any]:
         """What the file says of itself: method, what it leaves, what it needs, what makes it void."""
@@ -227,7 +236,7 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
     before = centred(rows.error, rows, fold)
     nested, method = choose(trials, fold)
     found, off = candidates(rows, whole, terms, paths)[method]
-    worth, evidence = _worth(before, nested, rows)
+    worth, evidence, stretches = _worth(before, nested, rows)
     # What no other recording met is extrapolated in angle when held out; a fresh run over the same angles is not.
     again = centred(rows.error - said_of(found, rows), rows, np.zeros_like(fold))
     left = np.where(met_elsewhere(rows), trials[method], again)
@@ -256,19 +265,20 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
             *(_too_few(len(found), terms, off, float(np.ptp(again))) if worth else ()),
             *(of_one_speed(rows, again) if worth else ()),
         ),
+        stretches,
     )
 
 
-def _worth(before: Array, after: Array, rows: Rows) -> tuple[bool, float]:
-    """Whether the squares fall beyond chance, and by how many standard errors, over stretches of the record."""
+def _worth(before: Array, after: Array, rows: Rows) -> tuple[bool, float, int]:
+    """Whether the squares fall beyond chance, by how many standard errors, over how many stretches of the record."""
     size = max(1, round(rows.ratio / GROUPS_PER_BEAT))
     _, group = np.unique(rows.block // size, return_inverse=True)
     fall = np.bincount(group, before**2 - after**2) / np.bincount(group)
-    if len(fall) < 3:
-        return False, 0.0
+    if len(fall) < FEWEST_STRETCHES:
+        return False, 0.0, len(fall)
     error = float(fall.std(ddof=1)) / math.sqrt(len(fall))
     evidence = float(fall.mean()) / max(error, 1e-300)
-    return evidence > SURE, min(evidence, 1e6)
+    return evidence > SURE, min(evidence, 1e6), len(fall)
 
 
 def _predicted(each: Sequence[tuple[float, float]]) -> tuple[float, float, float]:

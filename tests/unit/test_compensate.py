@@ -141,6 +141,16 @@ def test_noise_is_refused_with_1_and_no_file(tmp_path, capsys):
     assert "nothing written: no better than no compensation beyond chance" in capsys.readouterr().out
 
 
+def test_a_record_too_short_to_judge_is_told_so(tmp_path, capsys):
+    """Not that its table were no better than none: 20 of 80 turns fall to a tenth, in two stretches of ten."""
+    table(lambda theta: np.sin(2 * theta), 20, per_turn=60).to_csv(tmp_path / "r.csv", index=False)
+    out = tmp_path / "t.csv"
+    assert run("compensate", str(tmp_path / "r.csv"), "--drive", "none", "--ratio", "80", "-o", str(out)) == 1
+    said = capsys.readouterr().out
+    assert "nothing written: 2 stretches" in said and "no better" not in said
+    assert not out.exists()
+
+
 @pytest.mark.parametrize("form", ["csv", "json", "c"])
 def test_command_writes_every_form(tmp_path, capsys, form):
     table(lambda t: 0.3 * np.sin(2 * t), 90, per_turn=40).to_csv(tmp_path / "r.csv", index=False)
