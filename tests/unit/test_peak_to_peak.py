@@ -55,7 +55,7 @@ def test_a_search_sees_every_phase_of_the_beat(teeth, index):
     design = drive(geometry=DriveGeometry(teeth, teeth + 2, 0.5, 0.3, 30.65))
     errors = random_errors(8, seed=index)
     sample = errors.to_matrix()
-    conditions = SimpleNamespace(drawn=lambda: sample, of=lambda drives, design: drives, teeth=None)
+    conditions = SimpleNamespace(drawn=lambda: sample, of=lambda drives, design: drives, teeth=None, added=None)
     found = PeakToPeakQuantile()._sample(conditions, SimpleNamespace(drive=design))
     searched = peak_to_peak_by_search_arcmin(design, errors)
     # What the compiled kernel promises.
