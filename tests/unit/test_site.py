@@ -245,3 +245,12 @@ def test_every_option_and_file_that_a_page_names_exists(page):
         assert set(re.findall(r"^--[a-z0-9][\w-]*", code)) <= every, code
         for file in re.findall(r"(?<![\w/.~])((?:[\w-]+/)+[\w-]+\.(?:py|toml|md|js|json|csv|ipynb))\b", code):
             assert file in MADE_UP or any((room / file).exists() for room in rooms), file
+
+
+def test_no_target_of_make_is_taken_for_a_folder_of_its_name():
+    """`make docs` is made each time, though `docs` exists."""
+    said = (ROOT / "Makefile").read_text(encoding="utf-8")
+    (phony,) = re.findall(r"^\.PHONY: (.+)$", said, re.M)
+    named = [name for name in re.findall(r"^([a-z]+):", said, re.M) if (ROOT / name).exists()]
+    assert "docs" in named
+    assert set(named) <= set(phony.split())
