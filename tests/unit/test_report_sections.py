@@ -169,7 +169,7 @@ def test_profiles_are_compared_with_the_first():
     change = {"ellipse": 0.001 * np.cos(2 * phi), "resal": 0.002 * np.cos(2 * phi)}
     section = profiles_section(phi, deflection, change, 30.0, pd.DataFrame({"profile": ["ellipse", "resal"]}))
     assert section.summary.startswith(
-        "Ellipse: the curvature changes by 1.00 × 10⁻³/mm at most, least of all. Resal: 2.00"
+        "Ellipse: the curvature changes by 1.00\u00a0×\u00a010⁻³/mm at most, least of all. Resal: 2.00"
     )
     (difference,) = item(section, "profiles-difference").figure.data
     assert max(difference.y) == pytest.approx(100.0)

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 Curves = Mapping[str, Array]
 
+TIMES = "\u00a0×\u00a0"
+"""Keeps a power of ten on the line of its number."""
 EXAGGERATED = 0.28
 """Largest deflection as drawn, as a share of the radius."""
 
@@ -84,11 +86,11 @@ def profiles_section(
 
 def _comparison(peaks: Mapping[str, float]) -> str:
     gentle, harsh = min(peaks, key=lambda name: peaks[name]), max(peaks, key=lambda name: peaks[name])
-    says = f"{label(gentle)}: the curvature changes by {peaks[gentle]:.2f} × 10⁻³/mm at most"
+    says = f"{label(gentle)}: the curvature changes by {peaks[gentle]:.2f}{TIMES}10⁻³/mm at most"
     if len(peaks) == 1:
         return f"{says}; bending stress grows in proportion."
     return (
-        f"{says}, least of all. {label(harsh)}: {peaks[harsh]:.2f} × 10⁻³/mm, most of all. "
+        f"{says}, least of all. {label(harsh)}: {peaks[harsh]:.2f}{TIMES}10⁻³/mm, most of all. "
         "Bending stress grows in proportion."
     )
 
