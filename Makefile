@@ -9,7 +9,10 @@ SHIPPED := csf-25-80 paper-reproduction csf-25-80-design-trade
 unexport PYTHONDONTWRITEBYTECODE
 
 # `docs` is a folder too, which would else count as made.
-.PHONY: study test check lint types lock docs benchmark fuzz mutants faults clean
+.PHONY: install study test check lint types lock docs benchmark fuzz mutants faults clean
+
+# hdopt alone, without a study.
+install: $(VENV)/ready
 
 study: $(VENV)/ready
 	for study in $(SHIPPED); do $(VENV)/bin/hdopt run $$study -o $(OUT)/$$study || exit 1; done
