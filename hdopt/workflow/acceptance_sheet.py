@@ -17,7 +17,7 @@ from hdopt.recordings.capability import gauge
 from hdopt.recordings.decision import Decision, decide
 from hdopt.recordings.figures import Cells
 from hdopt.recordings.orders import ModelOrder, OrderSpectrum, model_orders, order_spectrum
-from hdopt.recordings.recording import Recording
+from hdopt.recordings.recording import TURN, Recording
 from hdopt.recordings.sheet import Beat, Inspection, OrderLine
 from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
 from hdopt.workflow.waveform_fit import WaveformFit, fit_waveform
@@ -134,10 +134,10 @@ def _beat(
 ) -> Beat | None:
     """Measured where one recording covers the whole beat, else as the model extrapolates it; None without either."""
     for recording, cells in zip(recordings, parts, strict=True):
-        if recording.turns >= recording.ratio:
+        if _turns(recording) >= recording.ratio:
             value = figures.directional_peak_to_peak(cells)
             return Beat(value, max(value - 1.96 * doubt, 0.0), value + 1.96 * doubt, "measured")
-    longest = max((r.turns for r in recordings), default=0.0)
+    longest = max((_turns(r) for r in recordings), default=0.0)
     if fit is None or longest < LEAST_OF_A_BEAT * fit.ratio:
         return None
     value, low, high = fit.beat_peak_to_peak(seed)
@@ -145,6 +145,13 @@ def _beat(
     noise = max((cells.noise_arcmin for cells in parts), default=0.0)
     left = 1.96 * math.sqrt(2 * max(fit.rms_arcmin**2 - noise**2, 0.0) + doubt**2)
     return Beat(value, max(value - math.hypot(value - low, left), 0.0), value + math.hypot(high - value, left), "model")
+
+
+def _turns(recording: Recording) -> float:
+    """Input turns of `recording`, and two samples: the last one of a whole turn lies short of where the first one does,
+    and is a rounded count of an encoder."""
+    steps = np.abs(np.diff(recording.input_angle))
+    return recording.turns + 2 * float(np.median(steps)) / TURN
 
 
 def _slope_in_time(recordings: Sequence[Recording], slope: float, speed_rpm: float | None) -> float | None:

@@ -115,6 +115,15 @@ def test_the_beat_of_a_short_record_and_the_orientation(mirrored):
     assert way["input"] == ("the other way round" if mirrored else "as counted")
 
 
+@pytest.mark.parametrize(("turns", "known"), [(80, True), (79.9, False)])
+def test_a_whole_output_turn_needs_no_sample_on_its_end(turns, known):
+    """80 turns of 40 samples end a fortieth of a turn before the first sample's place; a tenth of a turn is missing."""
+    theta = np.arange(round(turns * 40)) * TURN / 40
+    table = {"input_angle_deg": np.degrees(theta), "output_angle_deg": np.degrees(theta) / RATIO - wave(theta) / 60}
+    found = inspect([recording_from_table(pd.DataFrame(table | {"time_s": np.arange(len(theta)) * 0.01}), RATIO)])
+    assert (found.beat is not None and found.beat.source == "measured") == known
+
+
 def test_guard_band_of_iso_14253():
     """1.645 u on either side: 0.90 + 0.0823 is below 1, 0.93 is not decidable, 1.09 is above."""
     assert [decide("rms", v, 0.05, 1.0).verdict for v in (0.91, 0.93, 1.07, 1.09)] == [
