@@ -313,7 +313,8 @@ def _too_few(count: int, terms: int | None, off: float, left: float) -> tuple[st
 
 def _warnings(rows: Rows, held_out: str, recordings: Sequence[Recording]) -> tuple[str, ...]:
     said = [w for r in recordings for w in r.warnings]
-    if rows.span_turns < rows.ratio:
+    # The last sample of a whole turn lies one short of where the first one does.
+    if rows.span_turns + 2 / rows.rows_per_turn < rows.ratio:
         said.append(
             f"{rows.span_turns:.3g} of the {rows.ratio:g} input turns of a beat were recorded: beyond them the table "
             "is an extrapolation, and what it leaves there was not seen; record a whole output turn"

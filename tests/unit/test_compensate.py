@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 from inspect import signature
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -23,7 +24,7 @@ from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.rows import gather
 from hdopt.study import load_study
-from hdopt.workflow.compensate import _too_few, _worth, compensate
+from hdopt.workflow.compensate import _too_few, _warnings, _worth, compensate
 from hdopt.workflow.compensation_trials import folds, met_elsewhere
 
 RATIO, TURN, NOISE = 80.0, 2 * np.pi, 0.01
@@ -139,6 +140,13 @@ def test_noise_is_refused_with_1_and_no_file(tmp_path, capsys):
     assert code == 1 and not out.exists()
     assert json.loads(told.read_text())["file"] is None
     assert "nothing written: no better than no compensation beyond chance" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("turns", "short"), [(80 - 1 / 60, False), (79.5, True)])
+def test_a_beat_that_ends_a_sample_short_is_whole(turns, short):
+    """Else 80 turns of 60 rows, of which the last lies a sixtieth of a turn before the first, are told to lack some."""
+    rows = SimpleNamespace(span_turns=turns, ratio=80.0, rows_per_turn=60.0)
+    assert any("an extrapolation" in said for said in _warnings(rows, "turns", [])) is short
 
 
 def test_a_record_too_short_to_judge_is_told_so(tmp_path, capsys):

@@ -170,11 +170,11 @@ def test_a_fall_is_worth_it_by_two_standard_errors_over_stretches():
     rows = SimpleNamespace(ratio=80.0, block=block)
     for falls, worth in (([1.0, 1.5, 0.5, 1.2, 0.8, 1.0], True), ([4.0, -2.0, 4.0, -2.0, 3.0, -1.0], False)):
         after = np.sqrt(10.0 - np.repeat(falls, 50))
-        found, evidence = _worth(np.full(300, np.sqrt(10.0)), after, rows)
+        found, evidence, _ = _worth(np.full(300, np.sqrt(10.0)), after, rows)
         assert evidence == pytest.approx(np.mean(falls) / (np.std(falls, ddof=1) / np.sqrt(6)))
         assert found is worth
     few = SimpleNamespace(ratio=80.0, block=np.zeros(300, int))
-    assert _worth(np.full(300, 2.0), np.full(300, 1.0), few) == (False, 0.0)
+    assert _worth(np.full(300, 2.0), np.full(300, 1.0), few) == (False, 0.0, 1)
 
 
 def test_what_is_expected_is_the_mean_with_the_usual_spread():
