@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from types import CodeType, FrameType
+
+from hdopt.workflow.frames import frames_of
 
 FIRST = 2
 """The first convex model that is timed: the one before it may compile."""
@@ -94,16 +95,8 @@ class AllocationWatch:
         from hdopt.allocation.rules import _successive
 
         known, found, models = _stages(), "", None
-        for frame in _frames(self.thread):
+        for frame in frames_of(self.thread):
             found = known.get(frame.f_code, found)
             if frame.f_code is _successive.__code__:
                 models = frame
         return found, models
-
-
-def _frames(thread: int) -> Iterator[FrameType]:
-    """What the `thread` is in, innermost first."""
-    frame: FrameType | None = sys._current_frames().get(thread)
-    while frame is not None:
-        yield frame
-        frame = frame.f_back

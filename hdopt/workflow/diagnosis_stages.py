@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from dataclasses import dataclass, field
 from functools import cache
-from types import CodeType, FrameType
+from types import CodeType
+
+from hdopt.workflow.frames import frames_of
 
 SECOND_OVER_FIRST = (1.0, 3.0)
 """Time of the work on all turns, with its checks, over that on four fifths of them: from where much is found in many
@@ -81,11 +82,9 @@ class DiagnosisWatch:
         """The outermost stage under way, and whether it is on a part of the turns."""
         known, part = _stages(), _part()
         found, in_part = "", False
-        frame: FrameType | None = sys._current_frames().get(self.thread)
-        while frame is not None:
+        for frame in frames_of(self.thread):
             found = known.get(frame.f_code, found)
             if frame.f_code is part:
                 in_part = True
                 break
-            frame = frame.f_back
         return found, in_part
