@@ -13,6 +13,7 @@ from hdopt.diagnosis.inference.catalogue import SCALE
 from hdopt.diagnosis.inference.cross_validation import HeldOut
 from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut
 from hdopt.diagnosis.settings import DEFAULT
+from hdopt.diagnosis.verdict import rules
 from hdopt.diagnosis.verdict.facts import found_again, own_gain, stands_out, too_little, unseen_gain, unseen_rms
 from hdopt.diagnosis.verdict.named_effect import confidences
 from hdopt.diagnosis.verdict.residual_structure import clearly_unexplained, left_over_passes, outside_share
@@ -76,6 +77,16 @@ def test_an_earlier_rule_is_asked_before_every_later_one(first):
     for later in ORDER[first:]:
         both = replace(CLEAN, **(fires[later] | fires[ORDER[first]]))
         assert rule_for(both).name == ORDER[first]
+
+
+def test_what_is_not_borne_out_is_located_in_its_largest_part(monkeypatch):
+    """By its gain on held-out turns, 0.16 = 0.4^2, and named by nothing but a likeness."""
+    monkeypatch.setattr(rules, "main_orders", lambda fit, contribution: [])
+    found = evidence(candidate({"hysteresis": 0.1, "local_tooth_defect": 0.3}), base=1.16, extended=1.0)
+    said = rules.unconfirmed(SimpleNamespace(evidence=found))
+    assert (said.verdict, said.effects, said.where["domain"]) == ("unknown", (), "angle")
+    assert said.where["rms_arcmin"] == pytest.approx(0.4)
+    assert "hysteresis and local_tooth_defect" in said.says
 
 
 def test_effects_gain_what_they_carry_themselves():

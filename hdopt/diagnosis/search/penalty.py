@@ -120,4 +120,4 @@ def kind_of(term: Term) -> str:
     like no other's.
     """
     effect = properties_of(term.effect)
-    return "swing" if effect.driven and effect.domain not in KINDS else KINDS.get(effect.domain, "way")
+    return KINDS.get(effect.domain, "swing" if effect.driven else "way")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hdopt.arrays import Array
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.localization import locate
 from hdopt.diagnosis.inference.base_fit import base_estimate, beat_warning
@@ -123,8 +124,7 @@ def scale_notes(evidence: Evidence) -> tuple[str, ...]:
 
 def skew_notes(evidence: Evidence) -> tuple[str, ...]:
     """What the `evidence` says of two clocks that run apart."""
-    fit = evidence.selection.best.fit
-    rates = [float(c[0]) for term, c in zip(fit.terms, fit.coefficients, strict=True) if term.effect == SKEW]
+    rates = [float(rate) for (rate,) in _coefficients(evidence, SKEW)]
     return tuple(
         f"the output's clock runs {rate * MICRO:.3g} millionths {'slow' if rate > 0 else 'fast'} against the input's: "
         "the delay between them grows steadily; sample both by one clock"
@@ -134,24 +134,26 @@ def skew_notes(evidence: Evidence) -> tuple[str, ...]:
 
 def zero_notes(evidence: Evidence) -> tuple[str, ...]:
     """What the `evidence` says of recordings that begin with a zero of their own."""
-    fit = evidence.selection.best.fit
-    offs = [c for term, c in zip(fit.terms, fit.coefficients, strict=True) if term.effect == NEW_ZERO]
     return tuple(
         "the output's zero lies off the first recording's, as where it was set anew or the clamping gave way: "
         + ", ".join(f"{off:.3g} arcmin in recording {i}" for i, off in enumerate(one, 2))
-        for one in offs
+        for one in _coefficients(evidence, NEW_ZERO)
     )
 
 
 def contact_notes(evidence: Evidence) -> tuple[str, ...]:
     """What the `evidence` says of a k_e that varies round the input's turn."""
-    fit = evidence.selection.best.fit
-    shares = [c for term, c in zip(fit.terms, fit.coefficients, strict=True) if term.effect == VARYING_CONTACT]
     return tuple(
         "the drive's own error grows and shrinks with the input angle, as where k_e varies round its turn: "
         + ", ".join(f"{100 * math.hypot(*wave):.2g} % at {k} a turn" for k, wave in enumerate(share.reshape(-1, 2), 1))
-        for share in shares
+        for share in _coefficients(evidence, VARYING_CONTACT)
     )
+
+
+def _coefficients(evidence: Evidence, effect: str) -> list[Array]:
+    """Those of what is called `effect` in the best set of the `evidence`, [] where it is not in it."""
+    fit = evidence.selection.best.fit
+    return [c for term, c in zip(fit.terms, fit.coefficients, strict=True) if term.effect == effect]
 
 
 def base_notes(model: Fit) -> tuple[str, ...]:

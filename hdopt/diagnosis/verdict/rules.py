@@ -13,10 +13,18 @@ from hdopt.diagnosis.inference.catalogue import properties_of
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.verdict.facts import Facts, Findings, sparse, unseen_rms
 from hdopt.diagnosis.verdict.named_effect import NamedEffect, main_orders
-from hdopt.diagnosis.verdict.residual_structure import in_what_way, locate_remainder, locate_repeated
+from hdopt.diagnosis.verdict.residual_structure import (
+    in_what_way,
+    locate_remainder,
+    locate_repeated,
+    term_powers,
+)
 from hdopt.diagnosis.verdict.rivals import Sets, separating_measurement, tied_pairs
 from hdopt.diagnosis.verdict.where import Where
 from hdopt.effects import EFFECTS
+
+MORE_TURNS = "record more turns of the same motion: what is there stays, whichever of them are left out"
+"""What tells whether something is there that a part of the turns does not show."""
 
 
 @dataclass(frozen=True)
@@ -188,8 +196,7 @@ def unstable(findings: Findings) -> Conclusion:
         f"{unseen / floor:.2g} times the noise: what is there is not known."
     )
     where = effects[0].where | {"rms_arcmin": math.sqrt(max(unseen**2 - floor**2, 0.0))}
-    test = "record more turns of the same motion: what is there stays, whichever of them are left out"
-    return Conclusion("unknown", says, effects, separating_test=test, where=where)
+    return Conclusion("unknown", says, effects, separating_test=MORE_TURNS, where=where)
 
 
 def unconfirmed(findings: Findings) -> Conclusion:
@@ -199,11 +206,10 @@ def unconfirmed(findings: Findings) -> Conclusion:
     evidence = findings.evidence
     gain = evidence.base_held_out.variance - evidence.extended_held_out.variance
     best = evidence.selection.best
-    largest = max(range(len(best.fit.terms)), key=lambda i: float(np.var(best.fit.contribution(i))))
-    contribution = best.fit.contribution(largest)
+    largest = int(np.argmax(term_powers(best.fit)))
     where: Where = {
         "domain": properties_of(best.effects[largest]).domain,
-        "orders_per_input_turn": main_orders(best.fit, contribution),
+        "orders_per_input_turn": main_orders(best.fit, best.fit.contribution(largest)),
         "direction": "both",
         "share_of_residual": float(min(gain / max(evidence.base_held_out.variance, TINY), 1.0)),
         "rms_arcmin": math.sqrt(max(gain, 0.0)),
@@ -213,7 +219,7 @@ def unconfirmed(findings: Findings) -> Conclusion:
         "unknown",
         f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that most resembles {like}; but turns that no "
         "stage saw do not bear that out: what it is, is not known.",
-        separating_test="record more turns of the same motion: what is there stays, whichever of them are left out",
+        separating_test=MORE_TURNS,
         where=where,
     )
 
