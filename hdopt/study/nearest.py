@@ -39,6 +39,10 @@ SYMBOLS = {
 """What engineers call a quantity -> the keys that hold it; the paper's symbols are those of docs/conventions.md."""
 MOST_KEYS = 4
 MOST_KNOWN = 14
+FAR_TOO_MANY = 60
+"""More keys than a section has: the first of a whole study's would say nothing."""
+UNIT = re.compile(r"_(?:(?:arcmin|nm)_per_(?:k|rad)|g_cm3|mm|um|deg|arcmin|nm|rpm|mpa|hz|percent|[hks])$")
+"""The unit with which a key ends."""
 LEAST_ALIKE = 0.75
 """Share of common letters from which a name counts as misspelt; below it 'ratio' would be like 'correlation'."""
 
@@ -60,6 +64,8 @@ def unknown_key(name: str, known: Sequence[str], elsewhere: Iterable[tuple[str, 
         return f"{said}; did you mean {' or '.join(map(repr, near))}?"
     if not known:
         return said
+    if len(known) > FAR_TOO_MANY:
+        return f"{said}; hdopt new NAME writes a study with every key explained"
     rest = f", ... ({len(known)} in all)" if len(known) > MOST_KNOWN else ""
     return f"{said}; known: {', '.join(known[:MOST_KNOWN])}{rest}"
 
@@ -72,13 +78,43 @@ def near_keys(name: str, known: Iterable[str]) -> list[str]:
     called = [last[key] for key in SYMBOLS.get(name.lower(), ()) if key in last]
     if called:
         return called
-    spelt = difflib.get_close_matches(name, known, n=1, cutoff=LEAST_ALIKE)
+    spelt = _spelt_like(name, known)
     words = _words(name)
-    sharing = [key for key in known if words and words <= _words(key)]
-    if sharing and len(sharing) <= 2 * MOST_KEYS and not (spelt and spelt[0] not in sharing):
-        fewest = min(len(_words(key)) for key in sharing)
-        return [key for key in sharing if len(_words(key)) == fewest][:MOST_KEYS]
+    sharing = _few([key for key in known if words and words <= _words(key)])
+    if sharing and not (spelt and spelt[0] not in sharing):
+        return _shortest(sharing)
+    begun = _few([key for key in known if _begins(words, _words(key))])
+    if begun and not (spelt and spelt[0] in begun):
+        return _shortest(begun)
     return spelt
+
+
+def _few(keys: list[str]) -> list[str]:
+    """`keys`, [] where they are so many that naming them is no help."""
+    return keys if len(keys) <= 2 * MOST_KEYS else []
+
+
+def _shortest(keys: list[str]) -> list[str]:
+    """Those of the `keys` with the fewest words, `MOST_KEYS` of them at most."""
+    fewest = min(len(_words(key)) for key in keys)
+    return [key for key in keys if len(_words(key)) == fewest][:MOST_KEYS]
+
+
+def _begins(words: set[str], of: set[str]) -> bool:
+    """Whether each of the `words` of somebody in a hurry begins one `of` a key's: temp, temperature."""
+    return bool(words) and all(len(word) > 2 and any(one.startswith(word) for one in of) for word in words)
+
+
+def _spelt_like(name: str, known: Sequence[str]) -> list[str]:
+    """The one of the `known` keys whose spelling is nearest to `name`: as a whole, by its last part, or either without
+    its unit, for nobody misspells the unit that he leaves out."""
+    forms: dict[str, str] = {}
+    for key in known:
+        for form in (key, key.rpartition(".")[2]):
+            forms.setdefault(form, key)
+            forms.setdefault(UNIT.sub("", form), key)
+    nearest = difflib.get_close_matches(name.lower(), forms, n=1, cutoff=LEAST_ALIKE)
+    return [forms[form] for form in nearest]
 
 
 def _words(key: str) -> set[str]:

@@ -13,8 +13,8 @@ from hdopt.cli import main
 from hdopt.errors import HdoptError, IncompleteStudy, MissingValue
 from hdopt.study import load_study, shipped_drives, shipped_studies
 from hdopt.study.defaults import defaults_taken, used_by
-from hdopt.study.nearest import near_keys
-from hdopt.study.schema import SECTIONS, section_model
+from hdopt.study.nearest import UNIT, near_keys
+from hdopt.study.schema import ANY_NAME, SECTIONS, known_paths, section_model
 from hdopt.workflow.check_study import PROBES, check_study
 from hdopt.workflow.study_reference import section_reference, study_reference
 
@@ -281,6 +281,29 @@ def test_names_that_are_like_nothing_get_no_suggestion():
     assert near_keys("ratio", keys) == []
     assert near_keys("colour", keys) == []
     assert near_keys("axis_tilt_z_deg", keys) == ["axis_tilt_x_deg"] or near_keys("axis_tilt_z_deg", keys)
+
+
+@pytest.mark.parametrize("section", ["drive", "wave_generator", "errors", "load", "operation", "requirement"])
+def test_a_misspelt_key_without_its_unit_leads_to_that_key(section):
+    """Would catch `modul` taken for `model`: a unit that the user leaves out counted as misspelt."""
+    names = sorted({path[-1] for path in known_paths({}) if ANY_NAME not in path})
+    assert len(names) > 300
+    for key in section_model(section).model_fields:
+        stem = UNIT.sub("", key)
+        for said in (stem, stem[:-1], stem[:1] + stem[2:]):  # whole, its last letter gone, its second
+            if len(said) > 4 and said not in names:
+                assert key in near_keys(said, names), said
+
+
+@pytest.mark.parametrize(("said", "meant"), [("modul", "module_mm"), ("temp", "temperature_difference_k")])
+def test_set_leads_to_what_was_begun(said, meant):
+    with pytest.raises(HdoptError, match=f"unknown key '{said}'; did you mean '{meant}'"):
+        load_study("csf-25-80", overrides=[f"{said}=0.3"])
+
+
+def test_a_key_like_nothing_is_not_answered_with_the_first_of_hundreds():
+    with pytest.raises(HdoptError, match=r"unknown key 'druckwinkel'; hdopt new NAME writes a study with every key"):
+        load_study("csf-25-80", overrides=["druckwinkel=20"])
 
 
 def test_an_incomplete_study_names_its_keys(tmp_path):
