@@ -59,8 +59,3 @@ def test_a_soak_goes_on_and_its_page_says_what_was_done(tmp_path, monkeypatch):
     page = soak.renewed(f"before\n{soak.START}\nold\n{soak.END}\nafter", kept)
     assert page.startswith("before") and page.endswith("after") and "old" not in page
     assert f"| any | {kept['kinds']['any']['inputs']} | {kept['kinds']['any']['failures']} |" in page
-
-
-def test_a_long_word_is_found_in_its_message_however_it_is_quoted(tmp_path):
-    """Would catch a rule that takes the quotes of the whole word for those of what is shown of it."""
-    KINDS["options"][1](["--drive", "'" + "x" * 100 + '"' + "x" * 100], tmp_path)
