@@ -147,6 +147,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m hdopt.studies.compensation", description=__doc__)
     parser.add_argument("--cases", type=int, default=60)
     parser.add_argument("--skip", type=int, default=0, help="Leave out so many cases of the list's beginning.")
+    parser.add_argument("--every", type=int, default=1, help="Of the cases that are left take every so many-th.")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--terms", default="64", help="As of hdopt compensate.")
     parser.add_argument("--out", default="compensation.csv", help="One line a case; cases that stand there are kept.")
@@ -159,7 +160,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     terms = None if options.terms == "auto" else int(options.terms)
     rows = kept.to_dict("records")
     done = {int(row["seed"]) for row in rows}
-    asked = [one for one in plan(options.seed, options.skip + options.cases)[options.skip :] if one[0] not in done]
+    listed = plan(options.seed, options.skip + options.cases)[options.skip :: options.every]
+    asked = [one for one in listed if one[0] not in done]
     begun = time.monotonic()
     for number, (seed, effect, severity) in enumerate(asked):
         more = f", {still(begun, number, len(asked))}" if number else ""

@@ -90,7 +90,8 @@ def _lines(found: Compensated, output: Path) -> Iterator[str]:
     elif not found.judged:
         yield (
             f"nothing written: {found.stretches} stretches of an eighth of an output turn are too few to say whether "
-            "that is chance; record three of them at least, better two output turns"
+            "that is chance; record three of them at least (more than a quarter of an output turn in all), better two "
+            "output turns"
         )
     else:
         yield (

@@ -14,6 +14,15 @@ LOCKED_TURNS = 0.02
 """Input turns below which the input counts as locked: only torque or time moved."""
 
 
+def turns_with_ends(turns: float, apart: float) -> float:
+    """The turns that a record of `turns` between its first and last angle, `apart` turns between neighbours, may have
+    made: the last value of a whole turn lies short of where the first one does, and is a rounded count of an encoder.
+
+    Both in turns of one shaft, >= 0.
+    """
+    return turns + 2 * apart
+
+
 @dataclass(frozen=True)
 class Recording:
     """One checked recording; all arrays have shape (n,).

@@ -17,7 +17,7 @@ from hdopt.recordings.capability import gauge
 from hdopt.recordings.decision import Decision, decide
 from hdopt.recordings.figures import Cells
 from hdopt.recordings.orders import ModelOrder, OrderSpectrum, model_orders, order_spectrum
-from hdopt.recordings.recording import TURN, Recording
+from hdopt.recordings.recording import TURN, Recording, turns_with_ends
 from hdopt.recordings.sheet import Beat, Inspection, OrderLine
 from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
 from hdopt.workflow.waveform_fit import WaveformFit, fit_waveform
@@ -148,10 +148,8 @@ def _beat(
 
 
 def _turns(recording: Recording) -> float:
-    """Input turns of `recording`, and two samples: the last one of a whole turn lies short of where the first one does,
-    and is a rounded count of an encoder."""
-    steps = np.abs(np.diff(recording.input_angle))
-    return recording.turns + 2 * float(np.median(steps)) / TURN
+    """Input turns that `recording` may have made, to a sample at either end."""
+    return turns_with_ends(recording.turns, float(np.median(np.abs(np.diff(recording.input_angle)))) / TURN)
 
 
 def _slope_in_time(recordings: Sequence[Recording], slope: float, speed_rpm: float | None) -> float | None:

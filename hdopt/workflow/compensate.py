@@ -19,7 +19,7 @@ from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
 from hdopt.figures import drawn
 from hdopt.files import ShownAsTable, write_text
-from hdopt.recordings.recording import Recording
+from hdopt.recordings.recording import Recording, turns_with_ends
 from hdopt.recordings.rows import Rows, gather
 from hdopt.workflow.compensation_speeds import of_one_speed, speeds_rpm
 from hdopt.workflow.compensation_trials import (
@@ -202,8 +202,12 @@ def compensate(
     `files` to write, where it is worth it: {"csv": PATH}, {"json": PATH} or {"c": PATH}. Raises `HdoptError` where
     nothing moves or `terms` is out of range, and before any work where a file cannot be written.
     """
+    from threadpoolctl import threadpool_limits
+
     source, wanted = recorded_drive(drive), checked_files(files, FORMATS)
-    made = compensation_of(source.recordings(recordings), source.drive, terms, seed)
+    # Matrices of a few hundred rows: a second thread of the linear algebra only waits, at six times the processor time.
+    with threadpool_limits(1, user_api="blas"):
+        made = compensation_of(source.recordings(recordings), source.drive, terms, seed)
     write_compensation(made, wanted)
     return made
 
@@ -313,8 +317,7 @@ def _too_few(count: int, terms: int | None, off: float, left: float) -> tuple[st
 
 def _warnings(rows: Rows, held_out: str, recordings: Sequence[Recording]) -> tuple[str, ...]:
     said = [w for r in recordings for w in r.warnings]
-    # The last sample of a whole turn lies one short of where the first one does.
-    if rows.span_turns + 2 / rows.rows_per_turn < rows.ratio:
+    if turns_with_ends(rows.span_turns, 1 / rows.rows_per_turn) < rows.ratio:
         said.append(
             f"{rows.span_turns:.3g} of the {rows.ratio:g} input turns of a beat were recorded: beyond them the table "
             "is an extrapolation, and what it leaves there was not seen; record a whole output turn"
