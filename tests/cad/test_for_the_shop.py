@@ -155,6 +155,9 @@ def test_mating_sheet_spends_no_more_than_the_bounds(tmp_path):
         if row["takes"]:
             spent[row["feeds"]] = spent.get(row["feeds"], 0.0) + float(row["takes"])
     assert spent["axis_eccentricity"] == pytest.approx(0.015) and spent["axis_tilt"] == pytest.approx(0.2)
+    # An axis is off by half of a coaxiality, of a clearance on diameter, of a run-out.
+    off_axis = [row for row in rows if row["feeds"] == "axis_eccentricity"]
+    assert [float(row["value_mm"]) for row in off_axis] == pytest.approx([2 * float(row["takes"]) for row in off_axis])
     # The shaft is that of the bore's fit: 14 n5 is +20/+12 um (ISO 286-2).
     assert rows[0]["requirement"] == "diameter 14 n5 (+20/+12 um)"
     # Perpendicularity over the face's diameter is the tangent of its share of the tilt.

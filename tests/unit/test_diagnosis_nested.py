@@ -78,6 +78,17 @@ def test_a_record_that_can_spare_no_turns_has_no_figure():
     assert hidden_samples(without_samples([recording], few), np.random.default_rng(1), DEFAULT.held_out) is None
 
 
+@pytest.mark.parametrize(("share", "hidden"), [(0.1, None), (0.2, 3), (0.55, 8), (0.7, None)])
+def test_turns_are_hidden_where_enough_are_on_either_side(share, hidden):
+    """Of 15 in one pass: three at least to judge by, and six at least to learn from."""
+    keep = [np.arange(len(THETA)) >= 15 * RATE]
+    settings = replace(DEFAULT.held_out, nested_share=share)
+    pass_of_15 = without_samples([record(noise())], keep)
+    found = hidden_samples(pass_of_15, np.random.default_rng(1), settings)
+    turns = None if found is None else len(np.unique(gather(pass_of_15).block[found[0]]))
+    assert turns == hidden
+
+
 def test_what_is_left_has_a_gap_where_turns_were_and_the_rest_as_it_was():
     """Fault caught: rows on both sides of a gap taken for neighbours."""
     recording = record(noise())
