@@ -17,7 +17,7 @@ def digest_of(fault: Fault, tests: Sequence[str] = ()) -> str:
     """Of what an answer rests on: the text that the fault is in, and `tests`, all of its own where none is named."""
     digest = hashlib.sha256()
     for name in (fault.file, *(f"tests/{test}" for test in tests or fault.tests)):
-        path = ROOT / name
+        path = ROOT / name.split("::")[0]
         digest.update(path.read_bytes() if path.is_file() else b"gone")
     return digest.hexdigest()[:10]
 

@@ -26,7 +26,10 @@ from tests.mutants.order import LikelyFirst, Watch
 
 LOG = "faults-last.log"
 TIMEOUT_S = 400.0
-QUICK = ("-q", "-x", "-m", "not slow and not browser", "--benchmark-disable", "-p", "no:cacheprovider")
+ALL = ("-q", "-x", "--benchmark-disable", "-p", "no:cacheprovider")
+QUICK = (*ALL, "-m", "not slow and not browser")
+NO_TESTS = 5
+"""Pytest's own code for a file of which nothing is selected."""
 LIBRARIES = ("numpy", "numba", "pytest", "hypothesis", "pandas", "scipy.optimize", "scipy.stats", "scipy.ndimage")
 KILLED, SURVIVED, TIMEOUT, ANEW = "killed", "survived", "timeout", "anew"
 SAID = {0: SURVIVED, 1: KILLED, 2: KILLED, -signal.SIGKILL: TIMEOUT, 99: ANEW}
@@ -95,7 +98,7 @@ def _on_file(file: str, faults: Sequence[Fault], tree: Path, folder: Path) -> It
         for line in lines:
             number, said = json.loads(line)
             if number is None:
-                print(f"not asked: {file} fails without any fault: see {folder / LOG}", flush=True)
+                print(f"not asked: {file} {said} without any fault: see {folder / LOG}", flush=True)
                 break
             fault = faults[number]
             if said == ANEW:
@@ -112,9 +115,11 @@ def _on_file(file: str, faults: Sequence[Fault], tree: Path, folder: Path) -> It
 def _session(file: str, faults: Sequence[Fault], tree: Path, folder: Path, out: TextIO) -> int:
     """Run `file` as it stands, then with each of `faults` in a child of this process; a line of `out` says what."""
     watch = Watch(faults, tree)
-    if _pytest(file, watch):
-        out.write(json.dumps([None, "failed"]) + "\n")
+    if code := _pytest(file, watch):
+        out.write(json.dumps([None, "has no quick test" if code == NO_TESTS else "fails"]) + "\n")
+        out.flush()
         return 0
+    _end_solid_threads()
     for number, fault in enumerate(faults):
         with put_in(fault, tree) as (path, before, after):
             first = LikelyFirst(watch, number)
@@ -134,6 +139,14 @@ def _session(file: str, faults: Sequence[Fault], tree: Path, folder: Path, out: 
         out.write(json.dumps([number, said]) + "\n")
         out.flush()
     return 0
+
+
+def _end_solid_threads() -> None:
+    """End the threads of the library of solids, where it was read: a child has none, and would wait for them."""
+    if "OCP" in sys.modules:
+        from OCP.OSD import OSD_ThreadPool
+
+        OSD_ThreadPool.DefaultPool_s().Init(1)
 
 
 @contextmanager
@@ -212,6 +225,7 @@ def _machine_code(tree: Path, folder: Path) -> Path:
 def _pytest(file: str, plugin: object = None) -> int:
     import pytest
 
-    code = int(pytest.main([*QUICK, f"tests/{file}"], [] if plugin is None else [plugin]))
+    named = "::" in file  # A test that a list names is asked however slow it is.
+    code = int(pytest.main([*(ALL if named else QUICK), f"tests/{file}"], [] if plugin is None else [plugin]))
     sys.stdout.flush()
     return code
