@@ -261,14 +261,14 @@ def finished_parts_kept(inputs: str, resume: bool) -> Iterator[None]:
     the same command with --resume goes on with them: the same `inputs` (hashes of the study or the recordings),
     options, seed and version."""
     import hashlib
-    from importlib import metadata
 
     from hdopt.parallel.engine import engine_from, engine_in_force
     from hdopt.parallel.kept import Kept, Parts, cache_folder, forget_old
+    from hdopt.workflow.provenance import own_version
 
     context = click.get_current_context()
     asked = {name: value for name, value in context.params.items() if name not in ("json_file", "resume")}
-    key = f"{context.info_name} {inputs} {asked} {metadata.version('hdopt')}"
+    key = f"{context.info_name} {inputs} {asked} {own_version()}"
     forget_old(cache_folder())
     parts = Parts.open(cache_folder() / hashlib.sha256(key.encode()).hexdigest()[:32], key, resume)
     with engine_in_force(Kept(engine_from(None), parts, quiet_s=QUIET_S, needed=False)):

@@ -27,7 +27,7 @@ def provenance(study: Study | None = None, seed: int | None = None, command: str
     SOURCE_DATE_EPOCH set, start and wall time are left out: two runs then give the same bytes.
     """
     work = files_of_work()
-    known: dict[str, Any] = {"hdopt": metadata.version("hdopt")}
+    known: dict[str, Any] = {"hdopt": own_version()}
     if command:
         known["command"] = command
     if study is not None:
@@ -47,6 +47,12 @@ def provenance(study: Study | None = None, seed: int | None = None, command: str
         known["started"] = datetime.fromtimestamp(work.began, UTC).isoformat(timespec="seconds")
         known["wall_time_s"] = round(time.time() - work.began, 3)
     return known
+
+
+@cache
+def own_version() -> str:
+    """hdopt's, as it is installed; read from its file once a process, which takes as long as reading a study."""
+    return metadata.version("hdopt")
 
 
 @cache

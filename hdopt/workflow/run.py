@@ -8,7 +8,6 @@ import os
 import platform
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast  # Any: values of JSON
 
@@ -26,7 +25,7 @@ from hdopt.study.defaults import defaults_taken
 from hdopt.study.drive import StudySection
 from hdopt.study.write import study_toml
 from hdopt.workflow.placed import numbers_named
-from hdopt.workflow.provenance import provenance
+from hdopt.workflow.provenance import own_version, provenance
 from hdopt.workflow.requirement import of_run
 from hdopt.workflow.run_folder import RunFolder, finish, run_folder
 from hdopt.workflow.run_verdict import section_of_run
@@ -136,7 +135,7 @@ def run_study(
 
 def work_key(study: Study, seed: int) -> str:
     """What two runs must share for one to go on with the parts of the other: `study`, `seed` and versions."""
-    return f"{study.sha256} {seed} {metadata.version('hdopt')} {platform.python_version()}"
+    return f"{study.sha256} {seed} {own_version()} {platform.python_version()}"
 
 
 def _do(run: RunFolder, name: str, step: Step, study: Study, seed: int, listed: bool) -> StepResult:
