@@ -189,12 +189,6 @@ def test_without_a_drive_model(study):
     assert diagnosis.base.parameters == {}
 
 
-@pytest.mark.slow
-def test_same_seed_same_answer(study, drive):
-    records = bench(study, HIDDEN["output_coupling"], turns=20, rate=60)
-    assert diagnose(records, drive, seed=0).to_dict() == diagnose(records, drive, seed=0).to_dict()
-
-
 def test_the_catalogue_is_complete_and_speaks():
     assert len(EFFECTS) == 16
     for name, effect in EFFECTS.items():

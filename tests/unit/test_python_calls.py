@@ -112,7 +112,8 @@ def recording(tmp_path_factory):
 
 @pytest.mark.slow
 def test_diagnose_from_python_writes_what_the_command_writes(recording, tmp_path):
-    """Verdict, report and written study: byte for byte those of `hdopt diagnose --report --write-study`."""
+    """Verdict, report and written study: byte for byte those of `hdopt diagnose --report --write-study`. Both search by
+    themselves, so the same seed gives the same answer twice."""
     from hdopt.cli import main
 
     files = {"report": tmp_path / "python.html", "study": tmp_path / "python.toml"}
