@@ -24,6 +24,7 @@ from hdopt.geometry.part21 import Part21
 from hdopt.geometry.solids import BUILD_TOLERANCE
 from hdopt.geometry.step import SCHEMAS, Identity, StepFile, StepPart
 from hdopt.geometry.surface import face_points, walls
+from hdopt.words import counted
 
 if TYPE_CHECKING:
     import cadquery as cq
@@ -235,7 +236,8 @@ def interferences(parts: Sequence[StepPart], context: Sequence[Part] = ()) -> li
             pairs = [(first, rings.get(second.name)), (second, rings.get(first.name))]
             inside = sum(_points_inside(part, ring) for part, ring in pairs if ring is not None)
             if inside:
-                found.append(f"{first.name} and {second.name} overlap ({inside} surface points lie in the other)")
+                points = counted(inside, "surface point lies", "surface points lie")
+                found.append(f"{first.name} and {second.name} overlap ({points} in the other)")
             continue
         volume = first.shape.intersect(second.shape).Volume()
         if volume > INTERFERENCE_VOLUME:

@@ -14,6 +14,7 @@ from hdopt.arrays import Array
 from hdopt.errors import HdoptError
 from hdopt.files import cells_of, read_text
 from hdopt.geometry.contour import Circle, Contour
+from hdopt.words import counted
 
 POLAR, CARTESIAN = ("angle_deg", "radius_mm"), ("x_mm", "y_mm")
 FEWEST_POINTS = 16
@@ -82,8 +83,8 @@ def read_cam(path: Path) -> Array:
         cells = cells_of(line)
         if any(cell.strip() for cell in cells[len(header) :]):
             raise HdoptError(
-                f"{path}, line {number}: holds {len(cells)} cells under {len(header)} names; does a decimal comma "
-                "stand where a comma separates? part the cells by semicolons"
+                f"{path}, line {number}: holds {counted(len(cells), 'cell')} under {len(header)} names; does a "
+                "decimal comma stand where a comma separates? part the cells by semicolons"
             )
         try:
             row = [float(cells[column]) for column in columns]
@@ -93,7 +94,7 @@ def read_cam(path: Path) -> Array:
             raise HdoptError(f"{path}, line {number}: holds a number that is not finite; leave the point out")
         values.append(row)
     if len(values) < FEWEST_POINTS:
-        raise HdoptError(f"{path} has {len(values)} points; at least {FEWEST_POINTS} are needed")
+        raise HdoptError(f"{path} has {counted(len(values), 'point')}; at least {FEWEST_POINTS} are needed")
     table = np.array(values)
     if kind is CARTESIAN:
         return table

@@ -8,6 +8,7 @@ from pathlib import Path
 from hdopt.files import JsonReady
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.job import Job
+from hdopt.words import counted
 
 COLUMNS = ("part", "feature", "requirement", "value_mm", "over_mm", "feeds", "takes", "unit")
 
@@ -31,7 +32,7 @@ def check_mating(path: Path, job: Job, name: str) -> JsonReady:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     failures = []
     if len(rows) != len(job.mating):
-        failures.append(f"it has {len(rows)} rows, not {len(job.mating)}")
+        failures.append(f"it has {counted(len(rows), 'row')}, not {len(job.mating)}")
     for error, key in (("axis_eccentricity", "axis_eccentricity_mm"), ("axis_tilt", "axis_tilt_y_deg")):
         spent = sum(float(row["takes"]) for row in rows if row["feeds"] == error and row["takes"])
         if key in job.bounds and not any(spec.get("feeds") == error for spec in job.contributors.values()):

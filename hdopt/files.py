@@ -71,6 +71,8 @@ class FilesOfWork:
     """Real path -> SHA-256 of what was read."""
     outputs: dict[Path, Path] = field(default_factory=dict)
     """Real path -> the name it was given by."""
+    written: list[Path] = field(default_factory=list)
+    """Those of `outputs` that are written, by the names they were given by."""
     began: float = field(default_factory=time.time)
     facts: dict[str, str] = field(default_factory=dict)
     """What else is to be known of the work: its study and that one's hash."""
@@ -448,9 +450,12 @@ def _finish(targets: Sequence[Path], passing: Mapping[Path, Path], reals: Mappin
     for path in targets:
         if path not in files:
             _pass_on(passing[path], path)
+    work = _of_work.get()
     with _signals_wait():
         for path in files:
             os.replace(passing[path], reals[path])
+            if work is not None and reals[path] in work.outputs:
+                work.written.append(work.outputs[reals[path]])
     for folder in dict.fromkeys(reals[path].parent for path in files):
         sync_folder(folder)
 

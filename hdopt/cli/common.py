@@ -14,7 +14,8 @@ import click
 from click.shell_completion import CompletionItem
 
 from hdopt.cli.log import logged
-from hdopt.files import HasTables, claim_output, to_csv, to_json, write_tables, write_text
+from hdopt.files import HasTables, claim_output, files_of_work, to_csv, to_json, write_tables, write_text
+from hdopt.words import without_minus_nought
 
 if TYPE_CHECKING:
     from hdopt.parallel.engine import Engine
@@ -176,9 +177,12 @@ def emit(
     lines: Iterable[str],
     verdict: Verdict | None = None,
     tables: HasTables | None = None,
+    of_files: Mapping[str, str] | None = None,
 ) -> None:
     """Write `result` as JSON where asked, and `lines` for a person unless JSON takes standard output.
 
+    After them every file that the command has written by an option is named, with what `of_files` says of it by its
+    path.
     The verdict, where there is one, is the last line, and `requirement` in the JSON; `provenance` is there always, and
     `defaults` where the command falls back on any.
     `tables` is what --csv and --xlsx take theirs from. Where a file cannot be written, the lines are printed all the
@@ -203,14 +207,21 @@ def emit(
         elif json_file:
             write_text(Path(json_file), to_json(result) + "\n")
     finally:
-        _say(() if alone else lines, () if alone else defaults, None if alone else verdict)
+        if not alone:
+            _say(lines, defaults, verdict, of_files or {})
 
 
-def _say(lines: Iterable[str], defaults: Iterable[str], verdict: Verdict | None) -> None:
+def _say(
+    lines: Iterable[str], defaults: Iterable[str], verdict: Verdict | None, of_files: Mapping[str, str]
+) -> None:
     for line in lines:
-        click.echo(line)
+        click.echo(without_minus_nought(line))
     for said in defaults:
         click.echo(f"default: {said}")
+    work = files_of_work()
+    for path in () if work is None else work.written:
+        said = of_files.get(str(path), "")
+        click.echo(f"wrote {path}" + (f" ({said})" if said else ""))
     if verdict is not None:
         click.echo(verdict.line)
 

@@ -18,6 +18,7 @@ from hdopt.cli.common import (
     set_option,
     table_options,
 )
+from hdopt.words import counted
 
 if TYPE_CHECKING:
     from hdopt.workflow.compare import CompareResult
@@ -73,7 +74,8 @@ def command(cam: str, study: str | None, drive: str | None, overrides: tuple[str
 def _lines(result: CompareResult, study: Path | None, table: Path | None) -> Iterator[str]:
     values = result.to_dict()
     fit, deviation = values["fit"], values["deviation_um"]
-    yield f"{result.study}: {values['points']} points of the {result.part.replace('_', ' ')} ({result.surface})"
+    points = counted(values["points"], "point")
+    yield f"{result.study}: {points} of the {result.part.replace('_', ' ')} ({result.surface})"
     x, y = fit["shift_um"]
     name = fit["method"].replace("_", " ")
     yield f"  best fit ({name}): turned by {fit['rotation_deg']:.4f} deg, moved by ({x:.3f}, {y:.3f}) um"
@@ -87,4 +89,4 @@ def _lines(result: CompareResult, study: Path | None, table: Path | None) -> Ite
         allowed = values["eccentricity_allowed_um"]
         yield f"  off the axis by {values['eccentricity_um']:.3f} um, {word} the {allowed:.4g} um of the tolerances"
     if study is not None:
-        yield f"  wrote {study} and {table}: hdopt ke {study}"
+        yield f"  next: hdopt ke {study}, which reads the cam from {table}"

@@ -10,6 +10,7 @@ import click
 
 from hdopt.cli.common import OutputFile, answer_options, emit, table_options
 from hdopt.cli.recorded import RecordingOptions, recording_options
+from hdopt.words import counted
 
 if TYPE_CHECKING:
     from hdopt.workflow.compensate import Compensated
@@ -86,12 +87,11 @@ def _lines(found: Compensated, output: Path) -> Iterator[str]:
 
         yield homing_words(found.homing)
         yield f"void {VOID}"
-        yield f"written: {output}"
     elif not found.judged:
         yield (
-            f"nothing written: {found.stretches} stretches of an eighth of an output turn are too few to say whether "
-            "that is chance; record three of them at least (more than a quarter of an output turn in all), better two "
-            "output turns"
+            f"nothing written: {counted(found.stretches, 'stretch', 'stretches')} of an eighth of an output turn: "
+            "too few to say whether that is chance; record three of them at least (more than a quarter of an output "
+            "turn in all), better two output turns"
         )
     else:
         yield (

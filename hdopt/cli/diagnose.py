@@ -12,6 +12,7 @@ from hdopt.cli.common import OutputFile, answer_options, engine_option, table_op
 from hdopt.cli.each import EachOptions, each_options, emit_written
 from hdopt.cli.log import looked_at
 from hdopt.cli.recorded import RecordingOptions, recording_options
+from hdopt.words import counted
 
 if TYPE_CHECKING:
     from hdopt.diagnosis.verdict.diagnosis import Diagnosis
@@ -71,7 +72,7 @@ def _one(
 
     source = given.source()
     read = source.recordings(given.recordings)
-    label = f"diagnosis of {len(read)} recording{'s' if len(read) > 1 else ''}"
+    label = f"diagnosis of {counted(len(read), 'recording')}"
     with looked_at(label, DiagnosisWatch(get_ident()).words):
         diagnosis = diagnose(read, source, seed=seed, nuisance=nuisance)
     names = [recording.name for recording in read]

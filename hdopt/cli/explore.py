@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hdopt.cli.common import StudyOptions, answer_options, emit, study_options, table_options
+from hdopt.words import counted
 
 if TYPE_CHECKING:
     from hdopt.workflow.explore import ExploreResult
@@ -35,7 +36,7 @@ def command(asked: StudyOptions, file: str, n: int, json_file: Path | None, seed
 
 
 def _lines(result: ExploreResult) -> Iterator[str]:
-    cloud = f", with a cloud of {result.drives} drives" if result.drives else ""
-    yield f"{result.study}: explorer written to {result.file}{cloud}"
+    cloud = f" with a cloud of {counted(result.drives, 'drive')}" if result.drives else ""
+    yield f"{result.study}: explorer{cloud}"
     for note in result.notes:
         yield f"  note: {note}"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar  # Any: what the command's other 
 import click
 
 from hdopt.cli.common import CHECK, OutputFile, StudyOptions, answer_options, emit, study_options, table_options
+from hdopt.words import settled
 
 if TYPE_CHECKING:
     from hdopt.geometry.export import ExportResult
@@ -92,8 +93,17 @@ def command(
     except CheckFailed as failed:
         print(f"hdopt: {failed}", file=sys.stderr)
         return 1
-    emit(result.to_dict(), json_file, _lines(result), tables=result)
+    emit(result.to_dict(), json_file, _lines(result), tables=result, of_files=_of_files(result))
     return 0 if result.budgets_kept or not click.get_current_context().meta.get(CHECK) else 1
+
+
+def _of_files(result: ExportResult) -> dict[str, str]:
+    """What is said of each of the files, by its path."""
+    instead = {kind: ", in place of an earlier file" for kind in result.to_dict()["replaced"]}
+    return {
+        str(path): f"{kind}, read back and checked{instead.get(kind, '')}"
+        for kind, path in result.to_dict()["files"].items()
+    }
 
 
 def _lines(result: ExportResult) -> Iterator[str]:
@@ -120,9 +130,6 @@ def _lines(result: ExportResult) -> Iterator[str]:
     yield ""
     if result.profile_deviation_um is not None:
         yield f"  profile in the files: within {result.profile_deviation_um:.2g} um of the analytic curve"
-    for kind, path in values["files"].items():
-        instead = ", in place of an earlier file" if kind in values["replaced"] else ""
-        yield f"  wrote and checked {path} ({kind}){instead}"
     if not values["files"]:
         yield "  nothing written: give --step, --dxf, --svg, --cam or another option that names a file"
     for budget in result.model.plan.budgets:
@@ -136,9 +143,8 @@ def _budget_lines(budgets: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for budget in budgets:
         verdict = "kept" if budget["met"] else "NOT KEPT"
         yield ""
-        yield (
-            f"  budget of {budget['of']}: {budget['spent']:.4g} of {budget['allowed']:.4g} {budget['unit']}, {verdict}"
-        )
+        spent, unit = settled(budget["spent"]), budget["unit"]
+        yield f"  budget of {budget['of']}: {spent:.4g} of {budget['allowed']:.4g} {unit}, {verdict}"
         for share in budget["shares"]:
             label = f"{share['feature']}: {share['callout']}"
-            yield f"    {label:72s} {share['takes']:9.4g} {budget['unit']}"
+            yield f"    {label:72s} {settled(share['takes']):9.4g} {unit}"

@@ -13,6 +13,7 @@ import click
 from hdopt.cli.common import OutputFile, answer_options, engine_option, table_options
 from hdopt.cli.each import EachOptions, each_options, emit_written
 from hdopt.cli.recorded import RecordingOptions, recording_options
+from hdopt.words import counted
 
 if TYPE_CHECKING:
     from hdopt.recordings.sheet import Batch, Inspection
@@ -160,8 +161,9 @@ def _lines(found: Inspection) -> Iterator[str]:
     if len(found.one_turn):
         t = found.one_turn
         spread = f"{t.mean():.4g} arcmin mean, {t.min():.4g} to {t.max():.4g}"
-        yield f"peak-to-peak over one input turn: {spread}, {len(t)} turns"
-    yield f"peak-to-peak over the recording ({found.turns:.4g} input turns): {found.recording_peak_to_peak:.4g} arcmin"
+        yield f"peak-to-peak over one input turn: {spread}, {counted(len(t), 'turn')}"
+    turns = counted(f"{found.turns:.4g}", "input turn")
+    yield f"peak-to-peak over the recording ({turns}): {found.recording_peak_to_peak:.4g} arcmin"
     if found.beat is not None:
         b = found.beat
         yield f"peak-to-peak over the full beat ({b.source}): {b.value:.4g} arcmin ({b.low:.4g} to {b.high:.4g})"
@@ -210,6 +212,6 @@ def _batch_lines(batch: Batch) -> Iterator[str]:
             yield f"{drive.name}: peak-to-peak {drive.peak_to_peak:.4g} arcmin ({drive.verdict or 'no limit'}){mark}"
     if batch.performance is not None:
         p = batch.performance
-        yield f"Ppk {p.ppk:.3g} ({p.low:.3g} to {p.high:.3g}), {p.n} drives, limit {batch.limit:g} arcmin"
+        yield f"Ppk {p.ppk:.3g} ({p.low:.3g} to {p.high:.3g}), {counted(p.n, 'drive')}, limit {batch.limit:g} arcmin"
     elif batch.limit is not None:
         yield "Ppk: not known, too few drives (8 at least) or no two that differ"

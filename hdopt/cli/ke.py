@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hdopt.cli.common import StudyOptions, check_option, emit, json_option, status, study_options, table_options
+from hdopt.words import counted
 
 if TYPE_CHECKING:
     from hdopt.workflow.kinematic_error import KinematicErrorResult
@@ -82,6 +83,6 @@ def _lines(result: KinematicErrorResult) -> Iterator[str]:
     for order in large:
         yield f"  {order['symbol']:12s}  {order['amplitude_arcmin']:9.4f}  {order['origin']}"
     if few := len(result.orders) - len(large):
-        yield f"  {few} orders below {NIL_ARCMIN:g} arcmin are left out"
+        yield f"  {counted(few, 'order')} below {NIL_ARCMIN:g} arcmin left out"
     for note in result.notes:
         yield f"  note: {note}"

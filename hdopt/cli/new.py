@@ -26,7 +26,7 @@ def command(name: str, source: str, json_file: Path | None) -> None:
 
     made = new_study(name, source)
     lines = (
-        f"wrote {made.file}, with the numbers of {made.source}: change what differs",
+        f"{made.file} has the numbers of {made.source}, every key explained: change what differs",
         f"next: hdopt check {made.file}",
     )
     emit(made.to_dict(), json_file, lines)

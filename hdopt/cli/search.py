@@ -56,12 +56,8 @@ def _lines(result: SearchResult, study_file: Path | None) -> Iterator[str]:
     from hdopt.optimize.summary import result_lines
 
     yield from result_lines(result)
-    if study_file is not None:
-        yield (
-            f"  wrote {study_file}"
-            if result.feasible
-            else f"  not written, as no design keeps the limits: {study_file}"
-        )
+    if study_file is not None and not result.feasible:
+        yield f"  not written, as no design keeps the limits: {study_file}"
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any  # Any: what the command's other options g
 import click
 
 from hdopt.cli.common import StudyOptions, emit, status, study_options, table_options, watched, work_options
+from hdopt.words import counted
 
 if TYPE_CHECKING:
     from hdopt.study import Study
@@ -64,7 +65,7 @@ def _analysed(
 
 
 def _screened_lines(result: Screening) -> Iterator[str]:
-    yield f"{result.study}: {result.method}, n = {result.n}, {result.evaluations} drives"
+    yield f"{result.study}: {result.method}, n = {result.n}, {counted(result.evaluations, 'drive')}"
     yield f"  {result.says}"
     measures = list(next(iter(result.inputs.values())))
     yield f"  {'':34s} " + " ".join(f"{measure:>19s}" for measure in measures)
@@ -81,7 +82,7 @@ def _span(estimate: IntervalEstimate) -> str:
 def _lines(result: SobolResult) -> Iterator[str]:
     part = result.sobol or result.shapley
     assert part is not None, "a result holds indices, effects, or both"
-    yield f"{result.study}: n = {part.n}, {part.evaluations} drives; {part.interval}"
+    yield f"{result.study}: n = {part.n}, {counted(part.evaluations, 'drive')}; {part.interval}"
     if result.sobol is not None:
         yield f"  {'':34s} {'first order':28s} total"
         for group in (result.sobol.inputs, result.sobol.groups):

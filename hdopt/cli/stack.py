@@ -19,6 +19,7 @@ from hdopt.cli.common import (
     watched,
     work_options,
 )
+from hdopt.words import counted
 
 if TYPE_CHECKING:
     from hdopt.tolerance.intervals import IntervalEstimate
@@ -72,7 +73,7 @@ def _row(label: str, estimate: IntervalEstimate, form: str, unit: str) -> str:
 def _lines(result: StackResult) -> Iterator[str]:
     stack = result.stack
     unit, line = stack.unit, stack.linearisation
-    yield f"{result.study}: {stack.n} drives, {stack.sampling}; limit {stack.limit:g} {unit}"
+    yield f"{result.study}: {counted(stack.n, 'drive')}, {stack.sampling}; limit {stack.limit:g} {unit}"
     yield _row("mean", stack.mean, ".4f", unit)
     yield _row("standard deviation", stack.std, ".4f", unit)
     for q, estimate in stack.quantiles.items():

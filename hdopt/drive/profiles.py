@@ -20,6 +20,7 @@ from hdopt.drive.values import DriveError, require, require_positive
 from hdopt.errors import HdoptError, shown
 from hdopt.files import cells_of, read_text
 from hdopt.keywords import names_keywords
+from hdopt.words import counted
 
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(64)
 
@@ -278,7 +279,7 @@ class MeasuredProfile:
         require(angles.ndim == 1 and angles.shape == radii.shape, f"{where}: angles and radii must be two equal lists")
         require(
             len(angles) >= self.MINIMUM_POINTS,
-            f"{where} has {len(angles)} points; at least {self.MINIMUM_POINTS} are needed",
+            f"{where} has {counted(len(angles), 'point')}; at least {self.MINIMUM_POINTS} are needed",
         )
         require(
             bool(np.all(np.isfinite(angles)) and np.all(np.isfinite(radii)) and np.all(radii > 0)),

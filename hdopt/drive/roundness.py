@@ -12,6 +12,7 @@ from hdopt.arrays import Array
 from hdopt.drive.profiles import read_polar
 from hdopt.drive.values import require
 from hdopt.keywords import names_keywords
+from hdopt.words import counted
 
 EVEN_PLACES = 8192
 """Places of one turn that the measured points are joined on, by a periodic cubic, before they are filtered."""
@@ -106,7 +107,7 @@ def read_roundness(path: Path) -> tuple[Array, Array]:
     A last point that closes the turn is left out. Raises `DriveError` with file and line for a row that is none.
     """
     angles, radii = read_polar(path, "measured roundness")
-    require(len(angles) >= 16, f"measured roundness {path} has {len(angles)} points; at least 16 are needed")
+    require(len(angles) >= 16, f"measured roundness {path} has {counted(len(angles), 'point')}; at least 16 are needed")
     if abs(angles[-1] - angles[0]) == 2 * math.pi:
         angles, radii = angles[:-1], radii[:-1]
     return angles, radii

@@ -11,6 +11,7 @@ from hdopt.optimize.design_space import VARIABLES
 from hdopt.optimize.objectives import QUANTITIES
 from hdopt.optimize.records import DesignRecord, SearchResult
 from hdopt.optimize.region_records import NONE_LEFT, Regions
+from hdopt.words import counted, settled
 
 NOT_MODELLED = (
     "tooth separation under load",
@@ -113,7 +114,7 @@ def region_lines(regions: Regions) -> Iterator[str]:
 
 def number(value: float, unit: str = "") -> str:
     """A `value` to four digits with its `unit`; a large one written out: '35000 h'."""
-    digits = f"{value:.4g}" if abs(value) < 10_000 else f"{value:.0f}"
+    digits = f"{settled(value):.4g}" if abs(value) < 10_000 else f"{value:.0f}"
     return f"{digits} {unit}".strip()
 
 
@@ -126,7 +127,7 @@ def price_line(price: Mapping[str, Any]) -> str:
 def result_lines(result: SearchResult) -> Iterator[str]:
     """A search's `result` in lines for the terminal."""
     best, baseline = result.best, result.baseline
-    yield f"{result.study}: {result.algorithm}; {result.evaluations} designs evaluated"
+    yield f"{result.study}: {result.algorithm}; {counted(result.evaluations, 'design')} evaluated"
     if not result.feasible:
         yield "  no design meets all limits; the nearest is shown, which breaks:"
         for limit in best.broken_limits:
@@ -149,7 +150,7 @@ def result_lines(result: SearchResult) -> Iterator[str]:
         yield f"    {design.name:28s} {design.quantities[result.objective]:9.4f}{state}"
     for front in result.fronts:
         yield (
-            f"  front of {front.objective} and {front.second}: {len(front.designs)} designs, "
+            f"  front of {front.objective} and {front.second}: {counted(len(front.designs), 'design')}, "
             f"hypervolume {front.hypervolume:.4g}"
         )
     if gaps := break_evens(result):
@@ -167,8 +168,8 @@ def result_lines(result: SearchResult) -> Iterator[str]:
 
 
 def _row(title: str, unit: str, value: float, before: float | None) -> str:
-    was = "" if before is None else f"   was {before:9.4g}"
-    return f"    {title:32s} {value:9.4g} {unit:7s}{was}"
+    was = "" if before is None else f"   was {settled(before):9.4g}"
+    return f"    {title:32s} {settled(value):9.4g} {unit:7s}{was}"
 
 
 def design_words(design: DesignRecord) -> str:

@@ -31,6 +31,7 @@ from hdopt.recordings.repairs import (
     restore_whole_turns,
     unwrap_angles,
 )
+from hdopt.words import counted
 
 FEWEST_ROWS = 50
 """Below this nothing can be told apart from the 12 parameters of the base model."""
@@ -59,7 +60,7 @@ def checked_recording(channels: Mapping[str, Array], ratio: float, name: str) ->
     drop_repeated_rows(checks)
     if len(checks) < FEWEST_ROWS:
         checks.refuse(
-            f"{len(checks)} usable rows of {checks.rows_read}; at least {FEWEST_ROWS} are needed, "
+            f"{counted(len(checks), 'usable row')} of {checks.rows_read}; at least {FEWEST_ROWS} are needed, "
             "record longer or sample faster"
         )
     lock_missing_input(checks)
@@ -82,7 +83,8 @@ def checked_recording(channels: Mapping[str, Array], ratio: float, name: str) ->
     error = error_arcmin(checks)
     turns = float(np.ptp(checks.channels["input"])) / TURN
     if 0.02 <= turns < 2:
-        checks.warn(f"the record covers {turns:.2g} input turns; little can be told from less than a few whole turns")
+        covered = counted(f"{turns:.2g}", "input turn")
+        checks.warn(f"the record covers {covered}; little can be told from less than a few whole turns")
     return Recording(
         name=name,
         ratio=ratio,

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError
+from hdopt.words import counted
 
 INSEPARABLE_GROWTH = 3.0
 """Neighbouring orders count as not separable when together they make their errors at least this many times larger."""
@@ -102,7 +103,8 @@ def order_spectrum(theta: ArrayLike, signal: ArrayLike, orders: Sequence[float])
     columns = order_columns(theta, orders)
     if len(theta) <= columns.shape[1]:
         raise HdoptError(
-            f"{len(theta)} samples cannot carry {len(orders)} orders; at least {columns.shape[1] + 1} are needed"
+            f"{counted(len(theta), 'sample')} cannot carry {counted(len(orders), 'order')}; "
+            f"at least {columns.shape[1] + 1} are needed"
         )
     gram = columns.T @ columns
     coefficients = _coefficients(columns, gram, signal)

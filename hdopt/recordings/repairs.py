@@ -15,6 +15,7 @@ from hdopt.arrays import Array, Index
 from hdopt.drive.geometry import ARCMIN
 from hdopt.errors import HdoptError
 from hdopt.recordings.recording import TURN
+from hdopt.words import counted
 
 LARGEST_LOSS = 0.5
 """Refuse a file that loses more than this share of its rows."""
@@ -97,7 +98,7 @@ def drop_incomplete_rows(checks: Checks) -> None:
     lost = int((~good).sum())
     if lost:
         checks.keep(good)
-        checks.warn(f"{lost} rows with missing values dropped")
+        checks.warn(f"{counted(lost, 'row')} with missing values dropped")
     if lost > LARGEST_LOSS * checks.rows_read:
         checks.refuse(f"{lost} of {checks.rows_read} rows hold missing values; more than half is lost")
 
@@ -133,10 +134,12 @@ def order_rows_in_time(checks: Checks) -> None:
     order = np.argsort(time, kind="stable")
     if _travel(checks, np.arange(len(time))) < _travel(checks, order):
         checks.channels["time"] = time[order]
-        checks.warn(f"{int(backward.sum())} time stamps were out of order, the angles were not: the stamps were sorted")
+        stamps = counted(int(backward.sum()), "time stamp was", "time stamps were")
+        checks.warn(f"{stamps} out of order, the angles were not: the stamps were sorted")
         return
     checks.keep(order)
-    checks.warn(f"{int(backward.sum())} rows were out of order in time and have been sorted")
+    rows = counted(int(backward.sum()), "row was", "rows were")
+    checks.warn(f"{rows} out of order in time; sorted")
 
 
 def _travel(checks: Checks, order: NDArray[Any]) -> float:
@@ -161,7 +164,7 @@ def drop_repeated_rows(checks: Checks) -> None:
                 "time is too coarse: write it with more digits, or leave it out of --columns"
             )
         checks.keep(~same)
-        checks.warn(f"{int(same.sum())} repeated rows dropped")
+        checks.warn(f"{counted(int(same.sum()), 'repeated row')} dropped")
 
 
 def lock_missing_input(checks: Checks) -> None:
@@ -201,7 +204,8 @@ def unwrap_angles(checks: Checks) -> None:
                 "the turns cannot be counted: sample faster, or record it unwrapped"
             )
         checks.channels[channel] = np.unwrap(angle, period=TURN)
-        checks.warn(f"the {channel} angle was wrapped to one turn and has been unwrapped at {int(jumps.sum())} places")
+        places = counted(int(jumps.sum()), "place")
+        checks.warn(f"the {channel} angle was wrapped to one turn and has been unwrapped at {places}")
 
 
 def unwrap_counter(checks: Checks, channel: str, angle: Array) -> None:
@@ -218,7 +222,8 @@ def unwrap_counter(checks: Checks, channel: str, angle: Array) -> None:
         return
     checks.channels[channel] = np.unwrap(angle, period=turns * TURN)
     checks.warn(
-        f"the {channel}'s counter runs over after {turns} turns; it has been counted on at {int(jumps.sum())} places"
+        f"the {channel}'s counter runs over after {counted(turns, 'turn')}; it has been counted on at "
+        f"{counted(int(jumps.sum()), 'place')}"
     )
 
 
@@ -235,8 +240,9 @@ def find_gaps(checks: Checks) -> Index:
         # A speed that varies is no gap: only steps far from their neighbours count.
         gaps &= steps > 0.02 * TURN
     if gaps.any():
-        what = f"{steps[gaps].sum():.3g} s" if time is not None else f"{steps[gaps].sum() / TURN:.3g} input turns"
-        checks.warn(f"{int(gaps.sum())} gaps ({what} missing in all); the parts are kept apart")
+        lost = float(steps[gaps].sum())
+        what = f"{lost:.3g} s" if time is not None else counted(f"{lost / TURN:.3g}", "input turn")
+        checks.warn(f"{counted(int(gaps.sum()), 'gap')} ({what} missing in all); the parts are kept apart")
     return np.asarray(np.r_[0, np.cumsum(gaps)], np.int64)
 
 
@@ -256,7 +262,7 @@ def restore_whole_turns(checks: Checks, segment: Index) -> None:
         lost = np.zeros(len(angle))
         lost[starts] = turns * TURN
         checks.channels["input"] = angle - np.cumsum(lost)
-        checks.warn(f"whole input turns lost in {int((turns != 0).sum())} gaps have been put back")
+        checks.warn(f"whole input turns lost in {counted(int((turns != 0).sum()), 'gap')} have been put back")
 
 
 def drop_outliers(checks: Checks, segment: Index) -> Index:
@@ -274,7 +280,8 @@ def drop_outliers(checks: Checks, segment: Index) -> Index:
     spikes = off > max(25 * scale, 1.0)
     if 0 < spikes.mean() <= 0.02:
         checks.keep(~spikes)
-        checks.warn(f"{int(spikes.sum())} samples far from their neighbours (backward jumps, read-out faults) dropped")
+        samples = counted(int(spikes.sum()), "sample")
+        checks.warn(f"{samples} far from their neighbours (backward jumps, read-out faults) dropped")
         kept: Index = segment[~spikes]
         return kept
     return segment

@@ -14,6 +14,7 @@ from hdopt.study.base import Section
 from hdopt.study.document import Document, Keys
 from hdopt.study.nearest import unknown_key
 from hdopt.study.schema import SECTIONS, known_paths, section_model, step_sections
+from hdopt.words import counted
 
 KINDS = {
     "model_type": "a table",
@@ -89,7 +90,7 @@ def _missing_line(paths: Sequence[Keys], document: Document) -> list[str]:
         return [f"{document.where(paths[0])}: is missing; give it"]
     keys = ", ".join(".".join(path) for path in paths)
     whole = "'hdopt new NAME' writes a whole study"
-    return [f"{document.source}: {len(paths)} keys are missing: {keys}; give them ({whole})"]
+    return [f"{document.source}: {counted(len(paths), 'key is', 'keys are')} missing: {keys}; give them ({whole})"]
 
 
 def _path(fault: ErrorDetails, document: Document, section: str) -> Keys:

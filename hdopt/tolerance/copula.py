@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError
+from hdopt.words import counted
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class CorrelationGroup:
         size = len(self.names)
         where = f"the correlation matrix of {', '.join(self.names)}"
         if len(set(self.names)) != size or size < 2:
-            raise HdoptError(f"{where} names {size} inputs; it must name at least two, each once")
+            raise HdoptError(f"{where} names {counted(size, 'input')}; it must name at least two, each once")
         if matrix.shape != (size, size):
             raise HdoptError(f"{where} has shape {matrix.shape}; it must be {size} x {size}")
         if not np.all(np.isfinite(matrix)) or not np.allclose(matrix, matrix.T, atol=1e-12):

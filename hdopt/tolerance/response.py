@@ -9,6 +9,7 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError, NoResult
+from hdopt.words import counted
 
 
 class Response(Protocol):
@@ -47,7 +48,7 @@ def evaluate(response: Response, inputs: Array, names: Sequence[str], where: str
     values = np.asarray(response(inputs), float)
     if values.shape != (len(inputs),):
         raise HdoptError(
-            f"the response gave shape {values.shape} for {len(inputs)} rows; it must give one number a row"
+            f"the response gave shape {values.shape} for {counted(len(inputs), 'row')}; it must give one number a row"
         )
     if not np.isfinite(values.sum()):
         bad = np.flatnonzero(~np.isfinite(values))

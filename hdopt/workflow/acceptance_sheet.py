@@ -20,6 +20,7 @@ from hdopt.recordings.orders import ModelOrder, OrderSpectrum, model_orders, ord
 from hdopt.recordings.recording import TURN, Recording, turns_with_ends
 from hdopt.recordings.sheet import Beat, Inspection, OrderLine
 from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
+from hdopt.words import counted
 from hdopt.workflow.waveform_fit import WaveformFit, fit_waveform
 
 MODEL_LEAVES = 3.0
@@ -68,7 +69,8 @@ def acceptance_sheet(
     if speed_rpm is not None and not 0 < speed_rpm < math.inf:
         raise HdoptError(f"the input speed is {speed_rpm:g} rpm; it must be a finite number above 0")
     if mountings and len(mountings) != len(recordings):
-        raise HdoptError(f"--mounting names {len(mountings)} for {len(recordings)} recordings; name one for each")
+        files = counted(len(recordings), "recording")
+        raise HdoptError(f"--mounting names {len(mountings)} for {files}; name one for each")
     moving = [r for r in recordings if not r.input_locked]
     sweeps = [t for t in map(torsion_of, recordings) if t is not None]
     parts = tuple(figures.cells_of(r) for r in moving)

@@ -22,6 +22,7 @@ from hdopt.study import AnyStudy, Study, as_study
 from hdopt.study.tolerances import RequirementSection, TolerancesBase
 from hdopt.study.write import study_toml
 from hdopt.tolerance.sampling import SAMPLINGS
+from hdopt.words import counted
 from hdopt.workflow.placed import numbers_named
 from hdopt.workflow.stack import drive_problem_of
 from hdopt.workflow.steps.profiles import alternatives
@@ -112,7 +113,7 @@ def explore(
 def explorer_page(study: Study, n: int = CLOUD_N, seed: int = 1) -> ExplorerPage:
     """The explorer of `study`; `n` and `seed` as in `explore`."""
     if not 1 <= n <= MOST_CLOUD:
-        raise HdoptError(f"the cloud has {n} drives; give 1 to {MOST_CLOUD}")
+        raise HdoptError(f"the cloud has {counted(n, 'drive')}; give 1 to {MOST_CLOUD}")
     drive, errors = study.drive, _errors(study)
     _check(drive)
     notes = _notes(study)

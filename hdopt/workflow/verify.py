@@ -14,6 +14,7 @@ from hdopt.errors import HdoptError
 from hdopt.files import ShownAsTable, read_json
 from hdopt.report import REPORT_FILE, RESULTS_FILE
 from hdopt.study import load_study
+from hdopt.words import counted
 from hdopt.workflow.provenance import provenance
 from hdopt.workflow.run import Progress, run_study
 
@@ -158,7 +159,7 @@ def _changes(then: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
 def lines(result: Verification) -> Iterator[str]:
     """The answer `result` in lines for a person."""
     said = "repeated" if result.repeated else "not repeated"
-    yield f"{result.folder}: {said}; {len(result.same)} files the same, {len(result.differing)} differ"
+    yield f"{result.folder}: {said}; {counted(len(result.same), 'file')} the same, {len(result.differing)} differ"
     for name in result.differing:
         yield f"  differs: {name}"
     for place, then, now in result.numbers[:MOST_TOLD]:
@@ -167,6 +168,6 @@ def lines(result: Verification) -> Iterator[str]:
             share = f" ({100 * (now / then - 1):+.3g} %)"
         yield f"  {place}: was {then!r}, is {now!r}{share}"
     if len(result.numbers) > MOST_TOLD:
-        yield f"  and {len(result.numbers) - MOST_TOLD} more numbers"
+        yield f"  and {counted(len(result.numbers) - MOST_TOLD, 'more number')}"
     for change in result.changes:
         yield f"  note: {change}"

@@ -190,7 +190,7 @@ def test_a_study_that_cannot_be_written_leaves_no_table_behind(tmp_path):
         ("angle_deg,radius_mm\n1,nan\n", "line 2: holds a number that is not finite"),
         ("angle_deg,radius_mm\n0,5,28,05\n", "line 2: holds 4 cells under 2 names; does a decimal comma stand"),
         ("angle_deg;radius_mm\n0,5;1.028,05\n", "line 2: does not hold angle_deg and radius_mm as numbers"),
-        ("angle_deg,radius_mm\n1,28\n", "has 1 points; at least 16 are needed"),
+        ("angle_deg,radius_mm\n1,28\n", "has 1 point; at least 16 are needed"),
         (
             "angle_deg,radius_mm\n" + "".join(f"{i},28\n" for i in range(180)),
             "the points leave [0-9]+ deg of the cam out",

@@ -40,7 +40,7 @@ def test_earlier_file_is_replaced_with_a_word(tmp_path, capsys):
         said.append(capsys.readouterr().out)
     first, second = said
     assert "in place of an earlier file" not in first
-    assert f"wrote and checked {target} (dxf), in place of an earlier file" in second
+    assert f"wrote {target} (dxf, read back and checked, in place of an earlier file)" in second
 
 
 WRITER = """

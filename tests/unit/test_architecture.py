@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 LAYERS = [
-    {"arrays", "interruption"},
+    {"arrays", "interruption", "words"},
     {"bench", "errors", "figures", "files", "keywords", "late", "parallel"},
     {"drive"},
     {"effects", "recordings", "kinematics", "mechanics"},
@@ -44,6 +44,7 @@ TOP = {
     "interruption.py",
     "keywords.py",
     "late.py",
+    "words.py",
 }
 
 HEAVY = {"cadquery", "plotly", "cvxpy", "SALib", "openturns", "distributed", "dask", "nlopt", "pymoo", "vtk", "OCP"}

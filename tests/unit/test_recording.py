@@ -118,7 +118,7 @@ def test_mostly_nan_is_refused(table, tmp_path):
 def test_text_among_the_numbers_counts_as_missing(table, tmp_path):
     table = table.astype({"output_angle_deg": object})
     table.loc[5, "output_angle_deg"] = "overrun"
-    assert any("1 rows with missing values" in said for said in read(table, tmp_path).warnings)
+    assert any("1 row with missing values" in said for said in read(table, tmp_path).warnings)
 
 
 def test_repeated_rows_are_dropped(table, tmp_path):
@@ -129,7 +129,7 @@ def test_repeated_rows_are_dropped(table, tmp_path):
 
 def test_gap_starts_a_new_segment(table, tmp_path):
     recording = read(table.drop(index=range(200, 260)), tmp_path)
-    assert "1 gaps" in recording.warnings[0]
+    assert "1 gap" in recording.warnings[0]
     assert recording.segment[-1] == 1
     assert error_is_right(recording)
 

@@ -84,7 +84,7 @@ class Fault:
 
 
 FAULTS = {
-    "gap": Fault(with_gap, "1 gaps"),
+    "gap": Fault(with_gap, "1 gap"),
     "missing rows": Fault(with_rows_missing, ""),
     "repeated rows": Fault(with_rows_repeated, "20 repeated rows dropped"),
     "NaN": Fault(changed("output_angle_deg", slice(100, 109), lambda old: old * np.nan), "10 rows with missing values"),

@@ -23,6 +23,7 @@ import numpy as np
 from hdopt.errors import HdoptError, shown
 from hdopt.recordings.formats.decimals import from_text
 from hdopt.recordings.table import Channel, Table
+from hdopt.words import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -115,7 +116,7 @@ def _left_out(path: Path, layout: Layout, numbers: Sequence[int]) -> str:
     """A sentence on the lines of these `numbers`, from 1, that have too many fields, with the first of them."""
     with _unpacked(path) as stream, io.TextIOWrapper(stream, layout.encoding, "replace") as lines:
         first = next(itertools.islice(lines, numbers[0] - 1, None), "").strip()
-    many = f"{len(numbers)} line{'s' if len(numbers) > 1 else ''} with more fields than the header names left out"
+    many = f"{counted(len(numbers), 'line')} with more fields than the header names left out"
     hint = "; does a decimal comma stand in it?" if layout.separator == "," else ""
     return f"{many}, the first {shown(first)} in line {numbers[0]}{hint}"
 
@@ -128,7 +129,7 @@ def _notes(layout: Layout) -> tuple[str, ...]:
     if layout.units:
         text += ", units in a row of their own"
     if layout.comments:
-        text += f", {layout.comments} lines of comment or preamble left out"
+        text += f", {counted(layout.comments, 'line')} of comment or preamble left out"
     known = set(layout.header)
     repeated = [name for name in layout.header if f"{name}.1" in known]
     if not repeated:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from hdopt.report import Figure, Item, KeyFigures, Report, Section, Table
 from hdopt.report.sections.words import label
 from hdopt.report.theme import BLUE, VERMILLION, figure
+from hdopt.words import counted
 
 if TYPE_CHECKING:
     from hdopt.diagnosis.verdict.many import DiagnosedBatch
@@ -49,7 +50,7 @@ def diagnoses_report(batch: DiagnosedBatch) -> Report:
         frame = pd.DataFrame(failed, columns=["recording", "why"])
         items.append(Table("failed-table", "Recordings that could not be diagnosed", frame))
     section = Section("diagnoses", "Drives", tuple(items), SAYS)
-    return Report("Diagnoses of many drives", f"{len(batch.drives)} recordings", (section,), batch.to_dict())
+    return Report("Diagnoses of many drives", f"{counted(len(batch.drives), 'recording')}", (section,), batch.to_dict())
 
 
 def _left(batch: DiagnosedBatch) -> object:

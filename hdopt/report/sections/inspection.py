@@ -11,6 +11,7 @@ from hdopt.recordings.decision import GUARD, unit_of
 from hdopt.report import Figure, Item, KeyFigures, Report, Ruling, Section, Table, Text
 from hdopt.report.cells import EACH
 from hdopt.report.theme import BLUE, DIVERGING, GREY, INK, VERMILLION, figure
+from hdopt.words import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,7 +72,8 @@ def _summary(found: Inspection) -> Section:
             ]
         )
         items.append(Table("limits", "Limits", frame, DECIDED, {"value": EACH, "limit": EACH, "guard_band": ".2g"}))
-    items.append(Text(f"{found.turns:.4g} input turns of a drive of ratio {found.ratio:g} were recorded."))
+    turns = counted(f"{found.turns:.4g}", "input turn was", "input turns were")
+    items.append(Text(f"{turns} recorded of a drive of ratio {found.ratio:g}."))
     return Section(
         "sheet",
         "Acceptance",
@@ -285,4 +287,4 @@ def batch_report(batch: Batch) -> Report:
         frame = pd.DataFrame(unread, columns=["recording", "why"])
         items = (*items, Table("unread-table", "Recordings that could not be read", frame))
     section = Section("drives", "Drives", items, PPK_SAYS)
-    return Report("Many drives of one type", f"{len(batch.drives)} recordings", (section,))
+    return Report("Many drives of one type", f"{counted(len(batch.drives), 'recording')}", (section,))

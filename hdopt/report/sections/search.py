@@ -29,6 +29,7 @@ from hdopt.report.sections.profiles import profiles_section
 from hdopt.report.sections.regions import region_items
 from hdopt.report.sections.words import in_sentence, label, listed
 from hdopt.report.theme import GREY, INK, PALETTE, PAPER, VERMILLION, faded, figure
+from hdopt.words import counted
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -265,7 +266,7 @@ def front_section(result: SearchResult, front: Front) -> Section:
                 f"{bounds}",
             ),
         ),
-        f"{len(front.designs)} designs that no other beats; hypervolume {front.hypervolume:.4g} "
+        f"{counted(len(front.designs), 'design')} that no other beats; hypervolume {front.hypervolume:.4g} "
         f"(arcmin {x_quantity.unit}) below ({front.reference[0]:.3g}, {front.reference[1]:.3g}).",
     )
 
@@ -350,7 +351,7 @@ def designs_section(result: SearchResult, key: str = "trade-designs") -> Section
                 "wrap angle passes below that axis. Hover for the whole design.",
             ),
         ),
-        f"{len(shown)} designs, the baseline and the chosen one.",
+        f"{counted(len(shown), 'design')}, the baseline and the chosen one.",
     )
 
 
@@ -522,8 +523,8 @@ def confidence_section(result: SearchResult, checked: Verification, key: str = "
             *(region_items(result.best, regions, key) if regions else (Text(NOT_FOLLOWED),)),
             Text(
                 f"First-order optimality holds to {result.optimality_residual:.1e} of the objective's slope. "
-                f"Algorithms: {result.algorithm}; {result.evaluations} designs evaluated, {result.impossible} of them "
-                f"impossible; stopped because: {result.stopped_because}."
+                f"Algorithms: {result.algorithm}; {counted(result.evaluations, 'design')} evaluated, "
+                f"{result.impossible} of them impossible; stopped because: {result.stopped_because}."
             ),
         ),
         f"{said[:1].upper()}{said[1:]}.",

@@ -10,6 +10,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.report import Figure, KeyFigures, Section
 from hdopt.report.theme import BLUE, DIVERGING, GREY, INK, VERMILLION, faded, figure
+from hdopt.words import counted
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -52,11 +53,11 @@ def waveform_section(
             KeyFigures(values),
             Figure(
                 f"{key}-beat",
-                f"The error over {len(turns)} input turns",
+                f"The error over {counted(len(turns), 'input turn')}",
                 _beat(theta, ke_arcmin, peak_to_peak),
                 "Every turn of the wave generator, and the envelope of its peaks. The flexspline falls behind by 1/N "
                 "of a turn each time, so its teeth meet those of the circular spline anew only after "
-                f"{len(turns)} turns.",
+                f"{counted(len(turns), 'turn')}.",
             ),
             Figure(
                 f"{key}-turn",
@@ -153,7 +154,7 @@ def _one_turn(turns: Array, by_turn: Array) -> go.Figure:
         x=np.tile(np.append(angle, np.nan), len(turns)),
         y=np.hstack([turns, np.full((len(turns), 1), np.nan)]).ravel().astype(np.float32),
         mode="lines",
-        name=f"All {len(turns)} turns",
+        name=f"All {counted(len(turns), 'turn')}",
         line={"width": 1, "color": faded(GREY, 0.22)},
         hoverinfo="skip",
     )
