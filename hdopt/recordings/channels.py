@@ -17,6 +17,22 @@ from hdopt.recordings.units import ANGLE_UNITS, CHANNEL_UNITS, DEGREE, TURN, par
 
 ARCSEC = DEGREE / 3600
 OPTIONAL = ("time", "torque", "temperature")
+REACH = {
+    "time": (-1e12, 1e12),
+    "input": (-1e10, 1e10),
+    "output": (-1e10, 1e10),
+    "error": (-1e10, 1e10),
+    "torque": (-1e7, 1e7),
+    "temperature": (-273.15, 1e4),
+}
+"""What a channel can hold, in s, rad, Nm and deg C: 30,000 years, a billion turns, the torque of no machine, and from
+absolute zero to twice what any solid stands."""
+REACH_UNITS = {
+    "time": "s",
+    "torque": "Nm",
+    "temperature": "deg C",
+    **dict.fromkeys(("input", "output", "error"), "rad"),
+}
 NEAR = 0.6
 """Likeness (of 1) from which a name may have been meant."""
 MOST_LISTED = 12
@@ -63,6 +79,8 @@ def mapped_channels(table: Table, columns: Mapping[str, Column], defaults: bool,
     for channel, column in stated.items():
         values[channel], sentence = _converted(channel, column, sources[channel], name)
         said += sentence
+        values[channel], doubt = within_reach(channel, values[channel])
+        doubts += [f"{column.name!r}: {sentence}" for sentence in doubt]
     said.insert(0, "; ".join(_told(channel, column) for channel, column in stated.items()))
     merged, how = on_one_clock(sources, values)
     return Channels(merged, stated, (*table.notes, *said, *how), (*table.doubts, *doubts))
@@ -106,6 +124,22 @@ def _converted(channel: str, column: Column, source: Channel, name: str) -> tupl
     if column.calibration:
         return values - _deviation(raw * unit.factor, column), [f"{channel} is corrected by its calibration"]
     return values, []
+
+
+def within_reach(channel: str, values: Array) -> tuple[Array, list[str]]:
+    """`values` (n,) of a `channel` (s, rad, Nm or deg C) without those that nothing can be, which are NaN; and what is
+    said of them."""
+    low, high = REACH[channel]
+    with np.errstate(invalid="ignore"):
+        beyond = np.isfinite(values) & ((values < low) | (values > high))
+    if not beyond.any():
+        return values, []
+    row = int(beyond.argmax())
+    says = (
+        f"{int(beyond.sum())} of {len(values)} cells hold what no {channel} can be, the first {values[row]:g} "
+        f"{REACH_UNITS[channel]} in row {row + 1} of the numbers"
+    )
+    return np.where(beyond, np.nan, values), [says]
 
 
 def _deviation(reading: Array, column: Column) -> Array:

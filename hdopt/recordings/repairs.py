@@ -97,8 +97,9 @@ def drop_incomplete_rows(checks: Checks) -> None:
     good = np.all([np.isfinite(values) for values in checks.channels.values()], axis=0)
     lost = int((~good).sum())
     if lost:
+        first = int(good.argmin()) + 1
         checks.keep(good)
-        checks.warn(f"{counted(lost, 'row')} with missing values dropped")
+        checks.warn(f"{counted(lost, 'row')} with missing values dropped, the first row {first} of the numbers")
     if lost > LARGEST_LOSS * checks.rows_read:
         checks.refuse(f"{lost} of {checks.rows_read} rows hold missing values; more than half is lost")
 

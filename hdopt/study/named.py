@@ -17,6 +17,9 @@ KEY = re.compile(r"(?<![\w.\-/])[a-z]\w*(?:\.\w+)+|\[(\w+)\](?: (\w+))?")
 COMMON = 100
 """Whole numbers up to this stand in many a message and many a study: they are taken only beside their key's name."""
 
+DIGITS = range(6, 18)
+"""Significant digits with which a message may show a number; what they round to a whole number is another one."""
+
 
 def numbers_in(message: str) -> set[float]:
     """The numbers that stand in `message`, but in its examples; a comma or a full stop that follows is none of them."""
@@ -30,9 +33,8 @@ def shows(message: str, value: Any, name: str) -> bool:
         return False
     if not math.isfinite(value):
         return _speaks_of(name, message) and re.search(rf"(?<!\w){value}\b", message) is not None
-    short = float(f"{value:g}")
-    written = {float(value)} if short.is_integer() else {float(value), short}
-    if not written & numbers_in(message):
+    rounded = {float(f"{value:.{digits}g}") for digits in DIGITS}
+    if not ({float(value)} | {one for one in rounded if not one.is_integer()}) & numbers_in(message):
         return False
     common = float(value).is_integer() and abs(value) <= COMMON
     return not common or _speaks_of(name, message)
