@@ -24,6 +24,8 @@ def held(arguments: list[str], *places: str) -> int:
         except SystemExit as ended:
             status = ended.code
     said = err.getvalue()
+    if status in (130, 143):
+        raise KeyboardInterrupt  # it is the soak that was to end
     assert status in (0, 1, 2), (arguments, status)
     assert "Traceback (most" not in said and "HDOPT_TRACEBACK=1" not in said, said
     assert len(said) <= LONGEST_MESSAGE, said[:200]

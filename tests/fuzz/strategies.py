@@ -171,7 +171,7 @@ def _around_a_number(name: str, path: tuple[str, ...]) -> list[str]:
 @st.composite
 def _one_number(draw) -> tuple[str, list[str]]:
     """A shipped study with one of its numbers far off, each allowed by itself, and a command that computes with it."""
-    name = draw(st.sampled_from(sorted(STUDIES)))
+    name = draw(st.sampled_from(["csf-25-80-tolerances"] * 3 + ["chase-shaft-housing"]))
     path = draw(st.sampled_from(PLACES[name]))
     value = draw(st.one_of(st.sampled_from(MAGNITUDES), st.floats(-308, 308).map(lambda decades: 10.0**decades)))
     before, after = _around_a_number(name, path)

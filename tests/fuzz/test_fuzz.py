@@ -59,3 +59,18 @@ def test_a_soak_goes_on_and_its_page_says_what_was_done(tmp_path, monkeypatch):
     page = soak.renewed(f"before\n{soak.START}\nold\n{soak.END}\nafter", kept)
     assert page.startswith("before") and page.endswith("after") and "old" not in page
     assert f"| any | {kept['kinds']['any']['inputs']} | {kept['kinds']['any']['failures']} |" in page
+
+
+def test_a_soak_ends_where_it_is_interrupted(tmp_path, monkeypatch):
+    """Would catch an interruption that comes while a command runs, which ends the command with 130, counted as a
+    failure of the command while the soak goes on."""
+
+    def interrupted(arguments):
+        raise SystemExit(130)
+
+    monkeypatch.setattr("tests.fuzz.rule.main", interrupted)
+    state = soak.opened(tmp_path, 1)
+    with pytest.raises(KeyboardInterrupt):
+        soak.soak(state, tmp_path, 100, 1e9)
+    assert all(done["failures"] == 0 for done in state["kinds"].values())
+    assert not list((tmp_path / "failures").iterdir())
