@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hdopt.cli.common import StudyOptions, emit, status, study_options, table_options, work_options
+from hdopt.cli.completion import offered, rules
 from hdopt.cli.log import looked_at
 
 if TYPE_CHECKING:
@@ -20,7 +21,12 @@ if TYPE_CHECKING:
 @click.command()
 @table_options
 @study_options
-@click.option("--rule", metavar="RULE", help="worst_case, rss or yield; the study's own if omitted.")
+@click.option(
+    "--rule",
+    metavar="RULE",
+    shell_complete=offered(rules),
+    help="worst_case, rss or yield; the study's own if omitted.",
+)
 @click.option("--compare/--no-compare", default=None, help="Also the other rules, in one table.")
 @work_options
 def command(asked: StudyOptions, rule: str | None, compare: bool | None, json_file: Path | None, seed: int) -> int:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hdopt.cli.common import emit, json_option, table_options
+from hdopt.cli.completion import offered, studies
 
 if TYPE_CHECKING:
     from hdopt.workflow.check_study import StudyCheck
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @table_options
-@click.argument("study", metavar="FILE")
+@click.argument("study", metavar="FILE", shell_complete=offered(studies, files=True))
 @json_option
 def command(study: str, json_file: Path | None) -> int:
     """What can be computed from FILE, a study file or a shipped study, and which keys are missing for the rest.

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar  # Any: values of JSON; what the 
 import click
 from click.shell_completion import CompletionItem
 
+from hdopt.cli.completion import a_file, drives, engines, offered, studies
 from hdopt.cli.log import logged
 from hdopt.files import HasTables, claim_output, files_of_work, to_csv, to_json, write_tables, write_text
 from hdopt.words import without_minus_nought
@@ -36,6 +37,9 @@ class OutputFile(click.ParamType):  # type: ignore[type-arg]  # generic in newer
         if str(value) != "-":
             claim_output(path)
         return path
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        return a_file(ctx, param, incomplete)
 
 
 json_option = click.option(
@@ -91,18 +95,10 @@ seed_option = click.option(
 set_option = click.option(
     "--set", "overrides", metavar="KEY=VALUE", multiple=True, help="Change a key of the study; may be repeated."
 )
-drive_option = click.option("--drive", metavar="NAME", help="A shipped drive, by name.")
+drive_option = click.option("--drive", metavar="NAME", shell_complete=offered(drives), help="A shipped drive, by name.")
 
 
-def _studies(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """What the shell offers for STUDY: shipped names, else files."""
-    from hdopt.study import shipped_studies
-
-    names = [CompletionItem(name) for name in shipped_studies() if name.startswith(incomplete)]
-    return names or [CompletionItem(incomplete, type="file")]
-
-
-study_argument = click.argument("study", required=False, metavar="[STUDY]", shell_complete=_studies)
+study_argument = click.argument("study", required=False, metavar="[STUDY]", shell_complete=offered(studies, files=True))
 check_option = click.option(
     "--check",
     is_flag=True,
@@ -211,9 +207,7 @@ def emit(
             _say(lines, defaults, verdict, of_files or {})
 
 
-def _say(
-    lines: Iterable[str], defaults: Iterable[str], verdict: Verdict | None, of_files: Mapping[str, str]
-) -> None:
+def _say(lines: Iterable[str], defaults: Iterable[str], verdict: Verdict | None, of_files: Mapping[str, str]) -> None:
     for line in lines:
         click.echo(without_minus_nought(line))
     for said in defaults:
@@ -259,6 +253,7 @@ def _put_in_force(ctx: click.Context, parameter: click.Parameter, name: str | No
 engine_option = click.option(
     "--engine",
     metavar="ENGINE",
+    shell_complete=offered(engines),
     callback=_put_in_force,
     expose_value=False,
     help="What does the work: process, threads[:N], processes[:N] or dask://HOST:PORT; threads if omitted.",

@@ -18,6 +18,7 @@ from hdopt.cli.common import (
     set_option,
     table_options,
 )
+from hdopt.cli.completion import a_file, offered, studies
 from hdopt.words import counted
 
 if TYPE_CHECKING:
@@ -26,8 +27,13 @@ if TYPE_CHECKING:
 
 @click.command()
 @table_options
-@click.argument("cam", metavar="CAM.csv")
-@click.option("--study", metavar="STUDY", help="A study file or a shipped study; the shipped drive if omitted.")
+@click.argument("cam", metavar="CAM.csv", shell_complete=a_file)
+@click.option(
+    "--study",
+    metavar="STUDY",
+    shell_complete=offered(studies, files=True),
+    help="A study file or a shipped study; the shipped drive if omitted.",
+)
 @drive_option
 @set_option
 @click.option(
@@ -40,7 +46,12 @@ if TYPE_CHECKING:
     show_default=True,
     help="What was measured: the cam itself, or the outside of the bearing on it.",
 )
-@click.option("--part", metavar="NAME", help="disc_1 or disc_2 of a two-disk wave generator.")
+@click.option(
+    "--part",
+    metavar="NAME",
+    shell_complete=offered(lambda: ("disc_1", "disc_2")),
+    help="disc_1 or disc_2 of a two-disk wave generator.",
+)
 @click.option(
     "--fit",
     type=click.Choice(["least_squares", "minimum_zone"]),

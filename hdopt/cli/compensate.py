@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any  # Any: what click hands over
 
 import click
+from click.shell_completion import CompletionItem
 
 from hdopt.cli.common import OutputFile, answer_options, emit, table_options
+from hdopt.cli.completion import offered
 from hdopt.cli.recorded import RecordingOptions, recording_options
 from hdopt.words import counted
 
@@ -28,6 +30,9 @@ class Terms(click.ParamType):  # type: ignore[type-arg]  # generic in newer Clic
             return int(value)
         except ValueError:
             self.fail(f"{value!r} is neither a whole number nor auto", parameter, context)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        return offered(lambda: ("auto",))(ctx, param, incomplete)
 
 
 @click.command()

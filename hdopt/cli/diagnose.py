@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hdopt.cli.common import OutputFile, answer_options, engine_option, table_options
+from hdopt.cli.completion import nuisances, several
 from hdopt.cli.each import EachOptions, each_options, emit_written
 from hdopt.cli.log import looked_at
 from hdopt.cli.recorded import RecordingOptions, recording_options
@@ -26,7 +27,11 @@ MOST_LISTED = 12
 @table_options
 @recording_options
 @click.option(
-    "--nuisance", metavar="NAME,...", default="", help="Fit beside every model, and never name: drift, time-warp."
+    "--nuisance",
+    metavar="NAME,...",
+    default="",
+    shell_complete=several(nuisances),
+    help="Fit beside every model, and never name: drift, time-warp.",
 )
 @click.option("--report", "report_file", metavar="FILE", type=OutputFile(), help="Write an HTML report.")
 @click.option(

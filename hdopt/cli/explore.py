@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hdopt.cli.common import StudyOptions, answer_options, emit, study_options, table_options
+from hdopt.cli.completion import a_file
 from hdopt.words import counted
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 @click.command()
 @study_options
 @click.option("-o", "--output", "file", metavar="FILE", default="explorer.html", show_default=True,
-              help="The page to write.")  # fmt: skip
+              shell_complete=a_file, help="The page to write.")  # fmt: skip
 @click.option("-n", "n", type=click.IntRange(1, 100_000), default=2048, show_default=True, help="Drives of the cloud.")
 @table_options
 @answer_options

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar  # Any: what the command's other 
 import click
 
 from hdopt.cli.common import CHECK, OutputFile, StudyOptions, answer_options, emit, study_options, table_options
+from hdopt.cli.completion import a_file, offered, structures
 from hdopt.words import settled
 
 if TYPE_CHECKING:
@@ -53,7 +54,12 @@ def file_options(command: Callable[..., R]) -> Callable[..., R]:
 @click.command()
 @table_options
 @study_options
-@click.option("--structure", metavar="S", help="integral, automatic, one_way_major or one_way_minor.")
+@click.option(
+    "--structure",
+    metavar="S",
+    shell_complete=offered(structures),
+    help="integral, automatic, one_way_major or one_way_minor.",
+)
 @file_options
 @click.option("--context", is_flag=True, help="With bearing races, flexspline ring and circular spline.")
 @click.option(
@@ -63,7 +69,12 @@ def file_options(command: Callable[..., R]) -> Callable[..., R]:
     callback=lambda ctx, parameter, value: ctx.meta.__setitem__(CHECK, value),
     help="End with status 1 where a budget is not kept.",
 )
-@click.option("--allocation", metavar="FILE", help="Tolerances from the JSON that `hdopt allocate` wrote.")
+@click.option(
+    "--allocation",
+    metavar="FILE",
+    shell_complete=a_file,
+    help="Tolerances from the JSON that `hdopt allocate` wrote.",
+)
 @answer_options
 def command(
     asked: StudyOptions,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hdopt.cli.common import StudyOptions, check_option, emit, json_option, status, study_options, table_options
+from hdopt.cli.completion import geometries, offered, structures, unhyphened
 from hdopt.words import counted
 
 if TYPE_CHECKING:
@@ -18,11 +19,22 @@ if TYPE_CHECKING:
 @click.command()
 @table_options
 @study_options
-@click.option("--structure", metavar="S", help="integral, automatic, one_way_major or one_way_minor.")
+@click.option(
+    "--structure",
+    metavar="S",
+    shell_complete=offered(structures),
+    help="integral, automatic, one_way_major or one_way_minor.",
+)
 @click.option("--sampling-deg", type=float, help="Also take the peak-to-peak only on this grid, from 0.")
 @click.option("--turns", type=float, help="Input turns of that grid; one full relative turn if omitted.")
 @check_option
-@click.option("--method", default="exact", help="exact (the default) or 'closed form', to second order in the errors.")
+@click.option(
+    "--method",
+    default="exact",
+    shell_complete=offered(geometries),
+    callback=unhyphened,
+    help="exact (the default) or closed-form, to second order in the errors.",
+)
 @json_option
 @click.option(
     "--seed",

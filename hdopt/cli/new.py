@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from hdopt.cli.common import emit, json_option
+from hdopt.cli.completion import offered, studies_and_drives
 
 
 @click.command()
@@ -17,6 +18,7 @@ from hdopt.cli.common import emit, json_option
     metavar="STUDY",
     default="csf-25-80",
     show_default=True,
+    shell_complete=offered(studies_and_drives, files=True),
     help="Whose numbers it gets: a shipped drive or study, or a study file.",
 )
 @json_option

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hdopt.cli.common import StudyOptions, answer_options, emit, study_options, table_options
+from hdopt.cli.completion import offered, profiles
 
 if TYPE_CHECKING:
     from hdopt.workflow.kinematic_error import ProfileResult
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 @click.command()
 @table_options
 @study_options
-@click.option("--profile", metavar="P", help="ellipse, resal, two_disk or measured.")
+@click.option("--profile", metavar="P", shell_complete=offered(profiles), help="ellipse, resal, two_disk or measured.")
 @answer_options
 def command(asked: StudyOptions, profile: str | None, json_file: Path | None, seed: int) -> None:
     """The wave generator's profile: contact angle, curvature change, bending stress.

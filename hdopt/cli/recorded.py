@@ -12,6 +12,7 @@ import click
 from click.core import ParameterSource
 
 from hdopt.cli.common import DEFAULTS
+from hdopt.cli.completion import offered, recorded
 
 if TYPE_CHECKING:
     from hdopt.workflow.recorded_drive import RecordedDrive
@@ -70,7 +71,12 @@ def recording_options(command: Callable[..., R]) -> Callable[..., R]:
     options = (
         click.argument("recordings", nargs=-1, required=True, metavar="REC...", type=click.Path(path_type=Path)),
         click.option(
-            "--drive", metavar="NAME|STUDY|none", default="csf-25-80", show_default=True, help="The drive recorded."
+            "--drive",
+            metavar="NAME|STUDY|none",
+            default="csf-25-80",
+            show_default=True,
+            shell_complete=offered(recorded, files=True),
+            help="The drive recorded.",
         ),
         click.option("--ratio", type=float, help="Reduction ratio, with --drive none."),
         click.option(

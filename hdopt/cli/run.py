@@ -17,6 +17,7 @@ from hdopt.cli.common import (
     table_options,
     work_options,
 )
+from hdopt.cli.completion import a_folder
 from hdopt.cli.log import looked_at
 
 if TYPE_CHECKING:
@@ -25,7 +26,14 @@ if TYPE_CHECKING:
 
 @click.command()
 @study_options
-@click.option("-o", "--output", "folder", metavar="DIR", help="Folder to write to; out/STUDY if omitted.")
+@click.option(
+    "-o",
+    "--output",
+    "folder",
+    metavar="DIR",
+    shell_complete=a_folder,
+    help="Folder to write to; out/STUDY if omitted.",
+)
 @resume_option
 @click.option("--verify", is_flag=True, help="Do the run in the folder STUDY (or -o DIR) again and compare every file.")
 @table_options

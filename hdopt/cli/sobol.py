@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any  # Any: what the command's other options g
 import click
 
 from hdopt.cli.common import StudyOptions, emit, status, study_options, table_options, watched, work_options
+from hdopt.cli.completion import offered, sensitivity_methods
 from hdopt.words import counted
 
 if TYPE_CHECKING:
@@ -25,12 +26,18 @@ if TYPE_CHECKING:
 @click.option(
     "--method",
     metavar="METHOD",
+    shell_complete=offered(sensitivity_methods),
     default="sobol",
     show_default=True,
     help="sobol, or by SALib: morris, delta, pawn, rbd_fast, dgsm.",
 )
 @click.option("--no-second-order", is_flag=True, help="Leave out the indices of pairs.")
-@click.option("--shapley", metavar="PLAYERS", help="Also Shapley effects of 'inputs' or 'groups'.")
+@click.option(
+    "--shapley",
+    metavar="PLAYERS",
+    shell_complete=offered(lambda: ("inputs", "groups")),
+    help="Also Shapley effects of 'inputs' or 'groups'.",
+)
 @work_options
 def command(asked: StudyOptions, json_file: Path | None, seed: int, **options: Any) -> int:
     """Which tolerances matter: Sobol' indices with 95 % intervals, Shapley effects where inputs are correlated.

@@ -19,6 +19,7 @@ from hdopt.cli.common import (
     watched,
     work_options,
 )
+from hdopt.cli.completion import offered, samplings, stack_geometries, unhyphened
 from hdopt.words import counted
 
 if TYPE_CHECKING:
@@ -38,14 +39,17 @@ if TYPE_CHECKING:
     default="sobol",
     metavar="KIND",
     show_default=True,
+    shell_complete=offered(samplings),
     help="'sobol', 16 scramblings, or 'monte-carlo', independent points.",
 )
 @click.option(
     "--geometry",
-    default="closed form",
+    default="closed-form",
     metavar="KIND",
     show_default=True,
-    help="Of the sampled drives: 'closed form', 'exact' for up to 4096, or 'auto', exact where the former errs.",
+    shell_complete=offered(stack_geometries),
+    callback=unhyphened,
+    help="Of the sampled drives: 'closed-form', 'exact' for up to 4096, or 'auto', exact where the former errs.",
 )
 @resume_option
 @work_options
