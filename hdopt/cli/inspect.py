@@ -140,7 +140,8 @@ def _one(given: RecordingOptions, asked: SheetOptions, json_file: Path | None, s
         seed=seed,
     )
     files, names = asked.files, given.recordings
-    emit_written(found, json_file, _lines(found), lambda: write_inspection(found, files, names, source))
+    lines = _lines(found, given.drive == "none")
+    emit_written(found, json_file, lines, lambda: write_inspection(found, files, names, source))
     return found.missed
 
 
@@ -153,7 +154,7 @@ def _each(given: RecordingOptions, asked: SheetOptions, json_file: Path | None, 
     return batch.missed
 
 
-def _lines(found: Inspection) -> Iterator[str]:
+def _lines(found: Inspection, no_drive: bool) -> Iterator[str]:
     from hdopt.recordings.decision import verdict_line
 
     for said in found.understood:
@@ -169,7 +170,8 @@ def _lines(found: Inspection) -> Iterator[str]:
         yield f"peak-to-peak over the full beat ({b.source}): {b.value:.4g} arcmin ({b.low:.4g} to {b.high:.4g})"
         yield "  this is what a maker's angular transmission accuracy means: one output turn, one direction"
     else:
-        yield "peak-to-peak over the full beat: not known; record a whole output turn, or a quarter of one with --drive"
+        how = " with --drive" if no_drive else ""
+        yield f"peak-to-peak over the full beat: not known; record a whole output turn, or a quarter of one{how}"
     yield f"rms: {found.rms:.4g} arcmin; steepest slope: {found.slope_per_deg:.4g} arcmin per deg of input" + (
         f", {found.slope_arcsec_per_s:.4g} arcsec/s" if found.slope_arcsec_per_s is not None else ""
     )

@@ -82,17 +82,41 @@ def _least_width(column: Column) -> int:
 
 EACH = "each"
 """Instead of a format spec: four significant digits for each number by itself, where a column mixes quantities."""
+ROW = "row"
+"""Instead of a format spec: as `EACH`, but a row of such columns to one decimal place, as a value and its interval."""
 NAMES = "names"
 """Instead of a format spec: the column holds study keys, which are written in words."""
 
 
 def columns(frame: pd.DataFrame, formats: Mapping[str, str] | None = None) -> list[Column]:
     """The columns of `frame` as they are read, its index first where that has a meaning; `formats` maps a column's name
-    to a format spec such as '.3f', `EACH` or `NAMES`; the others show four significant digits, aligned."""
+    to a format spec such as '.3f', `EACH`, `ROW` or `NAMES`; the others show four significant digits, aligned."""
     if index_has_meaning(frame):
         frame = frame.reset_index()
     formats = formats or {}
-    return [_column(str(name), frame.iloc[:, i].tolist(), formats.get(name)) for i, name in enumerate(frame.columns)]
+    beside = [name for name in frame.columns if formats.get(name) == ROW]
+    rows = [_row_writer(row) for row in frame[beside].itertuples(index=False)] if beside else []
+    return [
+        _column_of_rows(str(name), frame.iloc[:, i].tolist(), rows)
+        if name in beside
+        else _column(str(name), frame.iloc[:, i].tolist(), formats.get(name))
+        for i, name in enumerate(frame.columns)
+    ]
+
+
+def _row_writer(row: Sequence[Any]) -> Callable[[float], str]:
+    """How the numbers of one `row` that belong together are written: to one decimal place."""
+    largest = max((abs(value) for value in row if _is_number(value)), default=0.0)
+    if not 1e-3 <= largest < 10**SIGNIFICANT_DIGITS - 0.5:
+        return significant
+    decimals = max(0, SIGNIFICANT_DIGITS - 1 - math.floor(math.log10(largest)))
+    return lambda value: f"{value:.{decimals}f}"
+
+
+def _column_of_rows(name: str, values: Sequence[Any], writers: Sequence[Callable[[float], str]]) -> Column:
+    title, unit = heading(name)
+    cells = tuple(_cell(value, write) for value, write in zip(values, writers, strict=True))
+    return Column(title, unit, "number", cells)
 
 
 def in_words(name: str) -> str:

@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -185,6 +186,25 @@ def test_the_sheet_begins_with_its_verdicts():
     assert "slipped counts" in html and "<td>peak_to_peak" not in html
 
 
+@pytest.mark.parametrize(
+    ("ways", "said"),
+    [((1.0, 1.0), "all of it turned forward"), ((-1.0, -1.0), "all of it turned backward"), ((1.0, -1.0), "colours")],
+)
+def test_the_first_figure_speaks_of_the_directions_that_were_recorded(ways, said):
+    """Would catch the colours of two directions promised beside a recording of one."""
+    from hdopt.recordings.figures import Cells
+    from hdopt.report.sections import inspection
+
+    n = 16
+    angle, zero = np.linspace(0.0, 2 * np.pi, 2 * n), np.zeros(2 * n)
+    half = np.repeat([0, 1], n)
+    cells = Cells(angle, np.sin(angle), zero, np.repeat(ways, n), half, np.arange(2 * n), 0.1, 0.0)
+    found = SimpleNamespace(cells=[cells], returned=None)
+    figure = inspection._waveform(found).items[0]
+    assert figure.caption.endswith(f"{said}.")
+    assert len(figure.figure.data) == len(set(ways))
+
+
 def test_torsion_of_a_known_spring():
     """K1 3e4, K2 5e4, K3 6e4 Nm/rad, knees 14 and 48 Nm, a loop of 0.8 arcmin."""
     torque = np.r_[np.linspace(0, 80, 400), np.linspace(80, -80, 800), np.linspace(-80, 80, 800)]
@@ -288,6 +308,20 @@ def test_command_writes_json_csv_report_and_bench(tmp_path, capsys):
     capsys.readouterr()
     assert run("inspect", path, "--drive", "none", "--bench", files["toml"]) == 0
     assert "input_angle_deg" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("drive", "asks"), [("csf-25-80", False), ("none", True)])
+def test_a_beat_not_known_asks_for_a_drive_only_where_none_was_given(drive, asks, tmp_path, capsys):
+    angle = np.linspace(0.0, 4 * np.pi, 4000)
+    error = np.radians(np.sin(2 * angle) / 60)
+    file = tmp_path / "short.csv"
+    pd.DataFrame({"input_angle_rad": angle, "output_angle_rad": angle / 80 + error}).to_csv(file, index=False)
+    options = ["--drive", drive, *(["--ratio", "80"] if asks else [])]
+    with pytest.raises(SystemExit):
+        main(["inspect", str(file), *options])
+    said = capsys.readouterr().out
+    assert "full beat: not known; record a whole output turn, or a quarter of one" in said
+    assert ("with --drive" in said) == asks
 
 
 def test_many_drives_name_the_outlier(tmp_path, capsys):

@@ -14,7 +14,7 @@ import pytest
 
 from hdopt.errors import HdoptError
 from hdopt.report import Download, Figure, KeyFigures, Points, Report, Ruling, Section, Table, Text, theme
-from hdopt.report.cells import EACH, columns, heading, stacks
+from hdopt.report.cells import EACH, ROW, columns, heading, stacks
 from hdopt.report.html import ROWS_SHOWN, render, write_report
 from hdopt.report.numbers import figure_frame
 
@@ -185,6 +185,14 @@ def test_a_column_of_several_quantities_shows_four_digits_of_each():
     frame = pd.DataFrame({"value": [0.643658, 11871.34, -2.5, 9999.96, 1e-5]})
     (column,) = columns(frame, {"value": EACH})
     assert column.cells == ("0.6437", "11871", "−2.5", "10000", "1e-05")
+
+
+def test_a_value_and_its_interval_have_one_number_of_decimals():
+    """Would catch 1.085 (1.08 to 1.091): trailing noughts dropped from an interval that is known to that place."""
+    frame = pd.DataFrame({"value": [1.0851, 11875.2], "low": [1.07999, 11539.0], "high": [1.091, None]})
+    value, low, high = columns(frame, {"value": ROW, "low": ROW, "high": ROW})
+    assert [value.cells[0], low.cells[0], high.cells[0]] == ["1.085", "1.080", "1.091"]
+    assert [value.cells[1], low.cells[1]] == ["11875", "11539"]
 
 
 def test_sentences_in_a_table_get_some_width():

@@ -99,15 +99,16 @@ def _ruling(decision: Decision) -> Ruling:
     return Ruling(decision.met, f"{name}{note} {abs(decision.value):.4g} {unit}, at most {allowed}: {by}.")
 
 
+WAYS = ((1.0, BLUE, "forward"), (-1.0, VERMILLION, "backward"))
+"""Direction of a pass, its colour and its name."""
+
+
 def _waveform(found: Inspection) -> Section:
     cells = max(found.cells, key=lambda c: len(c.error))
+    ways = [name for direction, _, name in WAYS if (cells.direction == direction).any()]
+    said = "forward and backward in their colours" if len(ways) > 1 else f"all of it turned {ways[0]}"
     items: list[Item] = [
-        Figure(
-            "waveform",
-            "The error as recorded",
-            _line(cells),
-            "Means over cells of the input angle; forward and backward in their colours.",
-        )
+        Figure("waveform", "The error as recorded", _line(cells), f"Means over cells of the input angle; {said}.")
     ]
     if (carpet := _carpet(cells)) is not None:
         items.append(
@@ -132,7 +133,7 @@ def _waveform(found: Inspection) -> Section:
 def _line(cells: Cells) -> Any:
     made = figure("Input angle (turns)", "Error (arcmin)", 320)
     middle = float(np.mean(cells.error))
-    for direction, colour, name in ((1.0, BLUE, "forward"), (-1.0, VERMILLION, "backward")):
+    for direction, colour, name in WAYS:
         x: list[float] = []
         y: list[float] = []
         for index in np.unique(cells.pass_index[cells.direction == direction]):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any  # Any: Plotly's dictionaries and traces, 
 import numpy as np
 
 from hdopt.report import Figure, Item, KeyFigures, Section, Table, Text
-from hdopt.report.cells import EACH, NAMES, in_words
+from hdopt.report.cells import EACH, NAMES, ROW, in_words, minus
 from hdopt.report.sections.words import in_sentence, listed, percent
 from hdopt.report.theme import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, faded, figure
 
@@ -66,7 +66,7 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
                 f"{key}-figures",
                 "The distribution in numbers, with 95 % intervals",
                 stack.to_frame().reset_index(),
-                formats=dict.fromkeys(("value", "low", "high"), EACH),
+                formats=dict.fromkeys(("value", "low", "high"), ROW),
             ),
             Figure(
                 f"{key}-contributions",
@@ -74,7 +74,8 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
                 _contributions(shares),
                 f"Linearised where {what} are: magnitudes and absolute tilts at their mean, directions and phases "
                 f"averaged. The line's spread is {line.std:.4g} {unit}, the real one {stack.std.value:.4g} {unit}; its "
-                f"root-sum-square value at the required yield is off by {stack.rss - quantile.value:+.4g} {unit}.",
+                f"root-sum-square value at the required yield is "
+                f"{_off(stack.rss - quantile.value)} {unit} off.",
             ),
             Table(
                 f"{key}-contributions-table",
@@ -88,6 +89,11 @@ def stack_section(result: StackResult, key: str = "stack") -> Section:
         f"As toleranced the {what} {verdict} the requirement: {percent(conforming.value)} stay within "
         f"{stack.limit:g} {unit}, {percent(stack.required_yield)} must. Most comes from {listed(most)}.",
     )
+
+
+def _off(difference: float) -> str:
+    """A `difference` with its sign, to three digits."""
+    return minus(f"{difference:+.3g}")
 
 
 def _stack_figures(result: StackResult) -> dict[str, str]:

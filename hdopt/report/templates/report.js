@@ -1,7 +1,7 @@
 "use strict";
 (() => {
   const PRINT_WIDTH = 660; // px: fits A4 and Letter within the margins of the print style
-  const printHeight = (height) => Math.round(height * (height > 460 ? 0.9 : 0.76)); // tall ones need their rows
+  const printHeight = (height) => Math.round(height * (height > 460 ? 0.8 : 0.68)); // tall ones need their rows
   const PRINT_TYPE = 0.8; // size of a table's type in print against that on the screen, a little above the style's
   const LEGEND_LINE = 17; // px
   const NARROW = 520; // px: below it a figure takes smaller type and leaves dragging to the page
