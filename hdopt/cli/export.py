@@ -140,7 +140,9 @@ def _lines(result: ExportResult) -> Iterator[str]:
         yield f"  note: {note}"
     yield ""
     if result.profile_deviation_um is not None:
-        yield f"  profile in the files: within {result.profile_deviation_um:.2g} um of the analytic curve"
+        off = settled(result.profile_deviation_um)
+        within = f"within {off:.2g} um of" if off else "to rounding"
+        yield f"  profile in the files: {within} the analytic curve"
     if not values["files"]:
         yield "  nothing written: give --step, --dxf, --svg, --cam or another option that names a file"
     for budget in result.model.plan.budgets:
