@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from hdopt.arrays import Array, Index, Mask
+from hdopt.compensation.fine import LEAST_TURNS
 from hdopt.compensation.mesh import ROWS_PER_TOOTH, fit_mesh, formed_mesh, shows_mesh
 from hdopt.compensation.path import Paths, crossing_of, half_return, path_of, some_of
 from hdopt.compensation.pursuit import dictionary, independent_share, pursue
@@ -30,6 +31,10 @@ PLAIN_SIGN = 2.0
 """How many times as much the wrong sign of the error must leave for the sign to be plain."""
 ROWS_PER_TURN, MOST_ROWS = 128, 40_000
 """Rows an input turn that show single teeth, and how many rows there may be for their sake."""
+OUTPUT_WAVES = (1, 2)
+"""Waves over the output's turn that a coupling, an encoder's disc or a load that hangs on the output may add."""
+FALLS = 0.9
+"""Part of what the model leaves that may be left beside those waves for a fit with them: less is no reason for one."""
 MEETS_AGAIN = 0.8
 """Share of the stretches that a pass back, or another recording, must reach over to have met them too."""
 BOTH_WAYS = "stretches of either direction"
@@ -106,15 +111,40 @@ def model_of(rows: Rows, drive: Drive, seed: int, sign: float | None = None) -> 
 
     What stands on the splines may be as large as the drive's own errors and make the wrong sign fit better without it:
     where neither leaves far more than the other, the signs are compared with its waves.
+
+    Where what it leaves falls beside waves over the output's turn, it is fitted once more with them free: such a wave
+    of a coupling or an encoder draws the drive's errors to itself. What the drive itself makes of them stays in it.
     """
     some = rows.rows(np.arange(0, len(rows), -(-len(rows) // FIT_ROWS)))
+    plain = _signed(some, drive, seed, sign, None)
+    if some.span_turns < LEAST_TURNS * some.ratio:
+        return plain
+    phases = np.outer(some.theta / some.ratio, OUTPUT_WAVES)
+    waves = np.hstack([np.cos(phases), np.sin(phases)])
+    if not _falls(some, waves, some.error - plain.predict(some.theta)):
+        return plain
+    beside = _signed(some, drive, seed, sign, waves)
+    return beside if beside.rms_arcmin < FALLS * plain.rms_arcmin else plain
+
+
+def _falls(rows: Rows, waves: Array, left: Array) -> bool:
+    """Whether what the model has `left` (n,) of `rows` falls beside columns of `waves` (n, q)."""
+    columns = offset_columns(rows)
+    both = columns, np.column_stack([columns, waves])
+    before, after = (float(np.std(left - one @ np.linalg.lstsq(one, left, rcond=1e-8)[0])) for one in both)
+    return after < FALLS * before
+
+
+def _signed(rows: Rows, drive: Drive, seed: int, sign: float | None, waves: Array | None) -> WaveformFit:
+    """`model_of` for all `rows`, beside `waves` (n, q), if any."""
     if sign is not None:
-        return fit_rows(some, drive, seed, (sign,))
-    first, second = sorted((fit_rows(some, drive, seed, (s,)) for s in (1.0, -1.0)), key=lambda fit: fit.rms_arcmin)
+        return fit_rows(rows, drive, seed, (sign,), waves)
+    each = (fit_rows(rows, drive, seed, (s,), waves) for s in (1.0, -1.0))
+    first, second = sorted(each, key=lambda fit: fit.rms_arcmin)
     if second.rms_arcmin > PLAIN_SIGN * first.rms_arcmin:
         return first
-    columns = offset_columns(some)
-    return min((first, second), key=lambda fit: _left_with_teeth(some, columns, fit))
+    columns = offset_columns(rows) if waves is None else np.column_stack([offset_columns(rows), waves])
+    return min((first, second), key=lambda fit: _left_with_teeth(rows, columns, fit))
 
 
 def _left_with_teeth(rows: Rows, free: Array, fit: WaveformFit) -> float:

@@ -79,13 +79,14 @@ def fit_waveform(recordings: Sequence[Recording], drive: Drive, seed: int = 1, b
     return fit_rows(gather(recordings, neighbours_for(recordings)), drive, seed, (1.0, -1.0) if both_signs else (1.0,))
 
 
-def fit_rows(rows: Rows, drive: Drive, seed: int, signs: Sequence[float]) -> WaveformFit:
-    """The model of `drive` fitted to `rows`, trying the error with each of `signs` (1.0, -1.0 or both) from `seed`."""
+def fit_rows(rows: Rows, drive: Drive, seed: int, signs: Sequence[float], free: Array | None = None) -> WaveformFit:
+    """The model of `drive` fitted to `rows`, trying the error with each of `signs` (1.0, -1.0 or both) from `seed`;
+    `free` (n, q) are columns fitted beside it, if any."""
     from threadpoolctl import threadpool_limits
 
     model = CartesianModel.of(drive)
     with threadpool_limits(1, user_api="blas"):
-        fits = {sign: _fit(rows, model, sign, seed) for sign in signs}
+        fits = {sign: _fit(rows, model, sign, seed, free) for sign in signs}
     size = {sign: max(float(np.std(fit.residual)), 1e-9) for sign, fit in fits.items()}
     best = min(size, key=lambda sign: size[sign])
     evidence = 0.0
@@ -103,15 +104,15 @@ def fit_rows(rows: Rows, drive: Drive, seed: int, signs: Sequence[float]) -> Wav
         decided,
         evidence,
         size[sign],
-        sign * float(fit.offsets[-1]) if _has_trend(rows) else 0.0,
+        sign * float(fit.offsets[rows.records + rows.reverses]) if _has_trend(rows) else 0.0,
         rows.ratio,
         back,
     )
 
 
-def _fit(rows: Rows, model: CartesianModel, sign: float, seed: int) -> Fit:
+def _fit(rows: Rows, model: CartesianModel, sign: float, seed: int, free: Array | None) -> Fit:
     mine = replace(rows, error=sign * (rows.error - float(np.median(rows.error))))
-    nuisance = offset_columns(rows)
+    nuisance = offset_columns(rows) if free is None else np.column_stack([offset_columns(rows), free])
     left = mine.error - nuisance @ np.linalg.lstsq(nuisance, mine.error, rcond=None)[0]
     scale = float(np.std(left))
     problem = FitProblem(mine, model, nuisance, Noise.white(mine, max(0.3 * scale, 1e-9)), max(1.0, scale / 0.3))
