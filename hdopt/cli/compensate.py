@@ -76,15 +76,18 @@ def _lines(found: Compensated, output: Path) -> Iterator[str]:
         f"{found.predicted:.4g} ({found.low:.4g} to {found.high:.4g}) of a fresh recording of this length"
     )
     for way, left in found.both.items():
-        yield f"  {way}: {left:.4g} arcmin left"
+        one = found.ways[way]
+        yield f"  {way}: {left:.4g} arcmin left, expect {one.expected:.4g} ({one.low:.4g} to {one.high:.4g})"
     if found.found.crossing.deg:
         way = "play crosses" if found.found.crossing.straight else "the return error crosses"
         yield f"  after a reversal {way} over about {found.found.crossing.deg:.2g} deg of output"
     if len(found.recordings) > 1:
         for part in found.recordings:
-            speed = "" if part.speed_rpm is None else f" at {part.speed_rpm:.4g} r/min"
+            rate = "" if part.speed_rpm is None else f" at {part.speed_rpm:.4g} r/min"
             expected = f"expect {part.expected:.4g} ({part.low:.4g} to {part.high:.4g})"
-            yield f"  {part.name}{speed}: {part.before:.4g} -> {part.after:.4g} arcmin, {expected}"
+            yield f"  {part.name}{rate}: {part.before:.4g} -> {part.after:.4g} arcmin, {expected}"
+    for speed, one in found.speeds.items():
+        yield f"  at {speed:.4g} r/min: expect {one.expected:.4g} ({one.low:.4g} to {one.high:.4g}) arcmin"
     for warning in found.warnings:
         yield f"note: {warning}"
     if found.worth:

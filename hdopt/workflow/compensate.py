@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
 import numpy as np
 
-from hdopt.arrays import Array
+from hdopt.arrays import Array, Mask
 from hdopt.compensation.expected import NORMAL, peak_to_peak_again
 from hdopt.compensation.path import half_about, paths_of
 from hdopt.compensation.writers import FORMATS, Found, crosses, homing_arcmin, written
@@ -21,7 +21,7 @@ from hdopt.figures import drawn
 from hdopt.files import ShownAsTable, write_text
 from hdopt.recordings.recording import Recording, turns_with_ends
 from hdopt.recordings.rows import Rows, gather
-from hdopt.workflow.compensation_speeds import of_one_speed, speeds_rpm
+from hdopt.workflow.compensation_speeds import of_each_speed, of_one_speed, speeds_rpm
 from hdopt.workflow.compensation_trials import (
     STRETCHES,
     candidates,
@@ -67,11 +67,21 @@ class PerRecording:
 
 
 @dataclass(frozen=True)
+class Expected:
+    """Peak-to-peak (arcmin) to expect of a fresh recording, and its 95 % interval `low`, `high`."""
+
+    expected: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
 class Compensated(ShownAsTable):
     """A compensation, and what it leaves on parts that the fit did not see; peak-to-peak in arcmin.
 
     `before` and `after` of the held-out parts together, each part scored by a choice made without it; `predicted` for a
-    fresh recording of the same length, with its 95 % interval `low`, `high`; `both` the same for each direction.
+    fresh recording of the same length, with its 95 % interval `low`, `high`; `both` is what is left in each direction,
+    `ways` what to expect of it there, and `speeds` (r/min) what to expect at each speed where the recordings differ.
     `worth` says whether the fall is beyond chance (`evidence` standard errors, over so many `stretches` of the record;
     fewer than three say nothing).
     """
@@ -93,6 +103,8 @@ class Compensated(ShownAsTable):
     ratio: float
     warnings: tuple[str, ...] = field(default=())
     stretches: int = 0
+    ways: Mapping[str, Expected] = field(default_factory=dict)
+    speeds: Mapping[float, Expected] = field(default_factory=dict)
 
     @property
     def judged(self) -> bool:
@@ -126,6 +138,8 @@ class Compensated(ShownAsTable):
                 "high": self.high,
             },
             "directions": self.both,
+            "expected_by_direction": {way: vars(one) for way, one in self.ways.items()},
+            "expected_by_speed": [{"speed_rpm": speed, **vars(one)} for speed, one in self.speeds.items()],
             "return": {
                 "half_arcmin": self.found.back,
                 "crossing_output_deg": self.found.crossing.deg,
@@ -245,9 +259,11 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
     again = centred(rows.error - said_of(found, rows), rows, np.zeros_like(fold))
     left = np.where(met_elsewhere(rows), trials[method], again)
     rng = np.random.default_rng(seed)
-    each = [peak_to_peak_again(left[rows.record == n], rows.block[rows.record == n], rng) for n in range(rows.records)]
+    each = _each(rows, left, np.ones(len(rows), np.bool_), rng)
     predicted, low, high = _predicted(each)
     ways = {"forward": 1.0, "backward": -1.0} if rows.reverses else {}
+    known = speeds_rpm(rows)
+    groups = of_each_speed(known)
     return Compensated(
         found,
         method,
@@ -270,7 +286,16 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
             *(of_one_speed(rows, again) if worth else ()),
         ),
         stretches,
+        {name: Expected(*_predicted(_each(rows, left, rows.direction == way, rng))) for name, way in ways.items()},
+        {known[one[0]] or 0.0: Expected(*_predicted([each[n] for n in one])) for one in groups if len(groups) > 1},
     )
+
+
+def _each(rows: Rows, left: Array, some: Mask, rng: np.random.Generator) -> list[tuple[float, float]]:
+    """Peak-to-peak to expect and its standard deviation (arcmin) of each record, by what is `left` (n,) of `some` (n,)
+    of its rows; records without any are left out."""
+    records = [some & (rows.record == n) for n in range(rows.records)]
+    return [peak_to_peak_again(left[mine], rows.block[mine], rng) for mine in records if mine.any()]
 
 
 def _worth(before: Array, after: Array, rows: Rows) -> tuple[bool, float, int]:

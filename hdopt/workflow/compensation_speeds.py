@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hdopt.arrays import Array
@@ -25,19 +27,25 @@ def speeds_rpm(rows: Rows) -> list[float | None]:
     return [float(np.median(size[rows.record == n])) for n in records]
 
 
-def of_one_speed(rows: Rows, left: Array) -> tuple[str, ...]:
-    """A sentence on each speed of the recordings in `rows` at which what the table has `left` (n,) arcmin holds
-    harmonics that a table for this speed alone would take. () where all turn at one speed."""
-    speeds = speeds_rpm(rows)
+def of_each_speed(speeds: Sequence[float | None]) -> list[list[int]]:
+    """The numbers of the records at each of the `speeds` (r/min) that differ by more than `APART`, slowest first; []
+    where a record has no clock or stands."""
     groups: list[list[int]] = []
-    for number in sorted(range(rows.records), key=lambda n: speeds[n] or 0.0):
+    for number in sorted(range(len(speeds)), key=lambda n: speeds[n] or 0.0):
         speed, first = speeds[number], speeds[groups[-1][0]] if groups else None
         if not speed:
-            return ()
+            return []
         if first and speed < (1 + APART) * first:
             groups[-1].append(number)
         else:
             groups.append([number])
+    return groups
+
+
+def of_one_speed(rows: Rows, left: Array) -> tuple[str, ...]:
+    """A sentence on each speed of the recordings in `rows` at which what the table has `left` (n,) arcmin holds
+    harmonics that a table for this speed alone would take. () where all turn at one speed."""
+    speeds, groups = speeds_rpm(rows), of_each_speed(speeds_rpm(rows))
     return tuple(
         said for group in groups if len(groups) > 1 and (said := _of_group(rows, left, group, speeds[group[0]]))
     )
