@@ -463,6 +463,7 @@ class VerdictSettings:
     confounded: float = threshold(0.5, "1", "choice: share of a found effect's power from which an imitator is listed")
     absorbed: float = threshold(1e-3, "1", "choice: length kept by the projection below which a column is rounding")
     remainder_t: float = threshold(4.0, "1", "theorem: one-sided chance below 1e-3 with ten turns")
+    remainder_chance: float = threshold(1e-3, "1", "choice: one-sided chance that `remainder_t` stands for")
     remainder_t_alone: float = threshold(6.0, "1", "theorem: the same where nothing else speaks for structure")
     remainder_share: float = threshold(0.2, "1", "choice: share of what can be explained that may be left")
     remainder_floor: float = threshold(
@@ -471,6 +472,9 @@ class VerdictSettings:
     base_floor: float = threshold(0.0025, "1", "choice: the same as share of the base's power")
     heldout_over_floor: float = threshold(
         1.4, "1", "measured: held-out error over noise floor is below it in 19 of 19 right names on the bench"
+    )
+    unseen_over_floor: float = threshold(
+        2.0, "1", "measured: right names of run-002 and run-003 reach 1.47, a drift by the power of travel was at 2.4"
     )
     placebo_share: float = threshold(0.98, "1", "choice: share of the effects' held-out gain that a placebo must reach")
     placebo_t: float = threshold(2.0, "1", "theorem: t below which two held-out errors do not differ (95 %)")
@@ -509,6 +513,9 @@ class VerdictSettings:
     high_share: float = threshold(0.01, "1", "choice: power over what else is explained that makes high orders count")
     momentary_share: float = threshold(0.5, "1", "choice: share of what is found from which an event is most of it")
     momentary_evidence: float = threshold(30.0, "1", "choice: log evidence for what no other turn repeats")
+    beside_told_evidence: float = threshold(
+        30.0, "1", "choice: log evidence for something beside a scale, clock or zero that is off"
+    )
     flatten: float = threshold(2.0, "1", "choice: by which log evidences are divided: models are not exact")
     smallest_weight: float = threshold(-60.0, "1", "choice: log weight below which a candidate is none")
     most_confident: float = threshold(0.97, "1", "measured: 97 of 100 names of three runs of the injection study")

@@ -26,7 +26,7 @@ from hdopt.effects.met import Spline, Waves
 from hdopt.effects.probe import Probe, widest_that_pays
 from hdopt.effects.term import Shape, Term
 
-RUNS: tuple[tuple[int, ...], ...] = ((2,), (3,), *(tuple(range(2, k + 1)) for k in (3, 4, 5, 8, 14, 24, 40)))
+RUNS: tuple[tuple[int, ...], ...] = ((2,), (3,), *(tuple(range(2, k + 1)) for k in (3, 4, 5, 8, 14, 24, 40, 70)))
 """Sets of harmonics without a gap, as of a pitch deviation of any shape, the first alone among them."""
 FEW, MOST_OF_FEW = tuple(range(2, 13)), 3
 """Harmonics of which also a few may stand out alone, as of cutter, chuck and machine table, and how many."""
@@ -43,7 +43,7 @@ SINES = Sines(
     "of arc, waves round the rim beyond the first",
     prior=(0.0, 10.0),
     scale=UM,
-    shown="`amplitude_H_um`, `phase_H_deg`, H 2 to 40",
+    shown="`amplitude_H_um`, `phase_H_deg`, H 2 to 70",
 )
 
 

@@ -9,15 +9,21 @@ import pytest
 from test_verdict_rules import CLEAN, FIRED, NAMED, held
 
 from hdopt.diagnosis.checks.repeated_passes import NOTHING_REPEATED, RepeatedPasses
-from hdopt.diagnosis.inference.catalogue import SCALE
+from hdopt.diagnosis.inference.catalogue import SCALE, SKEW, VARYING_CONTACT
 from hdopt.diagnosis.inference.cross_validation import HeldOut
 from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut
+from hdopt.diagnosis.search.penalty import Scale, penalty
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.verdict import rules
 from hdopt.diagnosis.verdict.facts import found_again, own_gain, stands_out, too_little, unseen_gain, unseen_rms
 from hdopt.diagnosis.verdict.named_effect import confidences
-from hdopt.diagnosis.verdict.residual_structure import clearly_unexplained, left_over_passes, outside_share
-from hdopt.diagnosis.verdict.rivals import placebo_as_good, rivals, scale_is_as_good
+from hdopt.diagnosis.verdict.residual_structure import (
+    beaten_by_generic,
+    clearly_unexplained,
+    left_over_passes,
+    outside_share,
+)
+from hdopt.diagnosis.verdict.rivals import beside_told, placebo_as_good, rivals, scale_is_as_good
 from hdopt.diagnosis.verdict.rules import rule_for
 from hdopt.effects.term import Term
 
@@ -171,6 +177,37 @@ def test_a_scale_that_explains_as_well(behind, said):
     assert scale_is_as_good(evidence(candidate({"thermal_drift": 1.0}), beside, alone)) is said
 
 
+def told_and_more(gain=160.0, power=1.0, told=SCALE, of="hysteresis"):
+    """A told explanation of gain 100, and a set that explains more beside it; each pays log(1000)/2 and 1 a term."""
+    alone = candidate({told: 1.0})
+    both = candidate({told: 1.0, of: power})
+    alone.gain, both.gain = 100.0, gain
+    problem = SimpleNamespace(weighed_rows=1000, settings=DEFAULT)
+    found = evidence(alone, both, inflation=1.0)
+    found.selection.base.problem = problem
+    return found
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"gain": 100.0},  # nothing more explained
+        {"power": 0.04},  # small beside the noise, whose power is one
+        {"told": VARYING_CONTACT},  # its shape is not exact, something is always left
+        {"of": SKEW},  # two that are told
+        {"told": "thermal_drift"},  # a name, not told
+    ],
+)
+def test_what_adds_to_what_is_told_is_seen(changes):
+    """Fault caught: relaxation after a reversal, explained by a clock that runs slow and friction beside it, was
+    adequate. Half of 60 noise variances less what one more effect pays."""
+    found, apart = beside_told(told_and_more())
+    one_more = penalty(found.fit.terms, 0.0, Scale(1000)) - penalty(found.fit.terms[:1], 0.0, Scale(1000))
+    assert found.effects == (SCALE, "hysteresis")
+    assert apart == pytest.approx(30.0 - one_more)
+    assert beside_told(told_and_more(**changes)) is None
+
+
 def test_a_placebo_must_reach_the_gain():
     """Half of it, in errors whose turns differ too little to say so: no explanation."""
     half = HeldOut(np.full(20, 2.0), np.full(20, 1.0), np.ones(20))
@@ -197,6 +234,37 @@ def test_what_is_left_counts_where_it_is_sure_and_a_fair_part(changes, said):
     remainder = SimpleNamespace(held_out=held(20, 1.0), t=given.pop("t"))
     found = evidence(**given, remainder=remainder, generic_held_out=held(20, 1.0), high=high)
     assert clearly_unexplained(found) is said
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, True),
+        ({"swing": 0.12}, False),  # t is 0.09 / 0.1231 * 20**0.5 = 3.27: a chance of 0.2 %
+        ({"swing": 0.1}, True),  # t is 3.92: a chance of 0.05 %
+        ({"extended": 1.03}, False),  # less than a noise's own share
+        ({"base": 1.0}, False),  # the base alone does as well: nothing is claimed for what is beside it
+        ({"base_power": 1e5}, False),  # below the model's resolution
+    ],
+)
+def test_a_basis_without_physics_that_predicts_better_alone_wins(changes, said):
+    """Held-out errors of 1.09 with the effects and 1 with the basis alone, turn by turn apart by 0.09 +- 0.02."""
+    given = {"extended": 1.09, "base": 3.0, "swing": 0.02, "base_power": 0.0} | changes
+    white = np.full(20, given["extended"]) + given["swing"] * SWING[:20]
+    found = evidence(base=given["base"], base_power=given["base_power"], generic_held_out=held(20, 1.0))
+    found.extended_held_out = HeldOut(np.full(20, given["extended"]), white, np.ones(20))
+    assert beaten_by_generic(found) is said
+
+
+def test_what_beats_the_effects_is_told_beside_them(monkeypatch):
+    """With a name it is said and more; without one, that something is there."""
+    where = {"domain": "speed", "rms_arcmin": 0.1, "orders_per_input_turn": [], "direction": "both"}
+    monkeypatch.setattr(rules, "locate_remainder", lambda evidence: where)
+    named = SimpleNamespace(id="lost_motion", says="Play.")
+    with_a_name = rules.named_and_beaten(SimpleNamespace(evidence=None, facts=NAMED, effects=(named,)))
+    without = rules.named_and_beaten(SimpleNamespace(evidence=None, facts=CLEAN, effects=()))
+    assert (with_a_name.verdict, with_a_name.effects) == ("unknown", (named,))
+    assert (without.verdict, without.effects) == ("unknown", ())
 
 
 def test_the_share_without_physics_is_of_all_that_is_explained():

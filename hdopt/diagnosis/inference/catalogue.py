@@ -30,6 +30,8 @@ VARYING_CONTACT = "_varying_contact"
 """The drive's own as it was built: a k_e that varies round the input's turn."""
 TOLD = frozenset({SCALE, SKEW, NEW_ZERO, VARYING_CONTACT})
 """Ids of what instruments do, and a drive as built, without a finding: told, never named."""
+EXACT_TOLD = TOLD - {VARYING_CONTACT}
+"""Ids of those whose shape is known to the last digit."""
 OUTSIDE = frozenset(explanations()) - frozenset(EFFECTS) - TOLD
 """Ids of the descriptions without physics."""
 

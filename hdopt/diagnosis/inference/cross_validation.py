@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student_t
 
 from hdopt.arrays import Array, Index
 from hdopt.diagnosis.inference.fit import Fit
@@ -86,3 +87,11 @@ def paired_t(worse: Array, better: Array, settings: HeldOutSettings = DEFAULT.he
         return 0.0
     spread = difference.std(ddof=1) / np.sqrt(len(difference))
     return float(difference.mean() / spread) if spread > 0 else 0.0
+
+
+def paired_chance(worse: Array, better: Array, settings: HeldOutSettings = DEFAULT.held_out) -> float:
+    """One-sided chance (Student's t) of a mean difference of two errors a turn, (turns,) each, as large as that of
+    `worse` over `better`; 1 where there are too few turns. `settings` are the thresholds.
+    """
+    t = paired_t(worse, better, settings)
+    return 1.0 if t <= 0 else float(student_t.sf(t, len(worse) - 1))

@@ -16,6 +16,7 @@ from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.settings import VerdictSettings
 from hdopt.diagnosis.verdict.named_effect import NamedEffect, describe
 from hdopt.diagnosis.verdict.residual_structure import (
+    beaten_by_generic,
     clearly_unexplained,
     left_over_passes,
     momentary,
@@ -26,6 +27,7 @@ from hdopt.diagnosis.verdict.residual_structure import (
 )
 from hdopt.diagnosis.verdict.rivals import (
     Sets,
+    beside_told,
     confounded_pairs,
     imitating_sets,
     placebo_as_good,
@@ -45,7 +47,8 @@ class Facts:
     out. `outside_share` and `high_outside_share`: share of what the best set, and the set of high orders, explain that
     descriptions without physics carry. `momentary`: something happened at one moment only; `unsteady`: something
     changes in time as no noise does; `generic_wins`: a basis without physics clearly predicts better, with a t of
-    `generic_t`. `turns_suffice`: turns can be held out; `too_little`: the record cannot say even that the base is
+    `generic_t`; `beaten_by_generic`: such a basis alone, without the effects, predicts better than they do.
+    `turns_suffice`: turns can be held out; `too_little`: the record cannot say even that the base is
     adequate. `rivals`: other sets that are as good, placebo and
     perfect imitations among them; `scale_as_good`: so is a ratio or gain that is off, alone. `heldout_over_floor`:
     error on turns that no stage saw (cross-validated where none could be spared) over what a generic basis leaves;
@@ -76,6 +79,8 @@ class Facts:
     noise_over_neighbours: float = 1.0
     left_over_passes: float = 1.0
     above_resolution: bool = True
+    beaten_by_generic: bool = False
+    beside_told: float = 0.0
 
     @property
     def significant(self) -> bool:
@@ -172,6 +177,8 @@ def find(evidence: Evidence) -> Findings:
         / max(evidence.neighbours_arcmin, evidence.sensor_arcmin, TINY),
         left_over_passes=left_over_passes(evidence),
         above_resolution=above_resolution(evidence),
+        beaten_by_generic=beaten_by_generic(evidence),
+        beside_told=(beside_told(evidence) or (None, 0.0))[1],
     )
     pairs = confounded_pairs(evidence, facts.named, high) if facts.said else ()
     effects = effects_said(evidence, facts, high)

@@ -8,6 +8,7 @@ import numpy as np
 
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.inference.catalogue import is_outside, properties_of
+from hdopt.diagnosis.inference.cross_validation import paired_chance
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.search.candidates import Candidate
@@ -129,6 +130,20 @@ def clearly_unexplained(evidence: Evidence) -> bool:
     return (
         evidence.remainder.t > settings.remainder_t and left > settings.remainder_share * explainable and left > floor
     )
+
+
+def beaten_by_generic(evidence: Evidence) -> bool:
+    """Whether the generic basis beside the base alone predicts held-out turns clearly better than the base does, with
+    the effects and without, and by more than sensors resolve: it knows no physics, so what explains is none either.
+    `evidence` is that of the diagnosis.
+    """
+    settings = evidence.settings
+    generic = evidence.generic_held_out
+    best = min(evidence.base_held_out, evidence.extended_held_out, key=lambda out: out.variance)
+    excess = best.variance - generic.variance
+    floor = max(settings.verdict.remainder_floor * generic.variance, resolution(evidence) ** 2)
+    chance = paired_chance(best.white, generic.white, settings.held_out)
+    return excess > floor and chance < settings.verdict.remainder_chance
 
 
 def locate_remainder(evidence: Evidence) -> Where:

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding
-from hdopt.diagnosis.inference.catalogue import properties_of
+from hdopt.diagnosis.inference.catalogue import TOLD, properties_of
 from hdopt.diagnosis.numerical import TINY
+from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.verdict.facts import Facts, Findings, sparse, unseen_rms
 from hdopt.diagnosis.verdict.named_effect import NamedEffect, main_orders
 from hdopt.diagnosis.verdict.residual_structure import (
@@ -19,7 +21,7 @@ from hdopt.diagnosis.verdict.residual_structure import (
     locate_repeated,
     term_powers,
 )
-from hdopt.diagnosis.verdict.rivals import Sets, separating_measurement, tied_pairs
+from hdopt.diagnosis.verdict.rivals import Sets, beside_told, power_of_named, separating_measurement, tied_pairs
 from hdopt.diagnosis.verdict.where import Where
 from hdopt.effects import EFFECTS
 
@@ -92,6 +94,20 @@ def more_than_noise_is_left(facts: Facts) -> bool:
     return facts.said and much and facts.generic_t > facts.settings.remainder_t
 
 
+def beaten_without_physics(facts: Facts) -> bool:
+    """A basis without physics, alone, predicts unseen turns better than what explains. `facts` are those of the
+    recording.
+    """
+    return facts.turns_suffice and facts.beaten_by_generic
+
+
+def misses_unseen(facts: Facts) -> bool:
+    """What is said was found without the turns that were hidden, but does not predict them. `facts` are those of the
+    recording.
+    """
+    return facts.said and facts.heldout_over_floor > facts.settings.unseen_over_floor
+
+
 def not_found_again(facts: Facts) -> bool:
     """What is said was not all found without the turns that were hidden, and misses these by clearly more than noise.
     `facts` are those of the recording.
@@ -111,6 +127,13 @@ def not_confirmed(facts: Facts) -> bool:
     neither a name nor nothing. `facts` are those of the recording.
     """
     return facts.found and not facts.said and facts.own_gain > facts.settings.unconfirmed_share
+
+
+def more_than_is_told(facts: Facts) -> bool:
+    """Nothing is said, and a scale, a clock or a zero that is off explains, but not all: what adds to it is clearly no
+    noise. `facts` are those of the recording.
+    """
+    return facts.turns_suffice and not facts.said and facts.beside_told > facts.settings.beside_told_evidence
 
 
 def others_are_as_good(facts: Facts) -> bool:
@@ -182,6 +205,13 @@ def named_and_more(findings: Findings) -> Conclusion:
     return Conclusion("unknown", says, findings.effects, separating_test=test, where=where)
 
 
+def named_and_beaten(findings: Findings) -> Conclusion:
+    """What is beaten by a basis without physics, which is said beside it where there is a name. `findings` hold the
+    facts and the evidence behind them.
+    """
+    return named_and_more(findings) if findings.facts.said else unknown(findings)
+
+
 def unstable(findings: Findings) -> Conclusion:
     """What explains all turns is not what a part of them shows. `findings` hold the facts and the evidence behind
     them.
@@ -206,20 +236,50 @@ def unconfirmed(findings: Findings) -> Conclusion:
     evidence = findings.evidence
     gain = evidence.base_held_out.variance - evidence.extended_held_out.variance
     best = evidence.selection.best
-    largest = int(np.argmax(term_powers(best.fit)))
-    where: Where = {
-        "domain": properties_of(best.effects[largest]).domain,
-        "orders_per_input_turn": main_orders(best.fit, best.fit.contribution(largest)),
-        "direction": "both",
-        "share_of_residual": float(min(gain / max(evidence.base_held_out.variance, TINY), 1.0)),
-        "rms_arcmin": math.sqrt(max(gain, 0.0)),
-    }
-    like = " and ".join(name for name in best.effects if name in EFFECTS) or "none of the catalogue's effects"
+    where = where_largest(best, max(gain, 0.0), evidence)
     return Conclusion(
         "unknown",
-        f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that most resembles {like}; but turns that no "
-        "stage saw do not bear that out: what it is, is not known.",
+        f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that most resembles {likeness(best)}; but turns "
+        "that no stage saw do not bear that out: what it is, is not known.",
         separating_test=MORE_TURNS,
+        where=where,
+    )
+
+
+def where_largest(candidate: Candidate, power: float, evidence: Evidence) -> Where:
+    """Where the largest term of `candidate` lives that is not told, which stands for a `power` (arcmin^2) of what is
+    in the `evidence`.
+    """
+    powers = [p * (name not in TOLD) for p, name in zip(term_powers(candidate.fit), candidate.effects, strict=True)]
+    largest = int(np.argmax(powers))
+    return {
+        "domain": properties_of(candidate.effects[largest]).domain,
+        "orders_per_input_turn": main_orders(candidate.fit, candidate.fit.contribution(largest)),
+        "direction": "both",
+        "share_of_residual": float(min(power / max(evidence.base_held_out.variance, TINY), 1.0)),
+        "rms_arcmin": math.sqrt(power),
+    }
+
+
+def likeness(candidate: Candidate) -> str:
+    """The catalogue's effects in `candidate`, as a part of a sentence."""
+    return " and ".join(name for name in candidate.effects if name in EFFECTS) or "none of the catalogue's effects"
+
+
+def more(findings: Findings) -> Conclusion:
+    """What a scale, a clock or a zero that is off does not explain, and what it most resembles. `findings` hold the
+    facts and the evidence behind them.
+    """
+    evidence = findings.evidence
+    found = beside_told(evidence)
+    assert found is not None, "the rule holds only where something adds"
+    best, _ = found
+    where = where_largest(best, power_of_named(best), evidence)
+    return Conclusion(
+        "unknown",
+        f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that most resembles {likeness(best)}, beside or in "
+        "place of the instruments' error that the warnings tell: what it is, is not known.",
+        separating_test="put right what the warnings tell of the instruments, and record again",
         where=where,
     )
 
@@ -303,9 +363,12 @@ RULES = (
     Rule("too much for noise", too_much_for_noise, no_noise),
     Rule("not confirmed", not_confirmed, unconfirmed),
     Rule("more than noise is left", more_than_noise_is_left, named_and_more),
+    Rule("beaten without physics", beaten_without_physics, named_and_beaten),
     Rule("not found again", not_found_again, unstable),
+    Rule("misses unseen turns", misses_unseen, unstable),
     Rule("others are as good", others_are_as_good, ambiguous),
     Rule("named", lambda facts: facts.said, named),
+    Rule("more than is told", more_than_is_told, more),
     Rule("too little", lambda facts: facts.too_little, insufficient),
     Rule("adequate", lambda facts: True, adequate),
 )
