@@ -17,6 +17,8 @@ KEY = re.compile(r"(?<![\w.\-/])[a-z]\w*(?:\.\w+)+|\[(\w+)\](?: (\w+))?")
 COMMON = 100
 """Whole numbers up to this stand in many a message and many a study: they are taken only beside their key's name."""
 
+MOST_ALIKE = 3
+"""Places of one value that a message may name where it shows no other."""
 DIGITS = range(6, 18)
 """Significant digits with which a message may show a number; what they round to a whole number is another one."""
 
@@ -48,13 +50,15 @@ def _speaks_of(name: str, message: str) -> bool:
 
 def values_named(document: Document, message: str) -> tuple[str, ...]:
     """Where in `document` the values stand that `message` shows, 'FILE, line N, a.b' each; a value that stands there
-    more than once is left out."""
+    more than once is left out beside one that does not, and above three places."""
     shown: dict[float, list[Keys]] = {}
     for path in leaves(document.data):
         value = _at(document.data, path)
         if _stands(document, path) and shows(message, value, path[-1]):
             shown.setdefault(float(value), []).append(path)
-    return tuple(document.where(paths[0]) for paths in shown.values() if len(paths) == 1)
+    alone = [paths for paths in shown.values() if len(paths) == 1]
+    several = [paths for paths in shown.values() if len(paths) <= MOST_ALIKE]
+    return tuple(document.where(path) for paths in alone or several for path in paths)
 
 
 def keys_named(document: Document, message: str) -> tuple[str, ...]:

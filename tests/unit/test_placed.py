@@ -112,6 +112,8 @@ def test_a_common_number_is_taken_only_beside_its_name():
     document = parse_document("a_mm = 2\nlimit = 3\nb = 0.25\nc = 0.25\nd = 0.75\n", "s.toml")
     assert values_named(document, "the limit is 3, 2 are needed") == ("s.toml, line 2, limit",)
     assert values_named(document, "0.25 and 0.75") == ("s.toml, line 5, d",)
+    # Would catch a refusal without a line because its value stands in the study twice.
+    assert values_named(document, "0.25 is too small") == ("s.toml, line 3, b", "s.toml, line 4, c")
 
 
 WORDS = st.sampled_from(
