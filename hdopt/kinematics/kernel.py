@@ -84,7 +84,7 @@ def design_of(drive: Drive) -> Design:
 
 
 @compiled
-def _describe(errors: Array, work: Singles) -> None:
+def describe(errors: Array, work: Singles) -> None:
     """Describe in the first area of `work` the drives with `errors` (12 LANES,), error by error."""
     for i in range(LANES):
         sine, cosine = sine_cosine(reduced(errors[LANES + i]))
@@ -179,7 +179,7 @@ def _look_again(work: Singles, lanes: Index, design: Design) -> None:
 def block_of_lanes(errors: Array, work: Singles, lanes: Index, design: Design) -> None:
     """Fill VALUE of the first area of `work` (WORK,) with the peak-to-peak, mm of arc, of the drives with `errors`
     (12 LANES,), error by error; `lanes` (LANES,) is room for a list, `design` what the drives share."""
-    _describe(errors, work)
+    describe(errors, work)
     fill_candidates(work, design)
     fill_lowest(work, 0, LANES // GROUP, design)
     for i in range(LANES):

@@ -32,8 +32,8 @@ WALK_PER_PERIOD, TABLE_PER_PERIOD = 8, 32
 """The same in a period of the highest order."""
 ON_SPLINE = 2
 """How many times finer the tables over a turn of a spline are: they are short."""
-BLOCK = 64
-"""Drives a thread takes at a time."""
+BLOCK, LANES_BLOCK = 64, 1024
+"""Drives a thread takes at a time: turn by turn, and in lanes."""
 
 
 NO_PLACES: Array = np.empty((2, 0))
@@ -156,6 +156,38 @@ def matrix_peak_to_peak_arcmin(drive: Drive, matrix: Array, added: AddedTable, h
 
     in_blocks(len(matrix), BLOCK, fill)
     return out
+
+
+def stacked_peak_to_peak_arcmin(drive: Drive, matrix: Array, added: AddedTable, homogenization: float = 1.0) -> Array:
+    """The same as `matrix_peak_to_peak_arcmin` of `drive`, `matrix` (n, 12), `added` and `homogenization`, (n,), for as
+    many drives as a stack has: some twelve times as fast where the effects repeat every input turn.
+
+    Then in single precision, within 1e-3 arcmin of it for 99 % of drives at up to three times the shipped tolerances;
+    else the same figures.
+    """
+    from hdopt.simulation.turn.effects import turn_of
+
+    gear = drive.geometry
+    scale = homogenization * gear.arcmin_per_mm
+    turns = [
+        None if added.fs.size else turn_of(zones + beside / scale, added.cs, gear.beat_phases, scale)
+        for zones, beside in zip(added.zones, added.beside, strict=True)
+    ]
+    repeating = [turn for turn in turns if turn is not None]
+    if len(repeating) < len(turns):
+        return matrix_peak_to_peak_arcmin(drive, matrix, added, homogenization)
+    from hdopt.kinematics.kernel import design_of
+    from hdopt.simulation.turn.kernel import extremes_block
+
+    matrix, design = np.ascontiguousarray(matrix, dtype=np.float64), design_of(drive)
+    lowered = np.full((len(matrix), 2), np.inf)
+
+    def fill(rows: slice) -> None:
+        for turn in repeating:
+            extremes_block(design, matrix[rows], turn, lowered[rows])
+
+    in_blocks(len(matrix), LANES_BLOCK, fill)
+    return np.asarray(-scale * lowered.sum(axis=1))
 
 
 WIDER = 1.2

@@ -12,7 +12,7 @@ from hdopt.drive.errors import ERROR_NAMES, DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics.essential import on_table
 from hdopt.parallel.shared_memory import in_blocks
-from hdopt.simulation.batch import AddedTable, matrix_peak_to_peak_arcmin
+from hdopt.simulation.batch import AddedTable, matrix_peak_to_peak_arcmin, stacked_peak_to_peak_arcmin
 from hdopt.tolerance.drawn_teeth import SPLINES, tables_of_teeth
 from hdopt.tolerance.drive_inputs import DriveResponse
 
@@ -57,7 +57,7 @@ class ExtendedResponse:
     def __call__(self, inputs: Array) -> Array:
         base = self.base
         if not self.has_own_teeth:
-            return matrix_peak_to_peak_arcmin(base.drive, base.matrix(inputs), self.added, base.homogenization)
+            return stacked_peak_to_peak_arcmin(base.drive, base.matrix(inputs), self.added, base.homogenization)
         matrix, evened = base.matrix(inputs), _evened_out(self.added, base.homogenization)
         misalignment, sine_share = base.shares
         matrix[:, SINES] *= sine_share

@@ -23,11 +23,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from cases import CSF_25_80, drive, random_errors
 
 from hdopt.drive.errors import DriveErrors
+from hdopt.effects import EFFECTS
 from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin, walked_peak_to_peak_arcmin
 from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin
 from hdopt.parallel.engine import engine_in_force
 from hdopt.simulation import EffectValues, Operation
-from hdopt.simulation.batch import matrix_peak_to_peak_arcmin as with_effects
+from hdopt.simulation.batch import matrix_peak_to_peak_arcmin as turn_by_turn
+from hdopt.simulation.batch import stacked_peak_to_peak_arcmin as with_effects
 from hdopt.simulation.batch import tabulate
 from hdopt.tolerance.fused import fused_pass
 from hdopt.tolerance.sampling import ScrambledSobol
@@ -68,7 +70,15 @@ class Row:
 
 LOBING = EffectValues("circular_spline_lobing", {"lobes": 6}, (0.001, 0.0005))
 MESH = EffectValues("tooth_mesh", {"sidebands": (0,)}, (0.02, 0.01))
-BENCHES = {"none": [], "lobes, every input turn": [LOBING], "a ripple at the teeth": [MESH]}
+BEARING = EFFECTS["bearing_pass"]
+CAGE = EffectValues(BEARING.id, *BEARING.values(BEARING.examples[1], CSF_25_80))
+BENCHES = {
+    "none": ([], DRIVES // 4),
+    "lobes, every input turn": ([LOBING], DRIVES // 4),
+    "a ripple at the teeth": ([MESH], DRIVES // 16),
+    "a bearing's cage, no whole turn": ([CAGE], SOME),
+}
+"""Effects, and of how many drives."""
 
 
 def drives() -> Iterable[Row]:
@@ -77,11 +87,11 @@ def drives() -> Iterable[Row]:
     few = [DriveErrors.from_matrix(row) for row in matrix[:4]]
     matrix_peak_to_peak_arcmin(design, matrix[:10])
     yield Row("compiled kernel", seconds_of(lambda: matrix_peak_to_peak_arcmin(design, matrix)), DRIVES)
-    for name, effects in BENCHES.items():
+    for name, (effects, count) in BENCHES.items():
         table = tabulate(design, effects, Operation())
         with_effects(design, matrix[:2], table)
-        taken = seconds_of(lambda t=table: with_effects(design, matrix[:SOME], t), 3)
-        yield Row(f"compiled, with effects: {name}", taken, SOME)
+        taken = seconds_of(lambda t=table, n=count: with_effects(design, matrix[:n], t), 3)
+        yield Row(f"compiled, with effects: {name}", taken, count)
     some = random_errors(200, seed=0)
     yield Row("NumPy, one turn at 180 fixed angles (1-3 % low)", seconds_of(lambda: fixed_angles(design, some)), 200)
     for step, whose in ((10, ", as Jia 2021 publishes"), (1, "")):
@@ -187,26 +197,26 @@ def growth_of_stacks() -> Iterable[tuple[str, Sizes]]:
 
 
 def growth_with_effects() -> Iterable[tuple[str, Sizes]]:
-    """How drives with effects grow with turns, samples and effects."""
+    """How drives with effects, turn by turn, grow with turns, samples and effects."""
     matrix, found = random_errors(SOME, seed=0).to_matrix(), Sizes()
     for teeth in (80, 160, 320):
         gear = drive(geometry=replace(CSF_25_80, flexspline_teeth=teeth, circular_spline_teeth=teeth + 2))
         added = tabulate(gear, [LOBING], Operation())
-        found.append((teeth // 2, seconds_of(lambda g=gear, t=added: with_effects(g, matrix, t), 3)))
-    yield "input turns of a relative turn: drives with an effect", found
+        found.append((teeth // 2, seconds_of(lambda g=gear, t=added: turn_by_turn(g, matrix, t), 3)))
+    yield "input turns of a relative turn: drives with an effect, turn by turn", found
     design, found = drive(), Sizes()
     for lobes in (40, 80, 160):
         added = tabulate(design, [replace(LOBING, shape={"lobes": lobes})], Operation())
-        found.append((added.zones.shape[2], seconds_of(lambda t=added: with_effects(design, matrix, t), 3)))
-    yield "samples of a relative turn: drives with an effect of rising order", found
+        found.append((added.zones.shape[2], seconds_of(lambda t=added: turn_by_turn(design, matrix, t), 3)))
+    yield "samples of a relative turn: drives with an effect of rising order, turn by turn", found
     tables, many = Sizes(), Sizes()
     for count in (1, 2, 4, 8):
         effects = [replace(LOBING, shape={"lobes": 2 + k}) for k in range(count)]
         tables.append((count, seconds_of(lambda e=effects: tabulate(design, e, Operation()), 3)))
         added = tabulate(design, effects, Operation())
-        many.append((count, seconds_of(lambda t=added: with_effects(design, matrix, t), 3)))
+        many.append((count, seconds_of(lambda t=added: turn_by_turn(design, matrix, t), 3)))
     yield "effects: their table, once a stack", tables
-    yield "effects: drives under it", many
+    yield "effects: drives under it, turn by turn", many
 
 
 def exponent(sizes: Sizes) -> float:

@@ -93,20 +93,21 @@ def direction(c: float, s: float) -> tuple[float, float, float]:
 
 
 @inlined
-def _at_most(c: float, s: float) -> float:
-    """A bound of the length of (c, s), 12 % above it at most: cheaper than a root."""
+def at_most(c: float, s: float) -> float:
+    """A bound of the length of (`c`, `s`), 12 % above it at most: cheaper than a root."""
     return max(abs(c), abs(s)) + HALF * min(abs(c), abs(s))
 
 
 @inlined
-def _second_order(motion: RigidMotion[float], teeth: Teeth, design: Design) -> float:
-    """By how much terms of second order may lower the deviation of a drive, mm of arc."""
-    t_max = _at_most(motion.ta_cos, motion.ta_sin) + abs(motion.ta_0)
-    l_max = _at_most(motion.el_cos, motion.el_sin) + abs(motion.el_0)
-    l_max += _at_most(motion.tl_cos, motion.tl_sin) + abs(motion.tl_0)
+def second_order(motion: RigidMotion[float], teeth: Teeth, design: Design) -> float:
+    """By how much terms of second order may lower the deviation of a drive of `motion` and `teeth` under a `design`, mm
+    of arc."""
+    t_max = at_most(motion.ta_cos, motion.ta_sin) + abs(motion.ta_0)
+    l_max = at_most(motion.el_cos, motion.el_sin) + abs(motion.el_0)
+    l_max += at_most(motion.tl_cos, motion.tl_sin) + abs(motion.tl_0)
     offset = l_max * design.rim.per_flatness
     of_depth = design.rim.bow * t_max * t_max + HALF * l_max * offset
-    return design.tan_alpha * of_depth + (_at_most(teeth.cs_cos, teeth.cs_sin) + teeth.fs) * offset
+    return design.tan_alpha * of_depth + (at_most(teeth.cs_cos, teeth.cs_sin) + teeth.fs) * offset
 
 
 @inlined
@@ -160,7 +161,7 @@ def fill_candidates(work: Singles, design: Design) -> None:
         best = _better(work, i + 3 * LANES, _found(f, -v_c, -v_s, TWO + ONE), best)
         c, s, size = direction(f.t_cos, f.t_sin)
         share = -f.t_0 / max(size, TINY)
-        margin = MARGIN_SHARE * _second_order(motion, teeth, design)
+        margin = MARGIN_SHARE * second_order(motion, teeth, design)
         beyond = abs(f.t_0) - size
         kind = VERTEX if beyond > ZERO else RIM_CHANGE
         kind = FLAT if abs(beyond) < margin else kind

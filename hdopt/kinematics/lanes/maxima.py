@@ -14,6 +14,7 @@ from hdopt.kinematics.lanes.compiled import inlined
 from hdopt.kinematics.lanes.motion import (
     LANES,
     VALUE,
+    Branch,
     Design,
     Teeth,
     branch_at,
@@ -61,9 +62,9 @@ class Crest(NamedTuple):
 
 
 @inlined
-def _crest(motion: RigidMotion[float], teeth: Teeth, design: Design, angle: Angle, s: float, k: float) -> Crest:
-    """The crest of zone s and rim k near the angle, over all FS phases."""
-    at = branch_at(place_at(motion, angle.cos, angle.sin), motion, teeth, design, s, k)
+def crest_of(at: Branch, teeth: Teeth, design: Design, angle: Angle, s: float, k: float, farthest: float) -> Crest:
+    """The crest of zone `s` and rim `k` near an `angle`, over all FS phases of the `teeth` under a `design`, at most
+    `farthest` (rad) away; `at` is the branch there."""
     off = design.advance * angle.angle + teeth.fs_phase + s * at.offset - s * HALF_PI
     off = off * design.per_spacing
     off = (off - np.floor(off)) * design.spacing
@@ -74,14 +75,21 @@ def _crest(motion: RigidMotion[float], teeth: Teeth, design: Design, angle: Angl
     back = off - design.spacing
     slope, before = at.slope - teeth.fs * rate * off, at.slope - teeth.fs * rate * back
     # A branch that is flat to first order has no stiffness: the step ends somewhere all the same.
-    ahead = clipped(slope * per_stiffness, -FARTHEST, FARTHEST)
-    astern = clipped(before * per_stiffness, -FARTHEST, FARTHEST)
+    ahead = clipped(slope * per_stiffness, -farthest, farthest)
+    astern = clipped(before * per_stiffness, -farthest, farthest)
     gained = ahead * (slope + slope - ahead * stiffness) - teeth.fs * off * off
     gained_before = astern * (before + before - astern * stiffness) - teeth.fs * back * back
     other = gained_before > gained
     step = astern if other else ahead
     value = at.value + HALF * (gained_before if other else gained)
     return Crest(value, angle.cos, angle.sin, s, k, back if other else off, at.offset, step)
+
+
+@inlined
+def _crest(motion: RigidMotion[float], teeth: Teeth, design: Design, angle: Angle, s: float, k: float) -> Crest:
+    """The crest of zone s and rim k near the angle, over all FS phases."""
+    at = branch_at(place_at(motion, angle.cos, angle.sin), motion, teeth, design, s, k)
+    return crest_of(at, teeth, design, angle, s, k, FARTHEST)
 
 
 @inlined
@@ -100,17 +108,24 @@ def _higher(one: Crest, two: Crest) -> Crest:
 
 
 @inlined
-def _top(motion: RigidMotion[float], teeth: Teeth, design: Design, crest: Crest) -> float:
-    """The height of a crest, from a parabola at the place to which the first one led."""
-    cos, sin = rotated(crest.cos, crest.sin, crest.step)
-    at = branch_at(place_at(motion, cos, sin), motion, teeth, design, crest.s, crest.k)
+def top_of(at: Branch, teeth: Teeth, design: Design, crest: Crest, farthest: float) -> float:
+    """The height of a `crest`, mm of arc, from a parabola of the branch `at` the place to which the first one led, at
+    most `farthest` (rad) away; `teeth` and `design` as before."""
     rate = design.advance + crest.s * at.offset_slope
     off = crest.off + design.advance * crest.step + crest.s * (at.offset - crest.offset)
     cos, sin = rotated(ONE, ZERO, off)
     slope = at.slope - teeth.fs * rate * sin
     bend = at.bend - teeth.fs * rate * rate * cos
-    step = clipped(slope / max(-bend, TINY), -FARTHEST, FARTHEST)
+    step = clipped(slope / max(-bend, TINY), -farthest, farthest)
     return at.value + teeth.fs * cos + step * (slope + HALF * step * bend)
+
+
+@inlined
+def _top(motion: RigidMotion[float], teeth: Teeth, design: Design, crest: Crest) -> float:
+    """The height of a crest, at the place to which its first parabola led."""
+    cos, sin = rotated(crest.cos, crest.sin, crest.step)
+    at = branch_at(place_at(motion, cos, sin), motion, teeth, design, crest.s, crest.k)
+    return top_of(at, teeth, design, crest, FARTHEST)
 
 
 @compiled

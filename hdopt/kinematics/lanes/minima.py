@@ -83,6 +83,32 @@ class Stretch(NamedTuple):
     d1: float
 
 
+class Look(NamedTuple):
+    """How far, rad, parabolas are followed, and whether the place that is looked at counts itself: where effects bend
+    the zones, a parabola may lead away from it to what is no lower."""
+
+    reach: float
+    stays: bool
+
+
+class Zone(NamedTuple):
+    """A zone around a place: where its deepest rim changes (rad from there) and how steeply the two cross (mm/rad), the
+    branches of the rim that is deepest before and after."""
+
+    change: float
+    rate: float
+    before: Branch
+    after: Branch
+
+
+class FsTeeth(NamedTuple):
+    """Amplitude of the FS teeth, mm of arc, Z_CS/Z_FS, and `stays` of `Look`."""
+
+    size: float
+    advance: float
+    stays: bool
+
+
 class Least(NamedTuple):
     """The least driving deviation found, mm of arc, and at which angle, rad."""
 
@@ -128,8 +154,9 @@ def _seen_from(part: Stretch, x: float) -> Stretch:
 
 
 @inlined
-def _lowest_of_phase(part: Stretch, fs: float, advance: float, cos: float, sin: float, best: Least) -> Least:
+def _lowest_of_phase(part: Stretch, teeth: FsTeeth, cos: float, sin: float, best: Least) -> Least:
     """The lower of `best` and the least driving deviation on a stretch for one FS phase, (cos, sin) at the angle 0."""
+    fs, advance = teeth.size, teeth.advance
     rate = advance + part.d1
     mean = part.mean + fs * part.h * cos
     mean1 = part.mean1 + fs * (part.h1 * cos - part.h * rate * sin)
@@ -145,16 +172,22 @@ def _lowest_of_phase(part: Stretch, fs: float, advance: float, cos: float, sin: 
     per = ONE / (gap1 if vanishes else bend)
     x = -(gap if vanishes else mean1 + side * gap1) * per
     x = clipped(x, part.low, part.high)
+    here = mean + abs(gap)
     mean += x * (mean1 + HALF * x * part.mean2)
     gap += x * (gap1 + HALF * x * gap2)
     # What the curvature leaves of the gap moves its zero a little.
     value = mean + (-mean1 * per * gap if vanishes else abs(gap))
+    if teeth.stays:
+        stays = here < value
+        value, x = here if stays else value, ZERO if stays else x
     less = value < best.value
     return Least(value if less else best.value, x if less else best.x)
 
 
 @inlined
-def _lowest_of_stretch(part: Stretch, fs: float, phase: float, design: Design, shortest: float, best: Least) -> Least:
+def _lowest_of_stretch(
+    part: Stretch, fs: float, phase: float, design: Design, shortest: float, look: Look, best: Least
+) -> Least:
     """The lower of `best` and the least driving deviation on a stretch, if it is longer than the shortest that counts.
 
     `phase` is that of one of the FS phases at the angle 0.
@@ -166,18 +199,19 @@ def _lowest_of_stretch(part: Stretch, fs: float, phase: float, design: Design, s
     other = math.sqrt(max(ZERO, ONE - wanted * wanted))
     target = angle_of(wanted, other)
     here = phase + design.advance * x + part.d
+    teeth = FsTeeth(flat, design.advance, look.stays)
     off = (here - target) * design.per_spacing
     off = (off - np.floor(off)) * design.spacing
     c, s = rotated(other, wanted, off)
-    least = _lowest_of_phase(part, flat, design.advance, c, s, Least(HUGE, ZERO))
+    least = _lowest_of_phase(part, teeth, c, s, Least(HUGE, ZERO))
     c, s = rotated(other, wanted, off - design.spacing)
-    least = _lowest_of_phase(part, flat, design.advance, c, s, least)
+    least = _lowest_of_phase(part, teeth, c, s, least)
     off = (here - PI + target) * design.per_spacing
     off = (off - np.floor(off)) * design.spacing
     c, s = rotated(-other, wanted, off)
-    least = _lowest_of_phase(part, flat, design.advance, c, s, least)
+    least = _lowest_of_phase(part, teeth, c, s, least)
     c, s = rotated(-other, wanted, off - design.spacing)
-    least = _lowest_of_phase(part, flat, design.advance, c, s, least)
+    least = _lowest_of_phase(part, teeth, c, s, least)
     less = least.value < best.value and part.high - part.low > shortest
     return Least(least.value if less else best.value, least.x + x if less else best.x)
 
@@ -208,15 +242,33 @@ def _moved(
 
 
 @inlined
-def _rim_change(place: Place, design: Design, s: float) -> tuple[float, float, float]:
-    """Where, seen from here, the deepest rim of zone s changes, which is the deepest one before, and how steeply they
-    cross, mm/rad."""
+def rim_change(place: Place, design: Design, s: float, reach: float) -> tuple[float, float, float]:
+    """Where, seen from a `place` under a `design`, the deepest rim of zone `s` changes (rad, within `reach`), which is
+    the deepest one before, and how steeply they cross, mm/rad."""
     gap, rate = rim_gap(place, design, s)
     changes = abs(rate) > TINY
     x = -gap / (rate if changes else ONE)
     rising = rate > ZERO if changes else gap < ZERO
     before = -ONE if rising else ONE
-    return clipped(x if changes else -REACH - REACH, -REACH, REACH), (before if changes else -before), abs(rate)
+    return clipped(x if changes else -reach - reach, -reach, reach), (before if changes else -before), abs(rate)
+
+
+@inlined
+def lowest_of_branches(one: Zone, two: Zone, fs: float, phase: float, design: Design, look: Look) -> Least:
+    """The least driving deviation (mm of arc) around a place, and how far from it (rad), of the branches of zones `one`
+    and `two` there, under a `design`; `fs` is the FS amplitude, mm of arc, `phase` that of one of the FS phases, rad;
+    `look` says how far they are followed."""
+    reach = look.reach
+    earlier, later = min(one.change, two.change), max(one.change, two.change)
+    ahead = one.change < two.change
+    of_one = _chosen(ahead, one.after, one.before)
+    of_two = _chosen(ahead, two.before, two.after)
+    before, after = _stretch(-reach, earlier, one.before, two.before), _stretch(later, reach, one.after, two.after)
+    # Seen from afar, a stretch that short may be on the wrong side of nothing.
+    shortest = min(SLIVER * abs(earlier * later) + TIE / max(min(one.rate, two.rate), TINY), LONG)
+    least = _lowest_of_stretch(before, fs, phase, design, ZERO, look, Least(HUGE, ZERO))
+    least = _lowest_of_stretch(_stretch(earlier, later, of_one, of_two), fs, phase, design, shortest, look, least)
+    return _lowest_of_stretch(after, fs, phase, design, ZERO, look, least)
 
 
 @inlined
@@ -225,23 +277,15 @@ def _lowest(
 ) -> tuple[Least, float, float]:
     cos, sin = _moved(motion, teeth, design, cos, sin, kind)
     place = place_at(motion, cos, sin)
-    first, k_one, rate_one = _rim_change(place, design, ONE)
-    second, k_two, rate_two = _rim_change(place, design, -ONE)
+    first, k_one, rate_one = rim_change(place, design, ONE, REACH)
+    second, k_two, rate_two = rim_change(place, design, -ONE, REACH)
     one_before = branch_at(place, motion, teeth, design, ONE, k_one)
     one_after = branch_at(place, motion, teeth, design, ONE, -k_one)
     two_before = branch_at(place, motion, teeth, design, -ONE, k_two)
     two_after = branch_at(place, motion, teeth, design, -ONE, -k_two)
+    one, two = Zone(first, rate_one, one_before, one_after), Zone(second, rate_two, two_before, two_after)
     phase = teeth.fs_phase + design.advance * angle_of(sin, cos)
-    earlier, later = min(first, second), max(first, second)
-    ahead = first < second
-    one = _chosen(ahead, one_after, one_before)
-    two = _chosen(ahead, two_before, two_after)
-    before, after = _stretch(-REACH, earlier, one_before, two_before), _stretch(later, REACH, one_after, two_after)
-    # Seen from afar, a stretch that short may be on the wrong side of nothing.
-    shortest = min(SLIVER * abs(earlier * later) + TIE / max(min(rate_one, rate_two), TINY), LONG)
-    least = _lowest_of_stretch(before, teeth.fs, phase, design, ZERO, Least(HUGE, ZERO))
-    least = _lowest_of_stretch(_stretch(earlier, later, one, two), teeth.fs, phase, design, shortest, least)
-    least = _lowest_of_stretch(after, teeth.fs, phase, design, ZERO, least)
+    least = lowest_of_branches(one, two, teeth.fs, phase, design, Look(REACH, False))
     cos, sin = rotated(cos, sin, least.x)
     return least, cos, sin
 

@@ -1,0 +1,150 @@
+"""Effects over one input turn as the lanes take them: cells for the scan, values with slopes and curvatures to look up.
+
+What repeats every turn is a periodic function of the input angle, so that its Fourier series gives slopes and
+curvatures; a parabola then holds it within half a cell. Cells are as many as that takes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from hdopt.arrays import Array, Singles
+from hdopt.kinematics.lanes.single import single
+
+FEWEST_CELLS, MOST_CELLS = 96, 4096
+LEFT_BY_CELL, LEFT_BY_PLACE = 1e-4, 2e-5
+"""What a parabola of an effect may leave within half a cell, and within half a place of the table, arcmin."""
+IN_CELL = 16
+"""Places of a cell at which what goes beyond its chord is looked for."""
+REPEATS = 1e-7
+"""arcmin by which turns may differ and still repeat: rounding of the input angle in effects of a high order."""
+OVERLAP, FARTHEST = 1.5, 0.12
+"""How many cells a parabola is followed, and how far, rad, at most to either side."""
+
+
+class Scan(NamedTuple):
+    """The cells: cosine and sine of their edges (c + 1,) and middles (c,). `edges` (c + 1, 4), mm of arc and mm/rad: of
+    the effects in both zones the mean, half the difference, and the same of how they change with the offset o, where
+    they stand on the CS. How far they go below and above their chord in a cell, (c,); half their difference at the
+    middles, (c,). w^2/8 and w/2 of the cells' width w, rad; how much half the difference changes in a cell at most."""
+
+    cos: Singles
+    sin: Singles
+    mid_cos: Singles
+    mid_sin: Singles
+    edges: Singles
+    below: Singles
+    above: Singles
+    mid: Singles
+    sag: float
+    half: float
+    step: float
+
+
+class Turn(NamedTuple):
+    """Effects of one direction over an input turn: the `scan`; value (mm of arc), slope and curvature (per rad) in zone
+    1, then in zone 2, on even places of the input angle, `fixed` (n, 6), and of the CS, `cs` (m, 6) or (0, 6); of the
+    latter the largest curvature and slope, and the range; how far a parabola is followed, rad."""
+
+    scan: Scan
+    fixed: Singles
+    cs: Singles
+    cs_bend: float
+    cs_slope: float
+    cs_range: float
+    reach: float
+
+
+def turn_of(zones: Array, cs: Array, turns: int, per_mm: float) -> Turn | None:
+    """What `zones` (2, m), mm of arc on even places of `turns` input turns, and `cs` (2, k), over a turn of the CS or
+    on no places, add; `per_mm` is arcmin per mm of arc. None where turns differ, or where no cell is fine enough."""
+    if zones.shape[1] % turns:
+        return None
+    folded = zones.reshape(2, turns, -1)
+    if float(np.ptp(folded, axis=1).max()) * per_mm > REPEATS:
+        return None
+    fixed, on_cs = _spectrum(folded[:, 0]), _spectrum(cs if cs.size else np.zeros((2, 2)))
+    bend = max(_largest(fixed, 3), _largest(on_cs, 3)) * per_mm
+    cells = max(FEWEST_CELLS, _parts(bend, LEFT_BY_CELL))
+    if cells > MOST_CELLS:
+        return None
+    places = max(folded.shape[2], _parts(bend, LEFT_BY_PLACE))
+    tables = [_table(spectrum, places) for spectrum in (fixed, on_cs)]
+    width = 2 * math.pi / cells
+    of_cs = tables[1] if cs.size else tables[1][:0]
+    return Turn(
+        _scan(fixed, on_cs, cells),
+        tables[0],
+        of_cs,
+        cs_bend=single(_largest(on_cs, 2)),
+        cs_slope=single(_largest(on_cs, 1)),
+        cs_range=single(float(np.ptp(tables[1][:, [0, 3]]))),
+        reach=single(min(FARTHEST, OVERLAP / 2 * width)),
+    )
+
+
+def _spectrum(values: Array) -> Array:
+    """Fourier coefficients of `values` (2, n) over a turn, the highest order left out where its phase is unknown."""
+    found: Array = np.fft.rfft(values) / values.shape[1]
+    if values.shape[1] % 2 == 0:
+        found[:, -1] = 0.0
+    return found
+
+
+def _derived(spectrum: Array, times: int, places: int) -> Array:
+    """The function, or so many `times` its derivative, on at least so many even `places` of a turn, (2, places)."""
+    orders = np.arange(spectrum.shape[1])
+    return np.asarray(np.fft.irfft(spectrum * (1j * orders) ** times, places) * places)
+
+
+def _largest(spectrum: Array, times: int) -> float:
+    """The largest value of that in either zone."""
+    return float(np.abs(_derived(spectrum, times, 2 * spectrum.shape[1])).max())
+
+
+def _parts(bend: float, left: float) -> int:
+    """Parts of a turn within half of which a parabola leaves no more than so much, by the largest third derivative."""
+    return math.ceil(math.pi * math.cbrt(bend / (6 * left)))
+
+
+def _table(spectrum: Array, places: int) -> Singles:
+    """Value, slope and curvature of both zones on so many places, (places, 6)."""
+    places = max(places, 2 * spectrum.shape[1])
+    rows = [_derived(spectrum, times, places)[zone] for zone in range(2) for times in range(3)]
+    return _singles(np.stack(rows, axis=1))
+
+
+def _scan(fixed: Array, on_cs: Array, cells: int) -> Scan:
+    """The cells of a turn for the effects of these spectra."""
+    inside = max(IN_CELL, 2 * math.ceil(max(fixed.shape[1], on_cs.shape[1]) / cells))
+    parts = (_derived(fixed, 0, cells * inside) + _derived(on_cs, 0, cells * inside)).reshape(2, cells, inside)
+    slopes = _derived(on_cs, 1, cells * inside)[:, ::inside]
+    first, share = parts[:, :, 0], np.arange(inside) / inside
+    after = np.roll(first, -1, axis=1)
+    beyond = parts - (first[:, :, None] * (1 - share) + after[:, :, None] * share)
+    below, above = np.maximum(-beyond.min(axis=(0, 2)), 0), np.maximum(beyond.max(axis=(0, 2)), 0)
+    one, two, half = first[0], first[1], parts[0] - parts[1]
+    # Zone 2 meets the CS at its end less o.
+    edges = np.stack([one + two, one - two, slopes[0] - slopes[1], slopes[0] + slopes[1]], axis=1) / 2
+    angle, width = np.arange(cells + 1) * (2 * math.pi / cells), 2 * math.pi / cells
+    middle = angle[:-1] + width / 2
+    return Scan(
+        _singles(np.cos(angle)),
+        _singles(np.sin(angle)),
+        _singles(np.cos(middle)),
+        _singles(np.sin(middle)),
+        _singles(np.concatenate([edges, edges[:1]])),
+        _singles(below),
+        _singles(above),
+        _singles(half[:, inside // 2] / 2),
+        sag=single(width**2 / 8),
+        half=single(width / 2),
+        step=single(float(np.ptp(half, axis=1).max()) / 2),
+    )
+
+
+def _singles(values: Array) -> Singles:
+    return np.ascontiguousarray(values, dtype=np.float32)
