@@ -208,6 +208,16 @@ def test_what_adds_to_what_is_told_is_seen(changes):
     assert beside_told(told_and_more(**changes)) is None
 
 
+def test_what_adds_to_what_is_told_is_located_and_likened(monkeypatch):
+    """Its own power, 0.5 of the base's 3; the place is that of friction, not of the scale, which is larger."""
+    monkeypatch.setattr(rules, "main_orders", lambda fit, contribution: [])
+    said = rules.more(SimpleNamespace(evidence=told_and_more(power=0.5)))
+    assert (said.verdict, said.effects, said.where["domain"]) == ("unknown", (), "reversal")
+    assert said.where["rms_arcmin"] == pytest.approx(0.5**0.5)
+    assert said.where["share_of_residual"] == pytest.approx(0.5 / 3)
+    assert "most resembles hysteresis" in said.says
+
+
 def test_a_placebo_must_reach_the_gain():
     """Half of it, in errors whose turns differ too little to say so: no explanation."""
     half = HeldOut(np.full(20, 2.0), np.full(20, 1.0), np.ones(20))
