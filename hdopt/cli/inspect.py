@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 UNITS = {"slope": "arcmin/deg"}
+NIL_ARCMIN = 5e-5
+"""An order below it would be shown as 0.0000."""
 
 
 @dataclass(frozen=True)
@@ -177,6 +179,8 @@ def _lines(found: Inspection, no_drive: bool) -> Iterator[str]:
     )
     yield from _lines_of_repeats(found)
     for line in sorted(found.orders, key=lambda o: -o.amplitude_arcmin)[:6]:
+        if line.amplitude_arcmin < NIL_ARCMIN:
+            break
         apart = "" if line.separable else " (not separable from its neighbours in this record)"
         yield f"order {line.symbol:10s} {line.amplitude_arcmin:.4f} arcmin  {line.origin}{apart}"
     for name, said in found.checks.items():

@@ -322,6 +322,7 @@ def test_a_beat_not_known_asks_for_a_drive_only_where_none_was_given(drive, asks
     said = capsys.readouterr().out
     assert "full beat: not known; record a whole output turn, or a quarter of one" in said
     assert ("with --drive" in said) == asks
+    assert "order 2 " in said and " 0.0000 arcmin" not in said
 
 
 def test_many_drives_name_the_outlier(tmp_path, capsys):
