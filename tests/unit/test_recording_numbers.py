@@ -22,7 +22,7 @@ from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.recording import Recording
 from hdopt.recordings.repairs import Checks, drop_incomplete_rows, drop_outliers, find_gaps, unwrap_counter
 from hdopt.recordings.rows import gather, quiet
-from hdopt.recordings.stiffness import torsion_of
+from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
 from hdopt.recordings.table import Channel, Table
 
 TURN, ARCMIN, RATIO, RATE = 2 * pi, pi / 10800, 80.0, 360
@@ -385,6 +385,74 @@ def test_mountings_scatter_beyond_their_repeats():
     alike = gauge(np.tile([1.0, 1.2, 0.9, 1.1], 3), np.repeat(["a", "b", "c"], 4))
     assert alike.reproducibility == 0.0
     assert replace(found, repeats=3).total == found.total
+
+
+def test_mountings_of_unequal_numbers():
+    """The mean squares' size for groups of 2, 3 and 5 is (10 - 38/10)/2 = 3.1 (Searle, Linear Models, 1971, ch. 10)."""
+    groups = [np.array([1.0, 1.2]), np.array([2.0, 2.1, 1.9]), np.array([1.5, 1.4, 1.6, 1.3, 1.7])]
+    values = np.concatenate(groups)
+    between = sum(len(g) * (g.mean() - values.mean()) ** 2 for g in groups) / 2
+    within = sum(len(g) * g.var() for g in groups) / 7
+    found = gauge(values, ["a"] * 2 + ["b"] * 3 + ["c"] * 5)
+    assert found.reproducibility == pytest.approx(sqrt((between - within) / 3.1))
+
+
+# figures at their edges
+
+
+def test_a_cell_scatters_as_the_mean_of_its_samples():
+    theta = there_and_back(4, 2, 3600)
+    found = figures.cells_of(recording(np.random.default_rng(7).normal(0, 0.05, len(theta)), theta))
+    assert len(found.error) < len(theta) / 4
+    # Of some 2000 cells and more the standard deviation is known to 2 %.
+    assert np.median(found.sigma) == pytest.approx(found.error.std(), rel=0.06)
+
+
+def test_an_encoders_step_scatters_evenly_over_itself():
+    """The standard deviation of what is spread evenly over 0.6 arcmin is 0.6/sqrt(12)."""
+    found = figures.cells_of(recording(np.zeros(8 * RATE), quantum_arcmin=0.6))
+    per_cell = RATE / round(TURN / found.width)
+    assert np.median(found.sigma) == pytest.approx(0.6 / sqrt(12 * per_cell))
+
+
+@pytest.mark.parametrize(("travel", "turns"), [(3.7, 3), (3.96, 4)])
+def test_a_turn_counts_where_nine_tenths_of_it_were_seen(travel, turns):
+    theta = np.arange(round(travel * RATE)) * TURN / RATE
+    found, _ = figures.turn_peak_to_peaks(cells(0.3 * np.sin(2 * theta), theta))
+    assert found == pytest.approx(np.full(turns, 0.6), rel=0.02)
+
+
+def test_the_largest_return_error_keeps_its_sign():
+    """Forward below backward by 0.25 to 0.75 arcmin."""
+    back = figures.return_error(cells(-0.25 * WAY * (1 + 0.5 * np.sin(there_and_back()))))
+    assert back.largest == pytest.approx(-0.75, abs=0.01)
+
+
+@pytest.mark.parametrize(("quantum", "count"), [(0.3, 1), (0.5, 0)])
+def test_a_slip_is_more_than_two_steps_of_the_encoder(quantum, count):
+    theta = np.arange(4 * RATE) * TURN / RATE
+    error = 0.05 * np.sin(2 * theta) + 0.8 * (theta >= 2 * TURN - 1e-9)
+    found = figures.slips(cells(error, theta), quantum)
+    assert len(found) == count
+    assert all(height == pytest.approx(0.8, abs=0.05) for _, height in found)
+
+
+def test_starting_torque_is_what_came_on_top_of_the_sensors_zero():
+    """A sensor that shows 0.3 Nm at rest; the drive starts at 1 Nm more and then runs at 0.4."""
+    k = np.arange(400)
+    theta = np.where(k <= 100, 0.0, 0.1 * (k - 100))
+    torque = 0.3 + np.where(k <= 100, k / 100, 0.4)
+    made = recording(np.zeros(400), theta, torque=torque)
+    assert starting_torque_nm(made) == pytest.approx(1.0)
+
+
+def test_the_first_way_of_a_sweep_does_not_count():
+    """It begins inside the loop; here it lies 3 arcmin beside it."""
+    made = sweep()
+    beside = replace(made, error_arcmin=made.error_arcmin + 3.0 * (np.arange(6000) < 500))
+    found, without = torsion_of(beside), torsion_of(made)
+    assert found.hysteresis_loss_arcmin == pytest.approx(0.4, rel=0.05)
+    assert found.stiffness == pytest.approx(without.stiffness, rel=1e-6)
 
 
 # repairs
