@@ -65,19 +65,6 @@ def test_lanes_find_what_every_turn_for_itself_has(effects, finely):
     assert off.max() < 5e-3
 
 
-NEAR_A_TIE = [171, 72]
-"""Of 256 random drives (seed 1), those whose crest another rim or zone makes than the one that drives at the middle of
-its cell: missed, it is 0.013 to 0.028 arcmin low."""
-
-
-def test_a_crest_where_another_zone_or_rim_drives_is_found():
-    """Within 1e-3 arcmin, as 99 % of drives are to be."""
-    name, keys = next(example for example in EXAMPLES if example[0] == "cs_tooth_harmonics")
-    rows, table = random_errors(256, seed=1).to_matrix()[NEAR_A_TIE], tabulate(DRIVE, [values_of(name, keys)], FORWARD)
-    found, expected = (f(DRIVE, rows, table) for f in (stacked_peak_to_peak_arcmin, matrix_peak_to_peak_arcmin))
-    assert found == pytest.approx(expected, abs=1e-3)
-
-
 LOBES = EffectValues("circular_spline_lobing", {"lobes": 6}, (0.001, 0.0005))
 
 
