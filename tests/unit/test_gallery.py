@@ -10,6 +10,8 @@ import pytest
 
 DOCS = Path(__file__).parents[2] / "docs"
 EXAMPLES = sorted((DOCS / "gallery").glob("example_*.py"))
+ROUNDING = 1e-6
+"""No picture of the gallery shows a quantity that varies by less in its unit."""
 
 
 @pytest.fixture(autouse=True)
@@ -27,8 +29,10 @@ def test_example(example):
     plt.close("all")
     runpy.run_path(str(example))
     drawn = [axes for figure in map(plt.figure, plt.get_fignums()) for axes in figure.axes if axes.has_data()]
+    heights = [axes.dataLim.height for axes in drawn]
     plt.close("all")
     assert drawn, "the example draws nothing"
+    assert min(heights) > ROUNDING, "what is drawn is what rounding left of nought"
 
 
 def test_there_are_examples_enough():
