@@ -29,6 +29,8 @@ SHORT = 0.5
 """Only stretches shorter than this many cells can be ties."""
 SAFETY = 2.0
 """How many times the largest second difference met on the grid a cell is allowed to bend."""
+ROUNDING_MM = 1e-13
+"""Gain, 1e-11 arcmin, below which no cell is followed: an error that is nought but for rounding may gain in all."""
 
 
 class Teeth(NamedTuple):
@@ -250,14 +252,14 @@ def _refine_piece(
         phase = 2 * math.pi * p / mesh.phases
         one, two = values[p, 0, :n], values[p, 1, :n]
         floor = np.maximum(np.minimum(one[:-1], one[1:]), np.minimum(two[:-1], two[1:]))
-        for i in np.flatnonzero(floor - margin < best[0]):
-            if _least_of_lines(one[i], two[i], one[i + 1], two[i + 1]) - margin < best[0]:
+        for i in np.flatnonzero(floor - margin < best[0] - ROUNDING_MM):
+            if _least_of_lines(one[i], two[i], one[i + 1], two[i + 1]) - margin < best[0] - ROUNDING_MM:
                 found = _extreme_in_cell(mesh, rims, phase, places[i], places[i + 1], -1, node)
                 best[0] = min(best[0], found)
         for zone in range(2):
             row = values[p, zone, :n]
-            for i in np.flatnonzero(np.maximum(row[:-1], row[1:]) + margin > best[1]):
-                if max(row[i], row[i + 1]) + margin > best[1]:
+            for i in np.flatnonzero(np.maximum(row[:-1], row[1:]) + margin > best[1] + ROUNDING_MM):
+                if max(row[i], row[i + 1]) + margin > best[1] + ROUNDING_MM:
                     found = _extreme_in_cell(mesh, rims, phase, places[i], places[i + 1], zone, node)
                     best[1] = max(best[1], -found)
 
