@@ -18,6 +18,13 @@ globalThis.HdoptCharts = (() => {
     return text.startsWith("-") ? `−${text.slice(1)}` : text;
   };
 
+  // Ends of the share that `kept` of `count` drawn alike hold at 95 % (Wilson 1927): 256 of 256 are at least 0.985.
+  const shareOf = (kept, count) => {
+    const z = 1.959964, share = kept / count, more = (z * z) / count;
+    const middle = share + more / 2, reach = z * Math.sqrt((share * (1 - share)) / count + more / (4 * count));
+    return [Math.max(0, (middle - reach) / (1 + more)), Math.min(1, (middle + reach) / (1 + more))];
+  };
+
   const ticks = (low, high, most) => {
     const rough = (high - low) / Math.max(1, most), power = 10 ** Math.floor(Math.log10(rough));
     const step = power * [1, 2, 5, 10].find((factor) => factor * power >= rough * 0.999);
@@ -313,5 +320,5 @@ globalThis.HdoptCharts = (() => {
     }
   };
 
-  return { readTheme, short, waveform, carpet, cloud, orders, quarter, colourOf };
+  return { readTheme, short, shareOf, waveform, carpet, cloud, orders, quarter, colourOf };
 })();
