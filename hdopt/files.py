@@ -176,9 +176,9 @@ DEEP = 100
 """Brackets open at a time beyond any sound file."""
 
 
-def line_of(text: str, part: str) -> int:
-    """The line of `text` in which `part` begins; the first where it is not in it."""
-    return text.count("\n", 0, max(0, text.find(part))) + 1
+def line_of(text: str, part: str, start: int = 0) -> int:
+    """The line of `text` in which `part` begins, from letter `start` on; the first where it is not in it."""
+    return text.count("\n", 0, max(0, text.find(part, max(0, start)))) + 1
 
 
 def line_of_depth(text: str) -> int:

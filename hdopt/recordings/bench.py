@@ -6,6 +6,7 @@ Columns with units, signs, counts a turn, gears, sensor steps and calibration; t
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,12 +14,16 @@ from pathlib import Path
 from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
 from hdopt.errors import HdoptError, unknown_name
+from hdopt.files import line_of, line_of_depth
 from hdopt.recordings.columns import Column
 from hdopt.recordings.units import CHANNEL_UNITS, parse_unit
+from hdopt.toml_lines import Keys, closest_line, key_lines
 
 BENCH_KEYS = ("name", "ratio", "columns")
 LARGEST, LONGEST_SHOWN = 1e300, 60
 """Above which a number is a slip of the pen, and characters of a value that a message shows."""
+MOST_DIGITS = 4300
+"""Of an integer that Python reads."""
 COLUMN_KEYS = ("column", "unit", "counts_per_turn", "gear", "sign", "step_deg", "uncertainty_arcsec", "calibration")
 
 
@@ -32,34 +37,59 @@ class Bench:
 
 
 def load_bench(path: Path) -> Bench:
-    """A bench file, checked; raises `HdoptError` with the file and the key where it is not sound.
+    """A bench file, checked; raises `HdoptError` with the file, the line and the key where it is not sound.
 
     `path` is the TOML file.
     """
+    text = _text_of(path)
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError as error:
-        raise HdoptError(f"no file {path}; give a bench file, or make one with hdopt inspect --write-bench") from error
-    except (OSError, ValueError, RecursionError) as error:  # of ValueError: not UTF-8, not TOML, thousands of digits
-        said = (str(error).splitlines() or ["nested too deep"])[0][:200]
-        raise HdoptError(f"{path.name or path} cannot be read as TOML: {said}") from error
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        said = str(error).replace("end of document", f"line {len(text.splitlines())}, the end of the file")
+        raise HdoptError(f"{path.name} cannot be read as TOML: {said[:200]}") from error
+    except (ValueError, RecursionError) as error:  # of ValueError: an integer of thousands of digits
+        endless = re.search(rf"\d{{{MOST_DIGITS}}}", text)
+        line = line_of(text, endless.group()) if endless else line_of_depth(text)
+        why = f"an integer of more than {MOST_DIGITS} digits" if endless else "nested too deeply"
+        raise HdoptError(f"{path.name}, line {line}: cannot be read as TOML: {why}") from error
+    at = _Places(path.name, key_lines(text))
     for key in content:
         if key not in BENCH_KEYS:
-            raise HdoptError(f"{path.name}: {unknown_name('key', key, BENCH_KEYS)}")
+            raise HdoptError(f"{at(key)}: {unknown_name('key', key, BENCH_KEYS)}")
     ratio = content.get("ratio")
     if ratio is not None and not _is_positive(ratio):
-        raise HdoptError(f"{path.name}: ratio is {_shown(ratio)}; give a finite number above 0")
+        raise HdoptError(f"{at('ratio')}: ratio is {_shown(ratio)}; give a finite number above 0")
     columns = content.get("columns", {})
     if not isinstance(columns, dict):
-        raise HdoptError(f"{path.name}: columns must be tables [columns.input], [columns.output], ...")
+        raise HdoptError(f"{at('columns')}: columns must be tables [columns.input], [columns.output], ...")
     name = content.get("name", "")
     if not isinstance(name, str):
-        raise HdoptError(f"{path.name}: name is {_shown(name)}; give a text in quotes")
+        raise HdoptError(f"{at('name')}: name is {_shown(name)}; give a text in quotes")
     return Bench(
         name,
         None if ratio is None else float(ratio),
-        {channel: _column(path.name, channel, entry) for channel, entry in columns.items()},
+        {channel: _column(at, channel, entry) for channel, entry in columns.items()},
     )
+
+
+def _text_of(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        raise HdoptError(f"no file {path}; give a bench file, or make one with hdopt inspect --write-bench") from error
+    except (OSError, ValueError) as error:  # of ValueError: not UTF-8
+        raise HdoptError(f"{path.name or path} cannot be read as TOML: {str(error)[:200]}") from error
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where the keys of a `file` stand, by its `lines`."""
+
+    file: str
+    lines: Mapping[Keys, int]
+
+    def __call__(self, *path: str) -> str:
+        return f"{self.file}, line {closest_line(self.lines, path)}"
 
 
 def _is_positive(value: object) -> bool:
@@ -74,27 +104,31 @@ def _shown(value: object) -> str:
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
-def _column(file: str, channel: str, entry: Any) -> Column:
-    where = f"{file}: [columns.{channel}]"
+def _column(at: _Places, channel: str, entry: Any) -> Column:
+    def where(*key: str) -> str:
+        return f"{at('columns', channel, *key)}: [columns.{channel}]"
+
     if channel not in CHANNEL_UNITS:
-        raise HdoptError(f"{file}: {unknown_name('channel', channel, CHANNEL_UNITS)}")
+        raise HdoptError(f"{at('columns', channel)}: {unknown_name('channel', channel, CHANNEL_UNITS)}")
     if not isinstance(entry, dict) or not isinstance(entry.get("column"), str):
-        raise HdoptError(f"{where} needs column = the column's name or path in the file")
+        raise HdoptError(f"{where('column')} needs column = the column's name or path in the file")
     for key in entry:
         if key not in COLUMN_KEYS:
-            raise HdoptError(f"{where}: {unknown_name('key', key, COLUMN_KEYS)}")
+            raise HdoptError(f"{where(key)}: {unknown_name('key', key, COLUMN_KEYS)}")
     for key in ("counts_per_turn", "gear"):
         if key in entry and not _is_positive(entry[key]):
-            raise HdoptError(f"{where} {key} is {_shown(entry[key])}; give a finite number above 0")
+            raise HdoptError(f"{where(key)} {key} is {_shown(entry[key])}; give a finite number above 0")
     sign = entry.get("sign", 1)
     if isinstance(sign, bool) or sign not in (1, -1):
-        raise HdoptError(f"{where} sign is {_shown(sign)}; give 1 or -1")
+        raise HdoptError(f"{where('sign')} sign is {_shown(sign)}; give 1 or -1")
     unit = entry.get("unit", "")
     if not isinstance(unit, str):
-        raise HdoptError(f'{where} unit is {_shown(unit)}; give a text in quotes, such as "deg"')
+        raise HdoptError(f'{where("unit")} unit is {_shown(unit)}; give a text in quotes, such as "deg"')
     if "counts_per_turn" in entry:
         if unit not in ("", "counts"):
-            raise HdoptError(f"{where} has unit {unit!r} and counts_per_turn; a column is one of both: take one out")
+            raise HdoptError(
+                f"{where('unit')} has unit {unit!r} and counts_per_turn; a column is one of both: take one out"
+            )
         unit = f"counts/{entry['counts_per_turn']}"
     if "gear" in entry and entry["gear"] != 1:
         unit += f"/gear{entry['gear']}"
@@ -102,14 +136,14 @@ def _column(file: str, channel: str, entry: Any) -> Column:
         if unit:
             parse_unit(channel, unit)
     except HdoptError as error:
-        raise HdoptError(f"{where}: {error}") from error
+        raise HdoptError(f"{where('unit')}: {error}") from error
     return Column(
         entry["column"],
         unit,
         float(sign),
-        _calibration(where, entry.get("calibration", [])),
-        _not_negative(where, "step_deg", entry),
-        _not_negative(where, "uncertainty_arcsec", entry),
+        _calibration(where("calibration"), entry.get("calibration", [])),
+        _not_negative(where("step_deg"), "step_deg", entry),
+        _not_negative(where("uncertainty_arcsec"), "uncertainty_arcsec", entry),
     )
 
 

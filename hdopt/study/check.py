@@ -11,9 +11,10 @@ from pydantic_core import ErrorDetails
 
 from hdopt.errors import HdoptError, IncompleteStudy, unknown_name
 from hdopt.study.base import Section
-from hdopt.study.document import Document, Keys
+from hdopt.study.document import Document
 from hdopt.study.nearest import unknown_key
 from hdopt.study.schema import SECTIONS, known_paths, section_model, step_sections
+from hdopt.toml_lines import Keys
 from hdopt.words import counted
 
 KINDS = {

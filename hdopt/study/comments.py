@@ -9,7 +9,8 @@ from typing import Any  # Any: tomlkit's containers, whose items are of many kin
 import tomlkit
 from tomlkit.items import Comment, Table, Whitespace
 
-from hdopt.study.document import SET_ON_COMMAND_LINE, Document, Keys
+from hdopt.study.document import SET_ON_COMMAND_LINE, Document
+from hdopt.toml_lines import Keys
 
 SET = "set beside the file"
 """Said of a key that --set or `with_` gave: what the file says of its value no longer holds."""

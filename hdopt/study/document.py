@@ -13,8 +13,7 @@ from typing import Any  # Any: what a study file holds, of TOML's several kinds
 from hdopt.errors import HdoptError, shown
 from hdopt.files import line_of, line_of_depth, read_text
 from hdopt.study.toml_faults import why_no_toml
-
-Keys = tuple[str, ...]
+from hdopt.toml_lines import Keys, key_lines
 
 SET_ON_COMMAND_LINE = 0
 """Stands for the line of a key that --set, or `Study.with_`, gave."""
@@ -23,12 +22,6 @@ DEEPEST = 12
 """Levels of tables and arrays; the deepest study that ships has five."""
 LONGEST_KEY = 200
 LARGEST_INTEGER = 2**63 - 1
-LONGEST_HEAD = 1000
-"""Letters of a line that are searched for its key."""
-
-_TABLE = re.compile(r"^\s*\[\[?\s*([^\]]+?)\s*\]\]?\s*(#.*)?$")
-_PART = re.compile(r"\"[^\"]*\"|'[^']*'|[^.]+")
-_KEY = re.compile(r"^\s*((?:\"[^\"]*\"|'[^']*'|[A-Za-z0-9_.-])+)\s*=")
 
 
 @dataclass(frozen=True)
@@ -70,7 +63,7 @@ def parse_document(text: str, source: str) -> Document:
         digits = re.search(r"\d{4300}", text)
         place = f"{source}, line {line_of(text, digits.group() if digits else '')}"
         raise HdoptError(f"{place}: holds an integer of more than 4300 digits; TOML allows 64 bits") from error
-    document = Document(data, source, _key_lines(text), (text,))
+    document = Document(data, source, key_lines(text), (text,))
     _check_size(document)
     return document
 
@@ -94,24 +87,6 @@ def _check_size(document: Document) -> None:
             todo += [((*path, key), item) for key, item in value.items()]
         elif isinstance(value, list):
             todo += [((*path, str(number)), item) for number, item in enumerate(value)]
-
-
-def _key_lines(text: str) -> dict[Keys, int]:
-    """Line of every table header and of every key that starts a line."""
-    lines: dict[Keys, int] = {}
-    table: Keys = ()
-    for number, whole in enumerate(text.split("\n"), 1):
-        line = whole[:LONGEST_HEAD]
-        if header := _TABLE.match(line):
-            table = _split(header.group(1))
-            lines.setdefault(table, number)
-        elif key := _KEY.match(line):
-            lines.setdefault(table + _split(key.group(1)), number)
-    return lines
-
-
-def _split(dotted: str) -> Keys:
-    return tuple(part.strip().strip("\"'") for part in _PART.findall(dotted))
 
 
 KIND_KEYS = ("distribution", "model", "callout")

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
-from hdopt.study.document import SET_ON_COMMAND_LINE, Document, Keys, leaves
+from hdopt.study.document import SET_ON_COMMAND_LINE, Document, leaves
+from hdopt.toml_lines import Keys
 
 NOTHING = 400.0
 """Decades by which 0 is off where something else is usual: more than any two finite numbers are apart."""

@@ -7,7 +7,8 @@ import re
 from collections.abc import Mapping
 from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
-from hdopt.study.document import Document, Keys, leaves
+from hdopt.study.document import Document, leaves
+from hdopt.toml_lines import Keys
 
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 EXAMPLE = re.compile(r"\b(?:such as|as in|as with|for example)\b[^;]*")

@@ -9,7 +9,8 @@ from types import UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints  # Any: values of TOML, and annotations
 
 from hdopt.study.base import Section
-from hdopt.study.document import KIND_KEYS, Keys
+from hdopt.study.document import KIND_KEYS
+from hdopt.toml_lines import Keys
 
 SECTIONS: dict[str, str] = {
     "study": "hdopt.study.drive:StudySection",

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hdopt.errors import HdoptError, shown, unknown_name
-from hdopt.files import read_json
+from hdopt.files import line_of, read_json, read_text
 
 if TYPE_CHECKING:
     from hdopt.study import Study
@@ -30,15 +31,17 @@ def read_allocation(path: Path, study: Study) -> dict[str, float]:
             f"{path}: is of the study {shown(str(result['study']))}, not of {study.name!r}; give the allocation of "
             "this study"
         )
-    known = _tolerances_of(study)
+    known, text = _tolerances_of(study), read_text(path, WANTED)
+    errors_at = text.find('"errors"')
     found = {}
     for name, row in errors.items():
         value = row.get("tolerance") if isinstance(row, dict) else None
+        at = f"{path}, line {line_of(text, json.dumps(name), errors_at)}"
         if name not in known:
-            raise HdoptError(f"{path}: {unknown_name('tolerance', name, sorted(known))}; is it of another study?")
+            raise HdoptError(f"{at}: {unknown_name('tolerance', name, sorted(known))}; is it of another study?")
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value <= 0:
             said = shown(str(value)) if isinstance(value, int | float | str) else "no number"
-            raise HdoptError(f"{path}: the tolerance of {name} is {said}; it must be a finite number above 0")
+            raise HdoptError(f"{at}: the tolerance of {name} is {said}; it must be a finite number above 0")
         found[name] = float(value)
     return found
 

@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 LAYERS = [
-    {"arrays", "interruption", "words"},
+    {"arrays", "interruption", "toml_lines", "words"},
     {"bench", "errors", "figures", "files", "keywords", "late", "parallel"},
     {"drive"},
     {"effects", "recordings", "kinematics", "mechanics"},
@@ -44,6 +44,7 @@ TOP = {
     "interruption.py",
     "keywords.py",
     "late.py",
+    "toml_lines.py",
     "words.py",
 }
 

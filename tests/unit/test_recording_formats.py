@@ -409,7 +409,7 @@ def test_what_is_given_beside_a_bench_file_is_not_silently_stronger(truth, tmp_p
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("ratoi = 3", r"b.toml: unknown key 'ratoi'; did you mean 'ratio'"),
+        ("ratoi = 3", r"b.toml, line 1: unknown key 'ratoi'; did you mean 'ratio'"),
         ("[columns.input]\nunit = 'deg'", "needs column = "),
         ("[columns.input]\ncolumn = 'a'\nsign = 2", "sign is 2; give 1 or -1"),
         ("[columns.input]\ncolumn = 'a'\ncounts_per_turn = -1", "give a finite number above 0"),
@@ -444,7 +444,23 @@ def test_bench_file_is_checked(tmp_path, text, message):
     with pytest.raises(HdoptError, match=message) as refused:
         load_bench(tmp_path / "b.toml")
     assert str(refused.value).startswith("b.toml")
+    assert re.search(r"\bline \d+", str(refused.value)), refused.value
     assert len(str(refused.value)) < 400
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("name = 'b'\n# of the lab\nratio = -80", 3),
+        ("ratio = 80\n\n[columns.input]\ncolumn = 'a'\nsign = 2", 5),
+        ("ratio = 80\n[columns.output]\nunit = 'deg'", 2),  # the key is missing: its table
+        ("ratio = 80\n[columns.output]\ncolumn = 'b'\ncolour = 'red'", 4),
+    ],
+)
+def test_a_bench_file_is_refused_with_its_line(tmp_path, text, line):
+    (tmp_path / "b.toml").write_text(text)
+    with pytest.raises(HdoptError, match=rf"^b\.toml, line {line}: "):
+        load_bench(tmp_path / "b.toml")
 
 
 def test_a_bench_file_may_begin_with_a_byte_order_mark(tmp_path):

@@ -220,3 +220,19 @@ def test_what_is_no_tolerance_of_a_study_is_refused(tmp_path):
     write_text(tmp_path / "a.json", to_json(allocated(study.name, {"correlation": 0.01}, 1.0, "").to_dict()))
     with pytest.raises(HdoptError, match="unknown tolerance 'correlation'"):
         read_allocation(tmp_path / "a.json", correlated)
+
+
+@pytest.mark.parametrize(
+    ("row", "line"), [('"wg_eccentricity_mm": {"tolerance": 0}', 5), ('"gap": {"tolerance": 1}', 5)]
+)
+def test_an_allocation_is_refused_with_its_line(tmp_path, row, line):
+    """Fault caught: the line of another place where the name stands, here among the shares before."""
+    lines = [
+        '{"shares": {"wg_eccentricity_mm": 1, "gap": 2},',
+        '"errors": {',
+        '"axis_eccentricity_mm": {',
+        '"tolerance": 1},',
+    ]
+    write_text(tmp_path / "a.json", "\n".join([*lines, row + "}}"]))
+    with pytest.raises(HdoptError, match=rf"a\.json, line {line}: "):
+        read_allocation(tmp_path / "a.json", load_study("csf-25-80"))
