@@ -10,8 +10,8 @@ from hdopt.arrays import Index, Singles
 from hdopt.kinematics.compiled_closed_form import compiled
 from hdopt.kinematics.lanes.compiled import inlined
 from hdopt.kinematics.lanes.minima import GROUP, Look, Zone, lowest_of_branches, rim_change
-from hdopt.kinematics.lanes.motion import LANES, Branch, Design, Place, branch_at, motion_of, place_at, teeth_of
-from hdopt.kinematics.lanes.single import HUGE, ONE, TURN, narrowed, sine_cosine
+from hdopt.kinematics.lanes.motion import LANES, Branch, Design, Place, teeth_of
+from hdopt.kinematics.lanes.single import HUGE, ONE, TURN, narrowed
 from hdopt.simulation.turn.effects import Turn
 from hdopt.simulation.turn.rows import (
     ANGLE,
@@ -27,22 +27,17 @@ from hdopt.simulation.turn.rows import (
     MET,
     PER_TURN,
     VALUE,
+    branch_of,
     fill_list,
     folded,
     look_up,
     middle,
     offsets,
-    with_effects,
+    place_of,
 )
 
 LOOKS = 2
 """Times that a place is looked at."""
-
-
-@inlined
-def _place(work: Singles, i: int, design: Design) -> Place:
-    sin, cos = sine_cosine(work[i + ANGLE])
-    return place_at(motion_of(work, i, design), cos, sin)
 
 
 @compiled
@@ -51,7 +46,7 @@ def _meet(work: Singles, count: int, design: Design, turn: Turn) -> None:
     for group in range(count // GROUP if len(turn.cs) else 0):
         for lane in range(GROUP):
             i = LIST + group * GROUP + lane
-            place = _place(work, i, design)
+            place = place_of(work, i, design)
             _, k_one, _ = rim_change(place, design, ONE, turn.reach)
             _, k_two, _ = rim_change(place, design, -ONE, turn.reach)
             work[i + MET] = work[i + ANGLE] + PER_TURN * offsets(place, design, ONE, k_one)[0]
@@ -70,10 +65,8 @@ def _meet(work: Singles, count: int, design: Design, turn: Turn) -> None:
 @inlined
 def _branch(work: Singles, i: int, place: Place, design: Design, s: float, k: float, number: int) -> Branch:
     """The branch of zone s and rim k with its effects, which are those of this number of the four."""
-    motion, teeth = motion_of(work, i, design), teeth_of(work, i)
-    rate = ONE + s * offsets(place, design, s, k)[1]
-    branch = branch_at(place, motion, teeth, design, s, k)
-    return with_effects(branch, work, i + CS_MET + 3 * number * LANES, i + FIXED_MET + 3 * (number // 2) * LANES, rate)
+    cs, fixed = i + CS_MET + 3 * number * LANES, i + FIXED_MET + 3 * (number // 2) * LANES
+    return branch_of(work, i, place, design, s, k, cs, fixed)
 
 
 @compiled
@@ -82,7 +75,7 @@ def _look(work: Singles, groups: int, design: Design, reach: float) -> None:
     for group in range(groups):
         for lane in range(GROUP):
             i = LIST + group * GROUP + lane
-            place, teeth = _place(work, i, design), teeth_of(work, i)
+            place, teeth = place_of(work, i, design), teeth_of(work, i)
             first, k_one, rate_one = rim_change(place, design, ONE, reach)
             second, k_two, rate_two = rim_change(place, design, -ONE, reach)
             before, after = (

@@ -10,8 +10,18 @@ from hdopt.arrays import Index, Singles
 from hdopt.kinematics.compiled_closed_form import compiled
 from hdopt.kinematics.lanes.compiled import inlined
 from hdopt.kinematics.lanes.minima import GROUP
-from hdopt.kinematics.lanes.motion import DESCRIPTION, LANES, Branch, Design, Place
-from hdopt.kinematics.lanes.single import HALF, TURN, narrowed, single
+from hdopt.kinematics.lanes.motion import (
+    DESCRIPTION,
+    LANES,
+    Branch,
+    Design,
+    Place,
+    branch_at,
+    motion_of,
+    place_at,
+    teeth_of,
+)
+from hdopt.kinematics.lanes.single import HALF, ONE, TURN, narrowed, sine_cosine, single
 
 PER_TURN = single(1 / (2 * math.pi))
 
@@ -79,9 +89,18 @@ def look_up(table: Singles, column: int, turns: float, work: Singles, at: int) -
 
 
 @inlined
-def with_effects(branch: Branch, work: Singles, cs: int, fixed: int, rate: float) -> Branch:
-    """A `branch` with the effects that `work` holds at `cs` and at `fixed`; the CS is passed `rate` times as fast as
-    the input turns."""
+def place_of(work: Singles, i: int, design: Design) -> Place:
+    """What both zones pass at the place of lane `i` of `work`, under a `design`."""
+    sin, cos = sine_cosine(work[i + ANGLE])
+    return place_at(motion_of(work, i, design), cos, sin)
+
+
+@inlined
+def branch_of(work: Singles, i: int, place: Place, design: Design, s: float, k: float, cs: int, fixed: int) -> Branch:
+    """The branch of zone `s` and rim `k` of lane `i` at its `place` under a `design`, with the effects that `work`
+    holds at `cs` and at `fixed`; the CS is passed faster than the input turns by the offset's slope."""
+    branch = branch_at(place, motion_of(work, i, design), teeth_of(work, i), design, s, k)
+    rate = ONE + s * offsets(place, design, s, k)[1]
     return Branch(
         branch.value + work[cs] + work[fixed],
         branch.slope + work[cs + LANES] * rate + work[fixed + LANES],

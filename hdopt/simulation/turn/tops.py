@@ -10,8 +10,8 @@ from hdopt.kinematics.compiled_closed_form import compiled
 from hdopt.kinematics.lanes.compiled import inlined
 from hdopt.kinematics.lanes.maxima import Angle, Crest, crest_of, top_of
 from hdopt.kinematics.lanes.minima import GROUP
-from hdopt.kinematics.lanes.motion import LANES, Branch, Design, Place, branch_at, motion_of, place_at, teeth_of
-from hdopt.kinematics.lanes.single import HUGE, ONE, TURN, TWO, ZERO, narrowed, sine_cosine
+from hdopt.kinematics.lanes.motion import LANES, Branch, Design, teeth_of
+from hdopt.kinematics.lanes.single import HUGE, ONE, TURN, TWO, ZERO, narrowed
 from hdopt.simulation.turn.effects import Turn
 from hdopt.simulation.turn.rows import (
     ANGLE,
@@ -40,28 +40,21 @@ from hdopt.simulation.turn.rows import (
     VALUE,
     ZONE,
     ZONE_AT,
+    branch_of,
     fill_list,
     folded,
     look_up,
     middle,
     offsets,
-    with_effects,
+    place_of,
 )
 
 
 @inlined
-def _place(work: Singles, i: int, design: Design) -> Place:
-    sin, cos = sine_cosine(work[i + ANGLE])
-    return place_at(motion_of(work, i, design), cos, sin)
-
-
-@inlined
-def _branch(work: Singles, i: int, place: Place, design: Design) -> Branch:
-    """The branch of the lane's zone and rim with its effects."""
-    s, k = work[i + ZONE], work[i + RIM]
-    rate = ONE + s * offsets(place, design, s, k)[1]
-    branch = branch_at(place, motion_of(work, i, design), teeth_of(work, i), design, s, k)
-    return with_effects(branch, work, i + CS_MET, i + FIXED_MET, rate)
+def _branch(work: Singles, i: int, design: Design) -> Branch:
+    """The branch of the lane's zone and rim at its place, with its effects."""
+    place = place_of(work, i, design)
+    return branch_of(work, i, place, design, work[i + ZONE], work[i + RIM], i + CS_MET, i + FIXED_MET)
 
 
 @compiled
@@ -71,7 +64,7 @@ def _meet(work: Singles, count: int, design: Design, turn: Turn) -> None:
         for lane in range(GROUP):
             i = LIST + group * GROUP + lane
             s = work[i + ZONE]
-            o = offsets(_place(work, i, design), design, s, work[i + RIM])[0]
+            o = offsets(place_of(work, i, design), design, s, work[i + RIM])[0]
             work[i + MET] = work[i + ANGLE] + s * PER_TURN * o
     for i in range(LIST, LIST + count):
         column = 0 if work[i + ZONE] > ZERO else 3
@@ -86,7 +79,7 @@ def _find(work: Singles, groups: int, design: Design, reach: float) -> None:
     for group in range(groups):
         for lane in range(GROUP):
             i = LIST + group * GROUP + lane
-            at, turned = _branch(work, i, _place(work, i, design), design), work[i + ANGLE]
+            at, turned = _branch(work, i, design), work[i + ANGLE]
             angle = Angle(ONE, ZERO, TURN * turned)
             crest = crest_of(at, teeth_of(work, i), design, angle, work[i + ZONE], work[i + RIM], reach)
             work[i + OFF], work[i + OFFSET], work[i + STEP] = crest.off, crest.offset, crest.step
@@ -99,7 +92,7 @@ def _measure(work: Singles, groups: int, design: Design, reach: float) -> None:
     for group in range(groups):
         for lane in range(GROUP):
             i = LIST + group * GROUP + lane
-            at, s, k = _branch(work, i, _place(work, i, design), design), work[i + ZONE], work[i + RIM]
+            at, s, k = _branch(work, i, design), work[i + ZONE], work[i + RIM]
             crest = Crest(ZERO, ONE, ZERO, s, k, work[i + OFF], work[i + OFFSET], work[i + STEP])
             work[i + VALUE] = top_of(at, teeth_of(work, i), design, crest, reach)
 
