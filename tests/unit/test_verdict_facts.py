@@ -205,13 +205,14 @@ def test_what_adds_to_what_is_told_is_seen(changes):
     one_more = penalty(found.fit.terms, 0.0, Scale(1000)) - penalty(found.fit.terms[:1], 0.0, Scale(1000))
     assert found.effects == (SCALE, "hysteresis")
     assert apart == pytest.approx(30.0 - one_more)
-    assert beside_told(told_and_more(**changes)) is None
+    assert beside_told(told_and_more(**changes)) == (None, 0.0)
 
 
 def test_what_adds_to_what_is_told_is_located_and_likened(monkeypatch):
     """Its own power, 0.5 of the base's 3; the place is that of friction, not of the scale, which is larger."""
     monkeypatch.setattr(rules, "main_orders", lambda fit, contribution: [])
-    said = rules.more(SimpleNamespace(evidence=told_and_more(power=0.5)))
+    found = told_and_more(power=0.5)
+    said = rules.more(SimpleNamespace(evidence=found, more=beside_told(found)[0]))
     assert (said.verdict, said.effects, said.where["domain"]) == ("unknown", (), "reversal")
     assert said.where["rms_arcmin"] == pytest.approx(0.5**0.5)
     assert said.where["share_of_residual"] == pytest.approx(0.5 / 3)

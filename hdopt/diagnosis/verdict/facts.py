@@ -18,6 +18,7 @@ from hdopt.diagnosis.verdict.named_effect import NamedEffect, describe
 from hdopt.diagnosis.verdict.residual_structure import (
     beaten_by_generic,
     clearly_unexplained,
+    effect_powers,
     left_over_passes,
     momentary,
     outside_share,
@@ -132,6 +133,8 @@ class Findings:
     pairs: tuple[Confounding, ...] = ()
     effects: tuple[NamedEffect, ...] = ()
     """Every effect that is said, the largest first."""
+    more: Candidate | None = None
+    """The set that adds most to what is told, if any does."""
 
 
 def effects_said(evidence: Evidence, facts: Facts, high: Candidate | None) -> tuple[NamedEffect, ...]:
@@ -154,6 +157,7 @@ def find(evidence: Evidence) -> Findings:
     high = evidence.high.best if evidence.high is not None and evidence.high.best.fit.terms else None
     if high is not None and not (suffice and stands_out(high, evidence)):
         high = None
+    more, adding = beside_told(evidence)
     facts = Facts(
         settings=settings,
         turns_suffice=suffice,
@@ -178,7 +182,7 @@ def find(evidence: Evidence) -> Findings:
         left_over_passes=left_over_passes(evidence),
         above_resolution=above_resolution(evidence),
         beaten_by_generic=beaten_by_generic(evidence),
-        beside_told=(beside_told(evidence) or (None, 0.0))[1],
+        beside_told=adding,
     )
     pairs = confounded_pairs(evidence, facts.named, high) if facts.said else ()
     effects = effects_said(evidence, facts, high)
@@ -192,7 +196,7 @@ def find(evidence: Evidence) -> Findings:
         as_good = (*as_good, *imitating_sets(pairs, [one.id for one in effects], settings))
     as_good = tuple(dict.fromkeys(as_good))[: settings.most_rivals]
     again = found_again(evidence, effects)
-    return Findings(evidence, replace(facts, rivals=as_good, found_again=again), high, pairs, effects)
+    return Findings(evidence, replace(facts, rivals=as_good, found_again=again), high, pairs, effects, more)
 
 
 def unseen_rms(evidence: Evidence) -> float:
@@ -205,12 +209,6 @@ def unseen_rms(evidence: Evidence) -> float:
 def found_again(evidence: Evidence, effects: Sequence[NamedEffect]) -> bool:
     """Whether the diagnosis of a part of the turns, if `evidence` has one, found every one of the `effects` said."""
     return evidence.nested is None or {one.id for one in effects} <= set(evidence.nested.effects)
-
-
-def effect_powers(candidate: Candidate) -> list[float]:
-    """Power (arcmin^2) of each term of `candidate` but a scale or clock that is off."""
-    powers = term_powers(candidate.fit)
-    return [power for power, name in zip(powers, candidate.effects, strict=True) if name not in TOLD]
 
 
 def above_resolution(evidence: Evidence) -> bool:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from hdopt.diagnosis.checks.assessment import Evidence
-from hdopt.diagnosis.inference.catalogue import is_outside, properties_of
+from hdopt.diagnosis.inference.catalogue import TOLD, is_outside, properties_of
 from hdopt.diagnosis.inference.cross_validation import paired_chance
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.numerical import TINY
@@ -24,6 +24,12 @@ MOMENTARY = frozenset({"_jump", "_bump"})
 def term_powers(fit: Fit) -> list[float]:
     """Power of each term's contribution, arcmin^2. `fit` holds the terms."""
     return [float(np.var(fit.contribution(i))) for i in range(len(fit.terms))]
+
+
+def effect_powers(candidate: Candidate) -> list[float]:
+    """Power (arcmin^2) of each term of `candidate` but a scale or clock that is off."""
+    powers = term_powers(candidate.fit)
+    return [power for power, name in zip(powers, candidate.effects, strict=True) if name not in TOLD]
 
 
 def momentary(evidence: Evidence) -> bool:

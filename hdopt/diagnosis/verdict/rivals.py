@@ -15,7 +15,7 @@ from hdopt.diagnosis.search.high_order import ripple_orders
 from hdopt.diagnosis.search.penalty import penalty
 from hdopt.diagnosis.settings import VerdictSettings
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
-from hdopt.diagnosis.verdict.residual_structure import term_powers
+from hdopt.diagnosis.verdict.residual_structure import effect_powers
 from hdopt.effects import EFFECTS, HIGH_ORDER
 
 Sets = tuple[tuple[str, ...], ...]
@@ -55,11 +55,11 @@ def scale_is_as_good(evidence: Evidence) -> bool:
     return any(best.log_bayes_factor - one.log_bayes_factor <= tie for one in alone)
 
 
-def beside_told(evidence: Evidence) -> tuple[Candidate, float] | None:
+def beside_told(evidence: Evidence) -> tuple[Candidate | None, float]:
     """The set that adds most to the best of those that are told and never named, and by how much log evidence, each
     paying for its freedom and its search alone: a scale, a clock or a zero that is off has an exact shape, beside which
-    nothing is left. None where the `evidence` holds no such pair of sets, or none that adds, or what adds is small
-    beside the noise.
+    nothing is left. None and 0 where the `evidence` holds no such pair of sets, or none that adds, or what adds is
+    small beside the noise.
     """
     candidates, scale = evidence.selection.candidates, penalty_scale(evidence.selection.base.problem)
     least = evidence.settings.verdict.unconfirmed_share * evidence.extended_held_out.variance
@@ -69,17 +69,11 @@ def beside_told(evidence: Evidence) -> tuple[Candidate, float] | None:
 
     told = next((one for one in candidates if one.effects and EXACT_TOLD.issuperset(one.effects)), None)
     if told is None:
-        return None
-    more = (one for one in candidates if set(one.effects) > set(told.effects) and power_of_named(one) > least)
+        return None, 0.0
+    more = (one for one in candidates if set(one.effects) > set(told.effects) and sum(effect_powers(one)) > least)
     best = max(more, key=evidence_of, default=told)
     apart = evidence_of(best) - evidence_of(told)
-    return (best, apart) if apart > 0 else None
-
-
-def power_of_named(candidate: Candidate) -> float:
-    """Power (arcmin^2) of the terms of `candidate` that are not told beside the verdict."""
-    powers = zip(term_powers(candidate.fit), candidate.effects, strict=True)
-    return sum(power for power, name in powers if name not in TOLD)
+    return (best, apart) if apart > 0 else (None, 0.0)
 
 
 def placebo_as_good(evidence: Evidence, pairs: Sequence[Confounding]) -> Sets:

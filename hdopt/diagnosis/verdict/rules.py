@@ -16,12 +16,13 @@ from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.verdict.facts import Facts, Findings, sparse, unseen_rms
 from hdopt.diagnosis.verdict.named_effect import NamedEffect, main_orders
 from hdopt.diagnosis.verdict.residual_structure import (
+    effect_powers,
     in_what_way,
     locate_remainder,
     locate_repeated,
     term_powers,
 )
-from hdopt.diagnosis.verdict.rivals import Sets, beside_told, power_of_named, separating_measurement, tied_pairs
+from hdopt.diagnosis.verdict.rivals import Sets, separating_measurement, tied_pairs
 from hdopt.diagnosis.verdict.where import Where
 from hdopt.effects import EFFECTS
 
@@ -270,11 +271,9 @@ def more(findings: Findings) -> Conclusion:
     """What a scale, a clock or a zero that is off does not explain, and what it most resembles. `findings` hold the
     facts and the evidence behind them.
     """
-    evidence = findings.evidence
-    found = beside_told(evidence)
-    assert found is not None, "the rule holds only where something adds"
-    best, _ = found
-    where = where_largest(best, power_of_named(best), evidence)
+    best = findings.more
+    assert best is not None, "the rule holds only where something adds"
+    where = where_largest(best, sum(effect_powers(best)), findings.evidence)
     return Conclusion(
         "unknown",
         f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that most resembles {likeness(best)}, beside or in "
