@@ -314,7 +314,8 @@ class PeakToPeakQuantile:
         """Peak-to-peak of the sample's drives, or of the `chosen`, built as `design`, arcmin, (n,)."""
         rows = trade.of(trade.drawn() if chosen is None else trade.drawn()[chosen], design)
         if trade.teeth is not None:
-            return trade.teeth.peak_to_peak_arcmin(design.drive, rows, chosen)
+            added = None if trade.added is None else trade.added.table(design.drive)
+            return trade.teeth.peak_to_peak_arcmin(design.drive, rows, chosen, added)
         if trade.added is not None:
             return trade.added.peaks_to_peaks_arcmin(design.drive, rows)
         return matrix_peak_to_peak_arcmin(design.drive, rows)
@@ -500,12 +501,14 @@ def evened_out(trade: DesignConditions, design: Design) -> float:
     """Peak-to-peak of `design` with the errors of `trade`, times k_e of its teeth in `contact` (Jia 2021, Eq. (13)),
     arcmin. With measured teeth k_e is for sines beside them only, and misalignment has its own mean."""
     k_e = contact(trade, design).homogenization(trade.k_b)
-    rows = trade.of(trade.rows, design)
+    rows, measured = trade.of(trade.rows, design), design.drive.has_measured_teeth
+    misalignment = misalignment_share(design.drive) if measured else 1.0
     if trade.added is not None:
-        return trade.added.peak_to_peak_arcmin(design.drive, rows[0], k_e)
-    if design.drive.has_measured_teeth:
-        shares = misalignment_share(design.drive), k_e
-        return float(np.ptp(beat_extremes_arcmin(design.drive, rows, None, *shares)))
+        from hdopt.simulation.own_teeth import SharedByTeeth
+
+        return trade.added.peak_to_peak_arcmin(design.drive, rows[0], SharedByTeeth(k_e, misalignment, k_e))
+    if measured:
+        return float(np.ptp(beat_extremes_arcmin(design.drive, rows, None, misalignment, k_e)))
     return PeakToPeak().value(trade, design) * k_e
 
 

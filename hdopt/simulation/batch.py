@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -23,7 +23,7 @@ from hdopt.simulation.model import ExtendedModel
 from hdopt.simulation.operation import Operation
 
 if TYPE_CHECKING:
-    from hdopt.simulation.cell_kernel import SplineTables
+    from hdopt.simulation.cell_kernel import CellTable, SplineTables
     from hdopt.simulation.walk_kernel import Added
 
 WALK_PER_TURN, TABLE_PER_TURN = 180, 1440
@@ -81,10 +81,12 @@ class AddedTable:
 
 
 def tabulate(drive: Drive, effects: Sequence[EffectValues], operation: Operation) -> AddedTable:
-    """The table of these `effects` for the ratio of `drive` at the condition `operation`.
+    """The table of these `effects` for the ratio of `drive` at the condition `operation`; its measured teeth are left
+    out (`own_teeth` adds them).
 
     Raises `HdoptError` for effects that are no function of the angle alone, or too fine for the table.
     """
+    drive = replace(drive, cs_teeth=None, fs_teeth=None, cs_roundness=None)
     model = ExtendedModel(drive, DriveErrors(), tuple(effects), operation)
     if following := [effect.id for effect in effects if effect.follows_base]:
         raise HdoptError(
@@ -95,11 +97,6 @@ def tabulate(drive: Drive, effects: Sequence[EffectValues], operation: Operation
         raise HdoptError(
             f"{', '.join(effect.id for effect in model.too_fine)} is a ripple too fine for tolerances and searches; "
             "leave the bench out with operation.include=drive, or remove the effect"
-        )
-    if drive.has_measured_teeth:
-        raise HdoptError(
-            "effects and measured teeth go together in ke and stack only; leave either out, as with "
-            "operation.include=none"
         )
     if not drive.wave_generator.profile.tip_is_smooth:
         raise HdoptError(
@@ -142,20 +139,46 @@ def matrix_peak_to_peak_arcmin(drive: Drive, matrix: Array, added: AddedTable, h
     `homogenization` is k_e, which evens out what the zones drive. Within 1e-3 arcmin of `simulation.extremes` in the
     closed form (a test measures it).
     """
-    from hdopt.simulation.cell_kernel import cell_table, extended_block
-
     matrix = np.ascontiguousarray(matrix, dtype=np.float64)
-    out = np.empty(len(matrix))
-    tip, tan_alpha, advance, turns, scale = _constants(drive, homogenization)
-    cells = added.zones.shape[2] // (added.stride * turns)
-    splines = _spline_tables(added, advance, cells)
-    table = cell_table(added.zones, added.beside, cells, turns, scale, splines)
+    out, cells = np.empty(len(matrix)), CellsOfTurn.of(drive, added, homogenization)
 
     def fill(rows: slice) -> None:
-        extended_block(tip, tan_alpha, advance, scale, matrix[rows], table, out[rows])
+        cells.fill(matrix[rows], out[rows])
 
     in_blocks(len(matrix), BLOCK, fill)
     return out
+
+
+@dataclass(frozen=True)
+class CellsOfTurn:
+    """What the compiled kernel knows of drives with effects besides their errors: `_constants`, and the `table` of the
+    effects cell by cell."""
+
+    constants: tuple[TipGeometry, float, float, int, float]
+    table: CellTable
+
+    @classmethod
+    def of(cls, drive: Drive, added: AddedTable, homogenization: float = 1.0) -> CellsOfTurn:
+        """Of the effects of the table `added` in drives that are built as `drive`; `homogenization` is k_e."""
+        from hdopt.simulation.cell_kernel import cell_table
+
+        constants = _constants(drive, homogenization)
+        _, _, advance, turns, scale = constants
+        cells = added.zones.shape[2] // (added.stride * turns)
+        splines = _spline_tables(added, advance, cells)
+        return cls(constants, cell_table(added.zones, added.beside, cells, turns, scale, splines))
+
+    def on_splines(self, added: AddedTable) -> CellsOfTurn:
+        """The same with what `added` has on the splines."""
+        cells = self.table.least.shape[2]
+        return replace(self, table=self.table._replace(splines=_spline_tables(added, self.constants[2], cells)))
+
+    def fill(self, rows: Array, out: Array) -> None:
+        """Fill `out` (n,) with the peak-to-peak, arcmin, of drives with errors as `rows` (n, 12)."""
+        from hdopt.simulation.cell_kernel import extended_block
+
+        tip, tan_alpha, advance, _, scale = self.constants
+        extended_block(tip, tan_alpha, advance, scale, rows, self.table, out)
 
 
 def stacked_peak_to_peak_arcmin(drive: Drive, matrix: Array, added: AddedTable, homogenization: float = 1.0) -> Array:
@@ -218,13 +241,10 @@ def _sags(table: Array, window: float) -> Array:
     just beside it, mm of arc, (2, places)."""
     if not table.size:
         return table
+    from hdopt.simulation.cell_kernel import sags
+
     length = math.ceil(window * table.shape[1]) + 1
-    ends, worst = np.roll(table, -length, axis=1) - table, np.zeros_like(table)
-    for k in range(1, length):
-        off = np.roll(table, -k, axis=1) - table - ends * (k / length)
-        worst = np.maximum(worst, np.abs(off))
-    beside = range(-math.ceil((1 - 1 / WIDER) * length) - 1, 2)
-    return np.asarray(np.max([np.roll(worst, k, axis=1) for k in beside], axis=0))
+    return np.asarray(sags(np.ascontiguousarray(table), length, math.ceil((1 - 1 / WIDER) * length) + 1))
 
 
 CLOSEST = math.radians(8)

@@ -458,6 +458,27 @@ def cell_table(zones: Array, beside: Array, cells: int, turns: int, scale: float
 
 
 @entry
+def sags(table: Array, length: int, ahead: int) -> Array:
+    """How far a periodic `table` (2, places) goes beyond a chord over `length` places that begins at a place, one
+    before it or up to `ahead` after it; (2, places), in its unit."""
+    zones, places = table.shape
+    alone, found = np.zeros((zones, places)), np.zeros((zones, places))
+    for z in range(zones):
+        for i in range(places):
+            left = table[z, i]
+            rise = (table[z, (i + length) % places] - left) / length
+            for k in range(1, length):
+                j = i + k
+                while j >= places:
+                    j -= places
+                alone[z, i] = max(alone[z, i], abs(table[z, j] - left - rise * k))
+        for i in range(places):
+            for k in range(-1, ahead + 1):
+                found[z, i] = max(found[z, i], alone[z, (i + k) % places])
+    return found
+
+
+@entry
 def extended_block(
     tip: TipGeometry,
     tan_alpha: float,

@@ -132,13 +132,13 @@ def _trade(study: Study, section: SearchSection, seed: int) -> DesignConditions:
         sample=sample,
         teeth=teeth,
         quantile=section.quantile,
-        added=_effects(study, section, teeth is not None),
+        added=_effects(study, section),
         structure_costs=tuple((Structure(name), cost / 100) for name, cost in given.structure_cost_percent.items()),
         over_bore=(given.wg_tilt_major_over == "bore", given.wg_tilt_minor_over == "bore"),
     )
 
 
-def _effects(study: Study, section: SearchSection, draws_teeth: bool) -> DesignEffects | None:
+def _effects(study: Study, section: SearchSection) -> DesignEffects | None:
     """The effects that count: those of the drive, unless [operation] says otherwise."""
     if not study.effects:
         return None
@@ -148,17 +148,10 @@ def _effects(study: Study, section: SearchSection, draws_teeth: bool) -> DesignE
     chosen = inclusion(study, "drive").counted
     if not chosen:
         return None
-    leave = "leave the effects out with operation.include=none"
-    if draws_teeth:
-        raise HdoptError(
-            "a search that draws teeth from tolerances of pitch does not compute effects beside them, 2 ms a drive; "
-            "give tooth amplitudes in [tolerances], set search.robust=false with a nominal search.objective, or "
-            f"{leave}"
-        )
     if section.size != "fixed_tooth_counts":
         raise HdoptError(
             f"search.size is {section.size!r}, which changes the ratio and with it the orders of the effects found; "
-            f"set search.size=fixed_tooth_counts, or {leave}"
+            "set search.size=fixed_tooth_counts, or leave the effects out with operation.include=none"
         )
     return DesignEffects.of(study.drive, chosen, study.operation)
 

@@ -186,8 +186,7 @@ def with_effects(study: Study, response: DriveResponse) -> tuple[Response, tuple
     from hdopt.simulation.batch import tabulate
     from hdopt.tolerance.drive_effects import ExtendedResponse
 
-    bare = replace(study.drive, cs_teeth=None, fs_teeth=None, cs_roundness=None)
-    extended = ExtendedResponse(response, tabulate(bare, chosen.counted, study.operation))
+    extended = ExtendedResponse(response, tabulate(study.drive, chosen.counted, study.operation))
     return extended, (*chosen.says, "the effects are the same in every drive: they have no tolerance")
 
 

@@ -59,10 +59,9 @@ def test_slopes_are_those_of_wide_differences(setup):
         assert error < 0.02 * np.abs(found.piece_slopes).max()
 
 
-def test_the_choice_is_verified_with_teeth(study, setup, monkeypatch):
+def test_the_choice_is_verified_with_teeth(study, setup):
     """Fresh drives of a search, robust or not, have teeth too: without them the quantile lies a fifth below."""
-    monkeypatch.setattr("hdopt.workflow.search_verification.VERIFICATION", 2048)
-    fresh = quantile_blocks(study, setup.baseline, 0.9, 4, setup.trade).mean()
+    fresh = quantile_blocks(study, setup.baseline, 0.9, 4, setup.trade, 2048).mean()
     searched = find_quantity(ROBUST).value(setup.trade, setup.baseline)
     # 256 drives know their 0.9 quantile to 2 % (standard deviation over seeds 1 to 12); three times that.
     assert fresh == pytest.approx(searched, rel=0.06)
