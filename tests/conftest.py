@@ -39,8 +39,9 @@ examples are drawn with `pytest --hypothesis-profile explore`; one that fails be
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     # Workers side by side have the cores already: threads in each would only wait for Python's lock (a tenth of a
-    # diagnosis). Tests that are about an engine name it.
-    engine_in_force("process").__enter__()
+    # diagnosis). Tests that are about an engine name it. The name keeps it in force: let go, it ends.
+    _IN_TURN = engine_in_force("process")
+    _IN_TURN.__enter__()
 
 _skipped: list[tuple[str, str]] = []
 

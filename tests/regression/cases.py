@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
-import os
 import tempfile
 from pathlib import Path
 
@@ -69,10 +69,22 @@ SPECS = specs()
 
 
 def diagnosed(name: str, kept_in: Path | None = None) -> dict:
-    """The JSON of `hdopt diagnose` on the case `name`. `kept_in` is a folder of answers given in this session."""
-    kept = kept_in / f"{name}.json" if kept_in else None
-    if kept and kept.exists():
-        return json.loads(kept.read_text())
+    """The JSON of `hdopt diagnose` on the case `name`. `kept_in` is a folder of answers given in this session: who asks
+    first answers, who asks meanwhile waits."""
+    if kept_in is None:
+        return answered(name)
+    kept = kept_in / f"{name}.json"
+    with open(kept.with_suffix(".lock"), "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not kept.exists():
+            draft = kept.with_suffix(".draft")
+            draft.write_text(json.dumps(answered(name)))
+            draft.rename(kept)
+    return json.loads(kept.read_text())
+
+
+def answered(name: str) -> dict:
+    """The same, whatever was answered before."""
     with tempfile.TemporaryDirectory() as folder:
         files = []
         for rank, table in enumerate(simulate(SPECS[name]).tables):
@@ -80,10 +92,6 @@ def diagnosed(name: str, kept_in: Path | None = None) -> dict:
             table.to_csv(files[-1], index=False)
         status, result = hdopt("diagnose", *files)
     assert status == 0, f"{name}: exit status {status}"
-    if kept:
-        draft = kept.with_suffix(f".{os.getpid()}")
-        draft.write_text(json.dumps(result))
-        draft.rename(kept)
     return result
 
 

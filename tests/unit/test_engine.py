@@ -99,11 +99,18 @@ def test_what_a_worker_calls_runs_in_turn():
     assert not in_a_worker()
 
 
+def test_workers_of_the_tests_have_one_thread_each():
+    """Would catch an engine in force that ends where its name is let go: two workers with two threads each."""
+    beside_others = "PYTEST_XDIST_WORKER" in os.environ
+    assert isinstance(engine_from(None), ThisProcess if beside_others else Threads)
+
+
 def test_one_process_means_one_thread():
     with engine_in_force("process"):
         assert threads_for(1000) == 1
         assert each(lambda i: threading.current_thread() is threading.main_thread(), range(4)) == [True] * 4
-    assert threads_for(1000) == cores()
+    with engine_in_force("threads"):
+        assert threads_for(1000) == cores()
 
 
 @pytest.mark.parametrize("engine", ["process", "threads:2", "threads:5"])
