@@ -76,16 +76,28 @@ def _sum(phase: Array, harmonics: Array, coefficients: Array) -> tuple[Array, Ar
     return value, slope
 
 
+LANES = 32
+"""Angles worked on at a time, each in a lane of the processor's vectors: none waits for the others' sums."""
+
+
 @late(calls=0)
 def _whole_sum(phase: Array, by_order: Array) -> tuple[Array, Array]:
     """The same where `by_order` (2, h + 1) holds the coefficients of sine and cosine of every whole multiple."""
-    value, slope = np.zeros(len(phase)), np.zeros(len(phase))
-    for i in range(len(phase)):
-        sine, cosine = math.sin(phase[i]), math.cos(phase[i])
-        s, c = 0.0, 1.0
+    rows = len(phase)
+    value, slope = np.empty(rows), np.empty(rows)
+    sine, cosine, s, c = np.zeros(LANES), np.zeros(LANES), np.empty(LANES), np.empty(LANES)
+    total, rise = np.empty(LANES), np.empty(LANES)
+    for start in range(0, rows, LANES):
+        here = min(LANES, rows - start)
+        for i in range(here):
+            sine[i], cosine[i] = math.sin(phase[start + i]), math.cos(phase[start + i])
+        s[:], c[:], total[:], rise[:] = 0.0, 1.0, 0.0, 0.0
         for h in range(1, by_order.shape[1]):
-            s, c = c * sine + s * cosine, c * cosine - s * sine
             a, b = by_order[0, h], by_order[1, h]
-            value[i] += a * s + b * c
-            slope[i] += h * (a * c - b * s)
+            for i in range(LANES):
+                now, beside = c[i] * sine[i] + s[i] * cosine[i], c[i] * cosine[i] - s[i] * sine[i]
+                s[i], c[i] = now, beside
+                total[i] += a * now + b * beside
+                rise[i] += h * (a * beside - b * now)
+        value[start : start + here], slope[start : start + here] = total[:here], rise[:here]
     return value, slope
