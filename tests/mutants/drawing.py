@@ -20,6 +20,8 @@ from tests.mutants.hand_made import ROOT, Fault, faults_of, rooms
 SEED = 2026
 ON_BITS = ("BitOr", "BitAnd", "BitXor", "LShift", "RShift", "Invert")
 """Left out: on floats these raise, so that whatever runs the line notices; nine in ten mutants would be of them."""
+OVER_EVERY = {"effects": ("unit/test_effects.py",)}
+"""Properties over all that is registered in a room: they are about each of its files, which they do not name."""
 MOST_TEST_FILES = 3
 """A mutant that survives costs the quick tests of so many files."""
 
@@ -94,15 +96,17 @@ def _program(text: str) -> str:
 def tests_of(file: str) -> tuple[str, ...]:
     """Test files (below `tests`) that should notice what is wrong in `file`, three at most.
 
-    First come those that the faults made by hand in it name, most often named first, then unit and validation tests
-    that import it; where there are none of either, those that import what imports it.
+    First come those over all that its room registers, then those that the faults made by hand in it name, most often
+    named first, then unit and validation tests that import it; where there are none of these, those that import what
+    imports it.
     """
     named = Counter(
         test.split("::")[0] for room in rooms() for one in faults_of(room) if one.file == file for test in one.tests
     )
     tests = [*ROOT.glob("tests/unit/test_*.py"), *ROOT.glob("tests/validation/test_*.py")]
-    found = [*(test for test, _ in named.most_common()), *_tests_importing(file, tests)]
-    for other in [] if found else _importing(file, ROOT.glob("hdopt/*/*.py")):
+    over_every = OVER_EVERY.get(Path(file).parent.name, ())
+    found = [*over_every, *(test for test, _ in named.most_common()), *_tests_importing(file, tests)]
+    for other in [] if len(found) > len(over_every) else _importing(file, ROOT.glob("hdopt/*/*.py")):
         found += _tests_importing(str(other.relative_to(ROOT)), tests)
     return tuple(islice(dict.fromkeys(found), MOST_TEST_FILES))
 

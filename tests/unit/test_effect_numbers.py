@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from enum import StrEnum
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +13,8 @@ from test_effect_physics import RATE, RATIO, TURN, moving, spanned
 
 from hdopt.effects import EFFECTS
 from hdopt.effects._friction_law import Law
-from hdopt.effects.declared import Shaft
+from hdopt.effects.base import Effect
+from hdopt.effects.declared import Category, Quantity, Shaft
 from hdopt.effects.estimate import FitEstimate, Parameter
 from hdopt.effects.local_tooth_defect import NARROWEST_DEG, WIDEST_DEG, WIDEST_OUTPUT_DEG, Seat
 from hdopt.effects.met import Pulse, Spline, ZoneWaves
@@ -19,6 +22,9 @@ from hdopt.effects.prior import outside_prior
 from hdopt.effects.probe import best_terms, strongest_orders
 from hdopt.effects.resonance import Foot
 from hdopt.effects.term import Term
+from hdopt.errors import HdoptError
+
+GEAR = SimpleNamespace(pressure_angle=math.radians(30), ratio=RATIO)
 
 
 def test_play_varies_with_the_input():
@@ -268,6 +274,79 @@ def test_warming_may_take_ten_records():
     for asked, kept in ((5.0, 5.0), (50.0, 10.0), (1e-4, 0.01)):
         term = effect.term(c, {"time_constant_s": asked * duration})
         assert term.shape["time_constant_s"] == pytest.approx(kept * duration)
+
+
+def test_warming_is_looked_for_from_a_twentieth_of_the_record_to_five(monkeypatch):
+    """Twelve time constants in equal ratios, of a record of 300 s, begun at 1000 s."""
+    effect, asked = EFFECTS["thermal_drift"], []
+    monkeypatch.setattr("hdopt.effects.thermal_drift.terms_at", lambda effect, samples, shapes: asked.extend(shapes))
+    monkeypatch.setattr("hdopt.effects.thermal_drift.best_terms", lambda probe, terms: [])
+    c = replace(moving(), time=1000 + np.linspace(0, 300, len(moving())))
+    effect.search(SimpleNamespace(samples=c))
+    found = [shape["time_constant_s"] for shape in asked]
+    assert found == pytest.approx(15 * 100 ** (np.arange(12) / 11))
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"coefficient_arcmin_per_k": 0.1, "amplitude_arcmin": 0.2},
+        {"coefficient_arcmin_per_k": 0.1, "time_constant_s": 60.0},
+        {"coefficient_arcmin_per_k": 0.1, "amplitude_arcmin": 0.2, "time_constant_s": 60.0},
+        {"amplitude_arcmin": 0.2},
+        {"time_constant_s": 60.0},
+        {},
+    ],
+    ids=lambda keys: " and ".join(keys) or "nothing",
+)
+def test_a_drift_follows_the_temperature_or_time(keys):
+    """Would catch a key that is dropped without a word, and half a pair that is filled up."""
+    every = dict.fromkeys(("coefficient_arcmin_per_k", "amplitude_arcmin", "time_constant_s"))
+    with pytest.raises(HdoptError, match="follows either the temperature or time"):
+        EFFECTS["thermal_drift"].values({**every, **keys}, GEAR)
+
+
+class Hum(StrEnum):
+    ONE = "one"
+    OTHER = "other"
+
+
+class Declared(Effect):
+    """An effect that is all declared: a category, a whole number, a number of its shape and one of its columns."""
+
+    id = "declared"
+    domain = "time"
+    separating = "none"
+    declared = (
+        Category("hum", Hum, "which"),
+        Quantity("lines", "1", "whole", "n", (3, 7), whole=True),
+        Quantity("decay", "1", "of its shape", "d", (0.1, 2.0)),
+        Quantity("size_um", "um", "of its columns", "s", scale=4.0),
+    )
+
+    def columns(self, conditions, shape):
+        return np.ones((len(conditions), 1))
+
+
+def test_what_is_declared_is_looked_for_over_all_its_values(monkeypatch):
+    """Each whole number of its prior, both ends, each category and nine places of what is continuous are trials: 90.
+    Would catch an end left out, and names that pay for fewer trials than were made."""
+    effect, asked = Declared(), []
+    monkeypatch.setattr("hdopt.effects.base.search_on_grid", lambda probe, *grid: asked.append(grid[:2]) or [])
+    effect.search(SimpleNamespace(samples=None))
+    ((axes, discrete),) = asked
+    assert [(axis.name, axis.low, axis.high) for axis in axes] == [("decay", 0.1, 2.0)]
+    assert discrete == {"hum": [Hum.ONE, Hum.OTHER], "lines": [3, 4, 5, 6, 7]}
+    assert effect.term(moving(), {"hum": Hum.ONE, "lines": 3, "decay": 1.0}).trials == 9 * 2 * 5
+
+
+def test_what_is_declared_goes_into_a_file_and_back():
+    """A coefficient is its number over the scale; a whole number stays one."""
+    effect, keys = Declared(), {"hum": "other", "lines": 5.0, "decay": 0.5, "size_um": 6.0}
+    shape, coefficients = effect.values(keys, GEAR)
+    assert (shape, coefficients) == ({"hum": Hum.OTHER, "lines": 5, "decay": 0.5}, (1.5,))
+    assert isinstance(shape["lines"], int)
+    assert effect.keys(shape, coefficients, GEAR) == keys
 
 
 def test_a_resonance_is_looked_for_from_the_slowest_turn_to_sixteen_of_the_fastest(monkeypatch):
