@@ -88,6 +88,7 @@ def _lines(found: Compensated, output: Path) -> Iterator[str]:
             yield f"  {part.name}{rate}: {part.before:.4g} -> {part.after:.4g} arcmin, {expected}"
     for speed, one in found.speeds.items():
         yield f"  at {speed:.4g} r/min: expect {one.expected:.4g} ({one.low:.4g} to {one.high:.4g}) arcmin"
+    yield from _speed_lines(found.to_dict(None)["of_speed"])
     for warning in found.warnings:
         yield f"note: {warning}"
     if found.worth:
@@ -106,3 +107,18 @@ def _lines(found: Compensated, output: Path) -> Iterator[str]:
             f"nothing written: no better than no compensation beyond chance ({found.evidence:.2g} standard errors on "
             "held-out stretches); record more output turns or less noise"
         )
+
+
+def _speed_lines(told: dict[str, Any] | None) -> Iterator[str]:
+    """How the table depends on the speed, as `told` in JSON; nothing where it does not."""
+    if told is None:
+        return
+    if told["lag_arcmin_per_rpm"]:
+        yield (
+            f"  grows with the speed by {told['lag_arcmin_per_rpm']:.3g} arcmin for each r/min of the input: a delay "
+            "of one channel, or drag; where the controller reads other channels than the recording, record with those"
+        )
+    for one in told["speeds"]:
+        if one["terms"]:
+            yield f"  at {one['speed_rpm']:.4g} r/min {counted(one['terms'], 'term')} of its own"
+    yield "the table takes the input's speed: hdopt_error_arcmin(input_rad, output_rad, path, input_rpm)"

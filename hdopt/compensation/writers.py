@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any  # Any: values of JSON
 
 from hdopt.compensation.mesh import Beat
+from hdopt.compensation.of_speed import Angular, OfSpeed
 from hdopt.compensation.surface import Crossing, Grid, Harmonics, Surface
 from hdopt.compensation.zones import Zones
 
-Found = Harmonics | Zones | Surface | Beat
+Found = Angular | OfSpeed
 
 FORMATS = ("csv", "json", "c")
 
@@ -21,21 +23,23 @@ def written(found: Found, form: str, facts: Mapping[str, Any]) -> str:
     return {"csv": _csv, "json": _json, "c": _c}[form](found, facts)
 
 
-def _csv(found: Found, facts: Mapping[str, Any]) -> str:
+def _csv(given: Found, facts: Mapping[str, Any]) -> str:
+    found, own = (given.common, _own(given)) if isinstance(given, OfSpeed) else (given, [])
     head = [f"# {key}: {str(value).replace(chr(10), ' ')}" for key, value in facts.items()]
     head.append(f"# half_return_arcmin: {found.back!r}")
     head.append(f"# return_crossing_output_deg: {found.crossing.deg!r}")
     head.append(f"# return_crosses: {crosses(found)}")
     head.append(f"# return_path_at_start: {found.crossing.start!r}")
-    if isinstance(found, Zones):
-        head.append(f"# error_arcmin: sum 0, with the half return, + the {_which(found)} of sums 1 and 2")
-        rows = ["k_input,j_output,cos_arcmin,sin_arcmin,sum"]
-        rows += [f"{k},{j},{c!r},{s!r},{number}" for k, j, c, s, number in _terms(found)]
-        return "\n".join([*head, *rows]) + "\n"
-    if isinstance(found, Harmonics):
-        rows = ["k_input,j_output,cos_arcmin,sin_arcmin"]
-        rows += [f"{k},{j},{c!r},{s!r}" for k, j, c, s, _ in _terms(found)]
-        return "\n".join([*head, *rows]) + "\n"
+    if isinstance(given, OfSpeed):
+        head.append(f"# lag_arcmin_per_input_rpm: {given.lag!r}")
+        head.append(f"# speeds_input_rpm: {' '.join(map(repr, given.speeds))}")
+        if own:
+            head.append(f"# of_each_speed: {BETWEEN}")
+    if not isinstance(found, Grid):
+        if isinstance(found, Zones):
+            head.append(f"# error_arcmin: sum 0, with the half return, + the {_which(found)} of sums 1 and 2")
+        return "\n".join([*head, *_csv_terms(found, own)]) + "\n"
+    head += [f"# of_speed: {rpm!r},{k},{j},{c!r},{s!r}" for rpm, k, j, c, s in own]
     inputs, outputs = found.values.shape
     if isinstance(found, Beat):
         head.append("# columns: the input turns of a turn of the output, each by the output angle at which it begins")
@@ -45,6 +49,25 @@ def _csv(found: Found, facts: Mapping[str, Any]) -> str:
         for i, row in enumerate(found.values.tolist())
     ]
     return "\n".join([*head, *rows]) + "\n"
+
+
+BETWEEN = (
+    "each term counts in full at its speed_input_rpm (negative backward) and falls in a straight line to the "
+    "neighbouring speeds; beyond the first and the last it stays"
+)
+
+
+def _own(found: OfSpeed) -> list[tuple[float, int, int, float, float]]:
+    """Speed (r/min), k, j, cosine and sine of every term that a speed has of its own."""
+    return [(rpm, *term[:4]) for rpm, one in zip(found.speeds, found.own, strict=True) for term in _terms(one)]
+
+
+def _csv_terms(found: Harmonics | Zones, own: Sequence[tuple[float, int, int, float, float]]) -> list[str]:
+    """Title and lines of the terms of `found`, with those of each speed's `own` in a last column, if any."""
+    summed = isinstance(found, Zones)
+    title = "k_input,j_output,cos_arcmin,sin_arcmin" + ",sum" * summed + ",speed_input_rpm" * bool(own)
+    rows = [f"{k},{j},{c!r},{s!r}" + f",{n}" * summed + "," * bool(own) for k, j, c, s, n in _terms(found)]
+    return [title, *rows, *(f"{k},{j},{c!r},{s!r}" + ",0" * summed + f",{rpm!r}" for rpm, k, j, c, s in own)]
 
 
 def _which(found: Zones) -> str:
@@ -61,8 +84,16 @@ def _terms(found: Harmonics | Zones) -> list[tuple[int, int, float, float, int]]
     ]
 
 
-def _json(found: Found, facts: Mapping[str, Any]) -> str:
+def _json(given: Found, facts: Mapping[str, Any]) -> str:
+    found = given.common if isinstance(given, OfSpeed) else given
     content: dict[str, Any] = {"schema": 1, **facts, "half_return_arcmin": found.back}
+    if isinstance(given, OfSpeed):
+        content["lag_arcmin_per_input_rpm"] = given.lag
+        content["of_each_speed"] = BETWEEN
+        content["speeds"] = [
+            {"speed_input_rpm": rpm, "terms": [dict(zip(TERM, term, strict=False)) for term in _terms(one)]}
+            for rpm, one in zip(given.speeds, given.own, strict=True)
+        ]
     content["return_crossing_output_deg"] = found.crossing.deg
     content["return_crosses"] = crosses(found)
     content["return_path_at_start"] = found.crossing.start
@@ -72,11 +103,12 @@ def _json(found: Found, facts: Mapping[str, Any]) -> str:
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
     if isinstance(found, Zones):
         content["error"] = f"sum 0 + the {_which(found)} of sums 1 and 2"
-    names = ("k", "j", "cos_arcmin", "sin_arcmin", "sum")[: 5 if isinstance(found, Zones) else 4]
+    names = (*TERM, "sum") if isinstance(found, Zones) else TERM
     content["terms"] = [dict(zip(names, term, strict=False)) for term in _terms(found)]
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
+TERM = ("k", "j", "cos_arcmin", "sin_arcmin")
 FUNCTION = "hdopt_error_arcmin"
 
 _HEAD = """/* Kinematic error of a drive, to be subtracted: output = input/N - error.
@@ -161,7 +193,54 @@ double hdopt_error_arcmin(double input_rad, double output_rad, double path)
 """
 
 
+_C_SPEED = """
+#define HDOPT_SPEEDS {speeds}
+static const double hdopt_rpm[] = {{{rpm}}};
+static const int hdopt_own_end[] = {{{end}}};
+static const int hdopt_own_k[] = {{{k}}};
+static const int hdopt_own_j[] = {{{j}}};
+static const double hdopt_own_cos[] = {{{cos}}};
+static const double hdopt_own_sin[] = {{{sin}}};
+
+/* What the speed number n has of its own. */
+static double hdopt_own_arcmin(int n, double input_rad, double output_rad)
+{{
+    double error = 0;
+    for (int i = n ? hdopt_own_end[n - 1] : 0; i < hdopt_own_end[n]; i++) {{
+        double phase = hdopt_own_k[i] * input_rad + hdopt_own_j[i] * output_rad;
+        error += hdopt_own_cos[i] * cos(phase) + hdopt_own_sin[i] * sin(phase);
+    }}
+    return error;
+}}
+
+/* input_rpm: speed of the input, negative backward; between the recorded speeds straight lines. */
+double hdopt_error_arcmin(double input_rad, double output_rad, double path, double input_rpm)
+{{
+    double error = hdopt_common_arcmin(input_rad, output_rad, path) + input_rpm * ({lag});
+    int n = 0;
+    double share;
+    if (HDOPT_SPEEDS == 0)
+        return error;
+    while (n < HDOPT_SPEEDS && hdopt_rpm[n] < input_rpm)
+        n++;
+    if (n == 0 || n == HDOPT_SPEEDS)
+        return error + hdopt_own_arcmin(n ? n - 1 : 0, input_rad, output_rad);
+    share = (input_rpm - hdopt_rpm[n - 1]) / (hdopt_rpm[n] - hdopt_rpm[n - 1]);
+    return error + (1 - share) * hdopt_own_arcmin(n - 1, input_rad, output_rad)
+        + share * hdopt_own_arcmin(n, input_rad, output_rad);
+}}
+"""
+
+
 def _c(found: Found, facts: Mapping[str, Any]) -> str:
+    if isinstance(found, OfSpeed):
+        common = _c(found.common, facts).replace(f"double {FUNCTION}(", "static double hdopt_common_arcmin(")
+        columns = list(zip(*_own(found), strict=True)) or [()] * 5
+        numbers = dict(zip(("k", "j", "cos", "sin"), map(_list, columns[1:]), strict=True))
+        end = itertools.accumulate(len(one) for one in found.own)
+        return common + _C_SPEED.format(
+            speeds=len(found.speeds), rpm=_list(found.speeds), end=_list(list(end)), lag=repr(found.lag), **numbers
+        )
     said = "\n".join(f"   {key}: {value}" for key, value in facts.items()).replace("*/", "* /")
     head = _HEAD.format(
         facts=said, crossing=found.crossing.deg, start=found.crossing.start, moves=_moves(found.crossing)

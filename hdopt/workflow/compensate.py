@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from hdopt.arrays import Array, Mask
 from hdopt.compensation.expected import NORMAL, peak_to_peak_again
+from hdopt.compensation.of_speed import OfSpeed, shows_lag, signed_rpm, with_speed
 from hdopt.compensation.path import half_about, paths_of
 from hdopt.compensation.writers import FORMATS, Found, crosses, homing_arcmin, written
 from hdopt.compensation.zones import MOST_TERMS, SMALL
@@ -21,7 +22,8 @@ from hdopt.figures import drawn
 from hdopt.files import ShownAsTable, write_text
 from hdopt.recordings.recording import Recording, turns_with_ends
 from hdopt.recordings.rows import Rows, gather
-from hdopt.workflow.compensation_speeds import of_each_speed, of_one_speed, speeds_rpm
+from hdopt.workflow.compensation_speeds import TERMS as OWN_TERMS
+from hdopt.workflow.compensation_speeds import lag_in, of_each_speed, own_of_each_speed, speeds_rpm
 from hdopt.workflow.compensation_trials import (
     STRETCHES,
     candidates,
@@ -37,6 +39,7 @@ from hdopt.workflow.compensation_trials import (
 from hdopt.workflow.output_files import Files, checked_files
 from hdopt.workflow.placed import recordings_named
 from hdopt.workflow.recorded_drive import AnyDrive, AnyRecordings, recorded_drive
+from hdopt.workflow.waveform_fit import WaveformFit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,6 +53,7 @@ GROUPS_PER_BEAT = 8
 FEWEST_STRETCHES = 3
 """Of which a standard error of the fall is taken."""
 NONE = "none"
+EACH_SPEED = ", and what each speed has of its own"
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,9 @@ class Expected:
     expected: float
     low: float
     high: float
+
+    def __str__(self) -> str:
+        return f"{self.expected:.4g} ({self.low:.4g} to {self.high:.4g}) arcmin"
 
 
 @dataclass(frozen=True)
@@ -118,6 +125,7 @@ class Compensated(ShownAsTable):
             "method": self.method,
             "peak_to_peak_before_arcmin": round(self.before, 4),
             "peak_to_peak_expected_arcmin": round(self.predicted, 4),
+            **{f"peak_to_peak_expected_at_{speed:.4g}_rpm": str(one) for speed, one in self.speeds.items()},
             "homing": homing_words(self.homing),
             "void": VOID,
         }
@@ -140,6 +148,7 @@ class Compensated(ShownAsTable):
             "directions": self.both,
             "expected_by_direction": {way: vars(one) for way, one in self.ways.items()},
             "expected_by_speed": [{"speed_rpm": speed, **vars(one)} for speed, one in self.speeds.items()],
+            "of_speed": of_speed(self.found),
             "return": {
                 "half_arcmin": self.found.back,
                 "crossing_output_deg": self.found.crossing.deg,
@@ -183,6 +192,14 @@ class Compensated(ShownAsTable):
             "directions": pd.DataFrame(list(self.both.items()), columns=["direction", "left_arcmin"]),
             "methods": pd.DataFrame(list(self.scores.items()), columns=["method", "heldout_rms_arcmin"]),
         }
+
+
+def of_speed(found: Found) -> dict[str, Any] | None:
+    """How `found` depends on the input's speed, as JSON says it; None where it does not."""
+    if not isinstance(found, OfSpeed):
+        return None
+    own = [{"speed_rpm": rpm, "terms": len(one)} for rpm, one in zip(found.speeds, found.own, strict=True)]
+    return {"lag_arcmin_per_rpm": found.lag, "speeds": own}
 
 
 VOID = (
@@ -236,34 +253,34 @@ def write_compensation(made: Compensated, files: Mapping[str, Path]) -> None:
 
 def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms: int | None, seed: int) -> Compensated:
     """The compensation from the records of `recordings`; `drive`, `terms`, `seed` and errors as for `compensate`."""
-    if terms is not None and not 0 <= terms <= MOST_TERMS:
-        raise HdoptError(f"--terms is {terms}; give 1 to {MOST_TERMS} coefficients, 0 for a table, or auto")
-    moving = [r for r in recordings if not r.input_locked]
-    if not moving:
-        raise HdoptError("the input is locked in every recording; a compensation needs recordings that turn")
+    moving = _moving(recordings, terms)
     rows = gather(moving, neighbours_of(moving))
-    whole = None if drive is None else model_of(rows, drive, seed)
+    still, lag, whole = _without_lag(rows, drive, seed)
     fold, held_out = folds(rows)
-    paths = paths_of(rows, half_about(rows, rows.error))
+    paths = paths_of(rows, half_about(still, still.error))
     trials = tried(
-        (rows, fold),
+        (still, fold),
         terms,
         paths,
         lambda train: None if whole is None or drive is None else model_of(train, drive, seed, whole.sign),
     )
     before = centred(rows.error, rows, fold)
     nested, method = choose(trials, fold)
-    found, off = candidates(rows, whole, terms, paths)[method]
-    worth, evidence, stretches = _worth(before, nested, rows)
+    common, off = candidates(still, whole, terms, paths)[method]
     # What no other recording met is extrapolated in angle when held out; a fresh run over the same angles is not.
-    again = centred(rows.error - said_of(found, rows), rows, np.zeros_like(fold))
+    again = centred(still.error - said_of(common, still), rows, np.zeros_like(fold))
+    own, with_own = own_of_each_speed(rows, again, min(OWN_TERMS, terms or OWN_TERMS))
+    found = with_speed(common, lag, own)
+    if isinstance(found, OfSpeed) and found.own:
+        gained = with_own != again
+        nested, again = np.where(gained, with_own, nested), with_own
+        trials[method + EACH_SPEED] = np.where(gained, with_own, trials[method])
+        method += EACH_SPEED
+    worth, evidence, stretches = _worth(before, nested, rows)
     left = np.where(met_elsewhere(rows), trials[method], again)
     rng = np.random.default_rng(seed)
     each = _each(rows, left, np.ones(len(rows), np.bool_), rng)
     predicted, low, high = _predicted(each)
-    ways = {"forward": 1.0, "backward": -1.0} if rows.reverses else {}
-    known = speeds_rpm(rows)
-    groups = of_each_speed(known)
     return Compensated(
         found,
         method,
@@ -274,7 +291,7 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
         predicted,
         low,
         high,
-        {name: float(np.ptp(nested[rows.direction == way])) for name, way in ways.items()},
+        {name: float(np.ptp(nested[rows.direction == way])) for name, way in _ways(rows).items()},
         _per_recording(moving, rows, (before, nested), each),
         held_out,
         {NONE: float(np.std(before))} | {name: float(np.std(left)) for name, left in trials.items()},
@@ -282,13 +299,53 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
         rows.ratio,
         (
             *_warnings(rows, held_out, moving),
-            *(_too_few(len(found), terms, off, float(np.ptp(again))) if worth else ()),
-            *(of_one_speed(rows, again) if worth else ()),
+            *(_too_few(len(common), terms, off, float(np.ptp(again))) if worth else ()),
         ),
         stretches,
-        {name: Expected(*_predicted(_each(rows, left, rows.direction == way, rng))) for name, way in ways.items()},
-        {known[one[0]] or 0.0: Expected(*_predicted([each[n] for n in one])) for one in groups if len(groups) > 1},
+        {
+            name: Expected(*_predicted(_each(rows, left, rows.direction == way, rng)))
+            for name, way in _ways(rows).items()
+        },
+        _by_speed(rows, each),
     )
+
+
+def _ways(rows: Rows) -> dict[str, float]:
+    """The directions that `rows` were recorded in, +1 and -1; {} where nothing reverses."""
+    return {"forward": 1.0, "backward": -1.0} if rows.reverses else {}
+
+
+def _by_speed(rows: Rows, each: Sequence[tuple[float, float]]) -> dict[float, Expected]:
+    """What to expect at each speed (r/min ->) of the records in `rows`, of `each` of which it is known with its
+    standard deviation; {} where all turn at one."""
+    known = speeds_rpm(rows)
+    groups = of_each_speed(known)
+    return {known[one[0]] or 0.0: Expected(*_predicted([each[n] for n in one])) for one in groups if len(groups) > 1}
+
+
+def _moving(recordings: Sequence[Recording], terms: int | None) -> list[Recording]:
+    """Those of the `recordings` whose input turns. Raises `HdoptError` where none does or `terms` is out of range."""
+    if terms is not None and not 0 <= terms <= MOST_TERMS:
+        raise HdoptError(f"--terms is {terms}; give 1 to {MOST_TERMS} coefficients, 0 for a table, or auto")
+    moving = [r for r in recordings if not r.input_locked]
+    if not moving:
+        raise HdoptError("the input is locked in every recording; a compensation needs recordings that turn")
+    return moving
+
+
+def _without_lag(rows: Rows, drive: Drive | None, seed: int) -> tuple[Rows, float, WaveformFit | None]:
+    """`rows` without what grows with the speed, how much that is (arcmin for each r/min), and the model of the `drive`
+    fitted to them, None without one.
+
+    Before the model is known the lag stands beside its whole error: it is asked for once more of what the model leaves.
+    """
+    rpm = signed_rpm(rows)
+    lag = lag_in(rows, rows.error)
+    still = replace(rows, error=rows.error - lag * rpm)
+    whole = None if drive is None else model_of(still, drive, seed)
+    if whole is not None and shows_lag(rpm):
+        lag += lag_in(still, still.error - whole.predict(still.theta))
+    return replace(rows, error=rows.error - lag * rpm), lag, whole
 
 
 def _each(rows: Rows, left: Array, some: Mask, rng: np.random.Generator) -> list[tuple[float, float]]:

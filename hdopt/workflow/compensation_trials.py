@@ -10,6 +10,7 @@ import numpy as np
 from hdopt.arrays import Array, Index, Mask
 from hdopt.compensation.fine import LEAST_TURNS
 from hdopt.compensation.mesh import ROWS_PER_TOOTH, fit_mesh, formed_mesh, shows_mesh
+from hdopt.compensation.of_speed import Angular, OfSpeed, signed_rpm
 from hdopt.compensation.path import Paths, crossing_of, half_return, path_of, some_of
 from hdopt.compensation.pursuit import dictionary, independent_share, pursue
 from hdopt.compensation.surface import AT_ONCE, COARSE, Crossing, nothing, surface_of
@@ -160,7 +161,9 @@ def part_of(rows: Rows, mask: Mask) -> Rows:
     return replace(part, record=np.unique(part.record, return_inverse=True)[1])
 
 
-def candidates(rows: Rows, fit: WaveformFit | None, terms: int | None, paths: Paths) -> dict[str, tuple[Found, float]]:
+def candidates(
+    rows: Rows, fit: WaveformFit | None, terms: int | None, paths: Paths
+) -> dict[str, tuple[Angular, float]]:
     """Every way to compensate, fitted to `rows`, in the form that will be written, and how far that form is off what
     was fitted (arcmin, peak-to-peak).
 
@@ -186,7 +189,7 @@ def candidates(rows: Rows, fit: WaveformFit | None, terms: int | None, paths: Pa
     alone = alone.sharpened(rows.ratio, width, count)
     held, lost = alone.for_table(COARSE)
     table = surface_of([held], None, alone.back, crossing)
-    made: dict[str, tuple[Found, float]] = {"harmonics": (table, lost.reach) if terms == 0 else (alone, 0.0)}
+    made: dict[str, tuple[Angular, float]] = {"harmonics": (table, lost.reach) if terms == 0 else (alone, 0.0)}
     if fit is None:
         return made
     free = zeros if path is None else np.column_stack([zeros, path])
@@ -224,10 +227,14 @@ def said_of(found: Found, rows: Rows) -> Array:
     before."""
     count = max(1, round(rows.averaged))
     apart = TURN / rows.rows_per_turn / count
-    value = found.back * path_of(rows, found.crossing)
+    path = path_of(rows, found.crossing)
+    value = np.zeros(len(rows))
     for place in range(count):
         theta = rows.theta + (place - (count - 1) / 2) * apart
-        value = value + found.at(theta, theta / rows.ratio) / count
+        if isinstance(found, OfSpeed):
+            value += found.at(theta, theta / rows.ratio, path, signed_rpm(rows)) / count
+        else:
+            value += found.at(theta, theta / rows.ratio, path) / count
     return value
 
 

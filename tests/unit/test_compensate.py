@@ -3,7 +3,6 @@
 import ctypes
 import itertools
 import json
-import re
 import shutil
 import subprocess
 from inspect import signature
@@ -335,21 +334,6 @@ def test_a_pass_there_and_back_is_held_out_where_the_other_way_met_it():
         trained = np.unique(np.round(rows.theta[fold != k] / TURN))
         assert set(np.round(rows.theta[fold == k] / TURN)) <= set(trained)
     assert folded(0, 60 * TURN, 50 * TURN)[2] == "stretches of the one output turn"
-
-
-@pytest.mark.parametrize("grows", [0.0, 0.3])
-def test_an_error_that_grows_with_speed_asks_for_a_table_of_each(grows):
-    """Would catch one table for two speeds, halfway between them, without a word; and the word where none is due."""
-
-    def run(speed, seed):
-        frame = table(lambda t: (0.2 + grows * (speed - 1)) * np.sin(2 * t), 90, per_turn=40, seed=seed)
-        return recording_from_table(frame.assign(time_s=frame["time_s"] / speed), RATIO, name=f"at {speed}")
-
-    made = compensate([run(1, 1), run(2, 3), run(1.02, 2), run(2, 4)])
-    told = r"at (\d+) r/min this table leaves .* one for this speed alone about ([\d.]+); compensate the"
-    asked = [found.groups() for said in made.warnings if (found := re.search(told, said))]
-    assert [float(speed) for speed, _ in asked] == pytest.approx([150, 300] if grows else [], rel=0.01)
-    assert [float(left) for _, left in asked] == pytest.approx([NOISE] * len(asked), rel=0.2)
 
 
 def test_a_recording_where_no_other_turned_is_not_judged_by_what_the_others_guess():
