@@ -96,15 +96,16 @@ def _program(text: str) -> str:
 def tests_of(file: str) -> tuple[str, ...]:
     """Test files (below `tests`) that should notice what is wrong in `file`, three at most.
 
-    First come those over all that its room registers, then those that the faults made by hand in it name, most often
-    named first, then unit and validation tests that import it; where there are none of these, those that import what
-    imports it.
+    First come the file of its name and those over all that its room registers, then those that the faults made by hand
+    in it name, most often named first, then unit and validation tests that import it; where there are none of these,
+    those that import what imports it.
     """
     named = Counter(
         test.split("::")[0] for room in rooms() for one in faults_of(room) if one.file == file for test in one.tests
     )
     tests = [*ROOT.glob("tests/unit/test_*.py"), *ROOT.glob("tests/validation/test_*.py")]
-    over_every = OVER_EVERY.get(Path(file).parent.name, ())
+    own = [name for name in (f"unit/test_{Path(file).stem}.py",) if (ROOT / "tests" / name).exists()]
+    over_every = [*own, *OVER_EVERY.get(Path(file).parent.name, ())]
     found = [*over_every, *(test for test, _ in named.most_common()), *_tests_importing(file, tests)]
     for other in [] if len(found) > len(over_every) else _importing(file, ROOT.glob("hdopt/*/*.py")):
         found += _tests_importing(str(other.relative_to(ROOT)), tests)

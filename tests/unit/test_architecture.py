@@ -164,6 +164,22 @@ def test_the_reasons_of_neighbours_are_still_needed():
     assert BESIDE.keys() <= room_edges(IMPORTS).keys()
 
 
+CHANGE_AS_THEY_WORK = {"FilesOfWork", "AllocationWatch", "DiagnosisWatch", "Doing"}
+"""Dataclasses that look on while something is done; all others are values."""
+
+
+def test_values_are_frozen():
+    """Would catch a dataclass that is changed by the one it was handed to."""
+    found = set()
+    for path in (ROOT / "hdopt").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            for mark in node.decorator_list if isinstance(node, ast.ClassDef) else ():
+                plain = ast.unparse(mark)
+                if plain.startswith("dataclass") and "frozen=True" not in plain:
+                    found.add(node.name)
+    assert found == CHANGE_AS_THEY_WORK
+
+
 def test_the_rules_of_this_page_bite():
     graph = {"hdopt.drive.a": {"hdopt.drive.b"}, "hdopt.drive.b": {"hdopt.drive.a"}, "hdopt.drive.c": {"hdopt.drive.a"}}
     assert circles(graph) == {frozenset({"hdopt.drive.a", "hdopt.drive.b"})}

@@ -276,6 +276,20 @@ def test_warming_may_take_ten_records():
         assert term.shape["time_constant_s"] == pytest.approx(kept * duration)
 
 
+@pytest.mark.parametrize(("step", "shortest"), [(0.01, 0.03), (1e-6, 1e-4)], ids=["by the rows", "by the travel"])
+def test_friction_is_looked_for_from_what_the_rows_hold_to_a_part_of_the_longest_pass(monkeypatch, step, shortest):
+    """Fourteen lengths in equal ratios: from 0.7 of three rows' travel, or of a ten-thousandth of the longest pass of
+    1 deg, to 0.14 of that pass."""
+    asked = []
+    monkeypatch.setattr("hdopt.effects.hysteresis.best_terms", lambda probe, terms: ["found"])
+    monkeypatch.setattr("hdopt.effects.hysteresis.terms_at", lambda effect, samples, shapes: asked.append(shapes) or [])
+    monkeypatch.setattr(type(EFFECTS["hysteresis"]), "_shape", staticmethod(lambda law, half: half))
+    travel = np.append(np.arange(100) * step, 1.0)
+    EFFECTS["hysteresis"].search(SimpleNamespace(samples=SimpleNamespace(locked=False, travel=travel)))
+    lengths = 0.7 * shortest * (0.14 / (0.7 * shortest)) ** (np.arange(14) / 13)
+    assert all(shapes == pytest.approx(lengths) for shapes in asked) and len(asked) > 1
+
+
 def test_warming_is_looked_for_from_a_twentieth_of_the_record_to_five(monkeypatch):
     """Twelve time constants in equal ratios, of a record of 300 s, begun at 1000 s."""
     effect, asked = EFFECTS["thermal_drift"], []

@@ -62,8 +62,13 @@ def test_an_effect_declares_what_its_examples_need(effect):
             item = declared[key]
             if isinstance(item, Category):
                 assert value in set(item.choices)
-            elif item.prior is not None:
+                continue
+            if item.prior is not None:
                 assert item.prior[0] <= abs(value) <= item.prior[1]
+            assert item.at_least is None or value >= item.at_least
+            assert item.at_most is None or value <= item.at_most
+            assert item.above is None or value > item.above
+            assert item.below is None or value < item.below
 
 
 @EACH

@@ -92,6 +92,8 @@ def test_each_slot_runs_off_by_the_offset_along_it():
 
 def test_flanks_interfere_whatever_play_the_cross_slide_adds():
     """Half of the angles have a negative backlash, and none a negative sum."""
+    # Flanks that just touch do not interfere.
+    assert Lag(np.zeros(4), np.array([-1.0, 0.0, 0.0, 1.0])).interference == 0.25
     found = Lag(np.array([5.0, 5.0]), np.array([-1.0, 1.0]))
     assert found.interference == 0.5
     assert found.to_dict()["min"] == 4.0

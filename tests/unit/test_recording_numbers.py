@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from math import exp, log, pi, radians, sqrt
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -13,8 +15,11 @@ from hdopt.recordings import figures
 from hdopt.recordings.capability import gauge, outliers, performance
 from hdopt.recordings.channels import mapped_channels, sensor_uncertainty_arcmin
 from hdopt.recordings.clocks import on_one_clock, seconds_of
-from hdopt.recordings.columns import Column, parse_columns
+from hdopt.recordings.columns import Column, choose_columns, parse_columns
 from hdopt.recordings.decision import decide, parse_limits
+from hdopt.recordings.formats import ending
+from hdopt.recordings.formats.messages import stamp_ns
+from hdopt.recordings.formats.text import find_layout
 from hdopt.recordings.orders import model_orders, order_spectrum
 from hdopt.recordings.passes import find_passes, synchronous_average
 from hdopt.recordings.ratio import measured_scale
@@ -23,9 +28,82 @@ from hdopt.recordings.recording import Recording
 from hdopt.recordings.repairs import Checks, drop_incomplete_rows, drop_outliers, find_gaps, unwrap_counter
 from hdopt.recordings.rows import gather, quiet
 from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
-from hdopt.recordings.table import Channel, Table
+from hdopt.recordings.table import Channel, Table, columns_of
+from hdopt.recordings.units import parse_unit
 
 TURN, ARCMIN, RATIO, RATE = 2 * pi, pi / 10800, 80.0, 360
+
+
+@pytest.mark.parametrize(
+    ("shape", "names"),
+    [
+        ((5,), ["angle"]),
+        ((5, 1), ["angle"]),
+        ((1, 5, 1), ["angle"]),
+        ((3, 5), ["angle[0]", "angle[1]", "angle[2]"]),
+        ((5, 3), ["angle[0]", "angle[1]", "angle[2]"]),
+        ((1, 1), []),
+        ((65, 70), []),
+        ((2, 3, 4), []),
+    ],
+    ids=str,
+)
+def test_arrays_become_channels_along_their_longer_side(shape, names):
+    """Each channel holds what stands along it, whichever way the array was written."""
+    values = np.arange(np.prod(shape)).reshape(shape)
+    found = columns_of("angle", values)
+    assert [name for name, _ in found] == names
+    along = np.atleast_2d(np.squeeze(values) if shape == (3, 5) else np.squeeze(values).T)
+    assert [column.tolist() for _, column in found] == (along.tolist() if names else [])
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("a.csv", ".csv"), ("a.CSV.GZ", ".csv"), ("a.b.txt", ".txt"), ("a.gz", ".gz"), ("a", "")]
+)
+def test_the_ending_says_what_a_compressed_file_is(name, said):
+    assert ending(Path(name)) == said
+
+
+@pytest.mark.parametrize(
+    ("header", "expected"),
+    [
+        ({"stamp": SimpleNamespace(sec=2, nanosec=5)}, 2_000_000_005),
+        ({"stamp": SimpleNamespace(sec=0, nanosec=7)}, 7),
+        ({"stamp": SimpleNamespace(sec=0, nanosec=0)}, None),
+        ({}, None),
+    ],
+)
+def test_a_stamp_is_seconds_and_the_rest_in_ns(header, expected):
+    assert stamp_ns(SimpleNamespace(header=SimpleNamespace(**header))) == expected
+    assert stamp_ns(SimpleNamespace()) is None
+
+
+def test_a_table_is_as_wide_as_its_second_half():
+    """Lines above it may be more, narrower and numbers too."""
+    above = ["5;7"] * 4
+    rows = [f"{k};{2 * k};{3 * k}" for k in range(60)]
+    layout = find_layout([*above, *rows], "utf-8", "file")
+    assert (layout.first_row, len(layout.header)) == (4, 3)
+
+
+def test_two_columns_that_could_be_the_torque_are_none():
+    """Temperatures may be several; of two torques neither is taken, and angles that are not plain are asked for."""
+    angle = np.linspace(0, 50, 200)
+    channels = {name: Channel(angle + k) for k, name in enumerate(("motor_angle_deg", "load_angle_deg"))}
+    both = {"torque_a_nm": Channel(angle), "torque_b_nm": Channel(angle)}
+    found, _ = choose_columns(Table({**channels, **both}), "file")
+    assert set(found) == {"input", "output"}
+    with pytest.raises(HdoptError, match="torque: torque_a_nm or torque_b_nm"):
+        choose_columns(Table({**channels, **both, "motor_angle_2_deg": Channel(angle)}), "file")
+
+
+@pytest.mark.parametrize(("channel", "said"), [("time", "gives time the unit"), ("torque", "Nm"), ("input", "deg")])
+def test_only_times_may_be_dates(channel, said):
+    """A torque in 'iso' is told the units of a torque."""
+    with pytest.raises(HdoptError) as refused:
+        parse_unit(channel, "iso")
+    assert said in str(refused.value)
+    assert ("day.month.year" in str(refused.value)) == (channel == "time")
 
 
 def there_and_back(turns=4, passes=2, rate=RATE):
