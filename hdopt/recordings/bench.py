@@ -17,13 +17,13 @@ from hdopt.errors import HdoptError, unknown_name
 from hdopt.files import line_of, line_of_depth
 from hdopt.recordings.columns import Column
 from hdopt.recordings.units import CHANNEL_UNITS, parse_unit
-from hdopt.toml_lines import Keys, closest_line, key_lines
+from hdopt.toml_lines import Keys, closest_line, first_too_deep, key_lines
 
 BENCH_KEYS = ("name", "ratio", "columns")
 LARGEST, LONGEST_SHOWN = 1e300, 60
 """Above which a number is a slip of the pen, and characters of a value that a message shows."""
-MOST_DIGITS = 4300
-"""Of an integer that Python reads."""
+MOST_DIGITS, MOST_LEVELS = 4300, 12
+"""Digits of an integer that Python reads, and levels of tables and arrays, of which a bench needs five."""
 COLUMN_KEYS = ("column", "unit", "counts_per_turn", "gear", "sign", "step_deg", "uncertainty_arcsec", "calibration")
 
 
@@ -53,6 +53,8 @@ def load_bench(path: Path) -> Bench:
         why = f"an integer of more than {MOST_DIGITS} digits" if endless else "nested too deeply"
         raise HdoptError(f"{path.name}, line {line}: cannot be read as TOML: {why}") from error
     at = _Places(path.name, key_lines(text))
+    if deep := first_too_deep(content, MOST_LEVELS):
+        raise HdoptError(f"{at(*deep)}: {'.'.join(deep[:3])} is nested more than {MOST_LEVELS} levels deep")
     for key in content:
         if key not in BENCH_KEYS:
             raise HdoptError(f"{at(key)}: {unknown_name('key', key, BENCH_KEYS)}")

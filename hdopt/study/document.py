@@ -78,9 +78,8 @@ def _check_size(document: Document) -> None:
                 f"{document.where(path[:3])}: is nested {len(path)} levels deep; a study has {DEEPEST} levels at most"
             )
         if path and len(path[-1]) > LONGEST_KEY:
-            raise HdoptError(
-                f"{document.where(path[:-1])}: has a name of {len(path[-1])} letters; at most {LONGEST_KEY} are allowed"
-            )
+            place = f"{document.source}, line {line_of(document.texts[-1], path[-1])}"
+            raise HdoptError(f"{place}: has a name of {len(path[-1])} letters; at most {LONGEST_KEY} are allowed")
         if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
             raise HdoptError(f"{document.where(path)}: is an integer of {len(hex(value)) * 4} bits; TOML allows 64")
         if isinstance(value, Mapping):
