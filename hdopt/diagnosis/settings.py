@@ -87,6 +87,7 @@ class BaseSettings:
         "choice: three times the shipped tolerances, as far as the closed form holds; beyond them its second-order "
         "terms would imitate physics that is not there",
     )
+    far: float = threshold(1.4, "1", "choice: an error over its prior from which the study's tolerances are left")
     prior_arcmin: float = threshold(
         0.3, "arcmin", "choice: rms up to which the prior holds; the prior of a larger error grows with it"
     )
@@ -343,6 +344,10 @@ class SearchSettings:
     beside_flexible: float = threshold(
         0.2, "1", "choice: share of a flexible leader's evidence from which a single effect may be half of it"
     )
+    begun: float = threshold(
+        0.5, "1", "choice: power left above the noise over it from which a leading set is taken for a part of another"
+    )
+    complete: float = threshold(0.05, "1", "choice: the same up to which that other set leaves noise alone")
     lost_by_trimming: float = threshold(0.005, "1", "choice: share of the gain that parts which do not show may take")
     known: int = threshold(5, "1", "choice: candidates from which a later search goes on")
     tie_of_variants: float = threshold(10.0, "1", "choice: log evidence by which a wider variant must be better")
@@ -498,9 +503,6 @@ class VerdictSettings:
     )
     stepped_resolution: float = threshold(
         0.5, "1", "choice: share of what steps taken out of a coarse encoder leave below which nothing is a finding"
-    )
-    far_base: float = threshold(
-        1.4, "1", "choice: a base error over its prior from which the study's tolerances are left"
     )
     smallest_share: float = threshold(0.02, "1", "choice: share of the held-out power that is worth a name")
     unconfirmed_share: float = threshold(

@@ -1,9 +1,13 @@
 """What a set of terms pays: an encoder's cycles, sets of which one is in the other, terms that must win clearly."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from hdopt.diagnosis.search.penalty import Scale, SubtractedTerms, is_cycle_of, penalty
+from hdopt.diagnosis.inference.base_fit import is_far
+from hdopt.diagnosis.search.candidates import weigh
+from hdopt.diagnosis.search.penalty import Scale, SubtractedTerms, discrepancy, is_cycle_of, penalty
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.effects.declared import Shaft
 from hdopt.effects.met import Spline, Waves
@@ -58,6 +62,45 @@ def test_waves_of_both_splines_teeth_pay_once_for_bending():
     ]:
         own = sum(one.width * np.log(100.0) / 2 + COSTS.effect_cost for one in pair)
         assert paid(pair, gain=1e4) == pytest.approx(own + inexact * COSTS.discrepancy * 1e4 / 2)
+
+
+def test_sines_that_leave_nothing_pay_as_such_beside_any_other_kind():
+    """Beside friction or wind-up two encoders off-centre are two sines still, and so is one beside lines that were
+    counted; beside a pulse, whose shape is inexact and lives where sines do, they are not. Would catch an encoder that
+    is given up for a drive which its tolerances exclude (3 % of the explained power)."""
+    loop, sine, other = (term(name) for name in ("hysteresis", "encoder_input_eccentricity", "output_coupling"))
+    pulse, nothing = term("local_tooth_defect"), term("_sine_in_time")
+    for terms, share in [
+        ([sine, other], COSTS.other_kind),
+        ([loop, sine, other], 2 * COSTS.other_kind),
+        ([encoder(64), sine], COSTS.other_kind),
+        ([pulse, sine, other], 2 * COSTS.discrepancy),
+        ([loop, term("lost_motion"), sine, other], COSTS.discrepancy + 2 * COSTS.other_kind),
+        ([nothing], 0.0),
+        ([loop, sine, nothing], COSTS.other_kind + COSTS.discrepancy),
+    ]:
+        assert discrepancy(terms) == pytest.approx(share)
+
+
+def test_a_drive_far_outside_its_tolerances_pays_as_an_effect_of_another_kind():
+    """It may be given by one error alone; what only comes near costs nothing, and neither does a gear without a base.
+    The base alone pays nothing: it is what all is weighed against."""
+    model = SimpleNamespace(base="a base", prior=np.array([0.03, 0.02]), settings=DEFAULT)
+    model.noise = SimpleNamespace(sigma=0.1)
+    scale = Scale(100.0, inflation=2.0)
+
+    def fit(errors, terms=(term("hysteresis"),), problem=model):
+        return SimpleNamespace(errors=np.array(errors), terms=terms, problem=problem, objective=30.0)
+
+    near, far = fit([0.041, -0.027]), fit([0.01, -0.029])
+    assert list(is_far(near)) == [False, False]
+    assert list(is_far(far)) == [False, True]
+    assert not is_far(fit([], problem=SimpleNamespace(base=None, settings=DEFAULT))).any()
+    base = SimpleNamespace(objective=40.0)
+    plain, dear = (weigh(one, base, scale, 5000.0).log_bayes_factor for one in (near, far))
+    assert plain - dear == pytest.approx(COSTS.effect_cost + COSTS.other_kind * 5000.0 / 2.0 / 2)
+    alone = [weigh(fit(errors, ()), base, scale, 5000.0).log_bayes_factor for errors in ([0.0, 0.0], [0.04, -0.03])]
+    assert alone[0] == alone[1]
 
 
 def test_a_doubtful_term_must_win_clearly():

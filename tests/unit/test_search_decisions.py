@@ -43,6 +43,7 @@ class Told:
     coefficients: tuple = ()
     motion: object = None
     may_be_said: bool = True
+    far: bool = False
 
     def all_but(self, index):
         return tuple(i for i in range(len(self.terms)) if i != index)
@@ -54,10 +55,12 @@ def of(evidence, *names, **more):
 
 @pytest.fixture(autouse=True)
 def weighed(monkeypatch):
-    """Evidence is what a fit says, less a tenth of what the best gains beyond it where that is asked for."""
+    """Evidence is what a fit says, less a tenth of what the best gains beyond it where that is asked for, and less 5
+    where a far drive pays."""
 
-    def weigh(fit, base, scale, top=None):
-        return Candidate(fit, fit.evidence - 0.1 * max((top or fit.gain) - fit.gain, 0.0), fit.gain)
+    def weigh(fit, base, scale, top=None, far_pays=True):
+        paid = 0.1 * max((top or fit.gain) - fit.gain, 0.0) + 5.0 * (far_pays and fit.far)
+        return Candidate(fit, fit.evidence - paid, fit.gain)
 
     monkeypatch.setattr(search_state, "weigh", weigh)
     monkeypatch.setattr(search_state, "penalty_scale", lambda *about: "scale")
@@ -96,6 +99,70 @@ def test_two_fits_of_one_set_are_weighed_against_the_larger_gain():
     assert not state.is_better(of(12.0, "a", gain=0.0), of(6.0, "a", gain=50.0), by=1.5)
     assert not state.is_better(of(12.0, "a", gain=0.0), of(8.0, "a", gain=50.0), by=0.0)
     assert state.is_better(of(5.0, "a"), of(6.0, "a"), by=-1.5)
+
+
+ROWS, SIGMA = 1000.0, 0.5
+
+
+@pytest.fixture
+def in_rows(monkeypatch):
+    """Candidates of fits that leave so much above the noise over it, and explain the rest of three times the noise;
+    each term pays 3, `sine` and `cosine` leave nothing."""
+    monkeypatch.setattr(search_state, "penalty_scale", lambda *about: SimpleNamespace(rows=ROWS))
+    monkeypatch.setattr(subset_search, "penalty", lambda terms, gain, scale: 3.0 * len(terms) + gain)
+    monkeypatch.setattr(subset_search, "leaves_nothing", lambda term: term.effect in ("sine", "cosine"))
+    problem = SimpleNamespace(**vars(PROBLEM), noise=SimpleNamespace(sigma=SIGMA))
+
+    def candidate(evidence, names, left, inflation=2.0):
+        objective = (1 + left) * ROWS * inflation * SIGMA**2
+        gain = (3 - left) * ROWS * inflation
+        return Candidate(of(evidence, *names, objective=objective, gain=gain, problem=problem), evidence, gain)
+
+    return candidate
+
+
+@pytest.mark.parametrize(
+    ("first", "other", "taken"),
+    [
+        (0.6, (("a", "sine"), 0.04), True),
+        (0.6, (("sine", "a", "cosine"), -0.1), True),
+        (0.4, (("a", "sine"), 0.04), False),
+        (0.6, (("a", "sine"), 0.06), False),
+        (0.6, (("a", "b"), 0.04), False),
+        (0.6, (("a", "sine", "b"), 0.04), False),
+        (0.6, (("b", "sine"), 0.04), False),
+    ],
+    ids=["completed", "by two", "not far above noise", "not to the noise", "no sine", "not all sines", "another set"],
+)
+def test_sines_that_leave_noise_alone_complete_a_set_that_leaves_far_more(in_rows, first, other, taken):
+    """Of a set that leaves 0.6 of the noise's power above it, and one with a sine more that leaves none, the latter,
+    whatever inexactness it would pay for. Would catch a second encoder given up beside a damaged tooth."""
+    names, left = other
+    begun, more, last = in_rows(900.0, ("a",), first), in_rows(100.0, names, left), in_rows(20.0, ("c",), 2.0)
+    found = subset_search.completed(state_of(), [begun, more, last])
+    if not taken:
+        assert found == [begun, more, last]
+        return
+    assert [one.fit for one in found] == [more.fit, begun.fit, last.fit]
+    assert found[0].log_bayes_factor == pytest.approx(900.0 + (first - left) * ROWS / 2 - 3.0 * (len(names) - 1))
+
+
+def test_of_two_completed_sets_the_better_and_nothing_where_the_base_leads(in_rows):
+    begun = in_rows(900.0, ("a",), 0.6)
+    one, two = in_rows(100.0, ("a", "sine"), 0.04), in_rows(90.0, ("a", "cosine"), 0.02)
+    assert subset_search.completed(state_of(), [begun, one, two])[0].fit is two.fit
+    alone = in_rows(0.0, (), 0.6)
+    assert subset_search.completed(state_of(), [alone, one]) == [alone, one]
+
+
+def test_a_far_drive_pays_against_other_effects_alone():
+    """Beside the same effects the better drive stays, wherever it lies. Would catch a worse minimum of many waves that
+    is taken for its drive (its held-out error was a seventh larger)."""
+    far, near = of(12.0, "a", far=True), of(10.0, "a")
+    assert state_of(near, far).leader.fit is far
+    assert state_of(far, near).leader.fit is far
+    other = of(8.0, "b")
+    assert state_of(far, other).leader.fit is other
 
 
 def test_what_is_skipped_and_what_is_there_is_not_looked_for(monkeypatch):

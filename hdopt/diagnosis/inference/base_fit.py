@@ -81,6 +81,15 @@ def _solve_offsets(fit: Fit) -> Fit:
     return evaluate(fit.problem, fit.errors, offsets, fit.terms, fit.coefficients)
 
 
+def is_far(fit: Fit) -> Mask:
+    """Which of the base's errors in `fit` lie far outside the tolerances of its kind, (12,); of a gear without a base
+    none, (0,).
+    """
+    if fit.problem.base is None:
+        return np.zeros(0, bool)
+    return np.asarray(np.abs(fit.errors) > fit.problem.settings.base.far * fit.problem.prior)
+
+
 @dataclass(frozen=True)
 class BaseEstimate:
     """The base's errors as a drive's: parameters with intervals, and combinations that the recording leaves open."""

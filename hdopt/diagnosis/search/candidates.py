@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hdopt.diagnosis.inference.base_fit import fit_base
+from hdopt.diagnosis.inference.base_fit import fit_base, is_far
 from hdopt.diagnosis.inference.catalogue import is_outside
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, extend, refine
 from hdopt.diagnosis.inference.normal_equations import gains_of_subsets, solved
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import SMALL_RIDGE, TINY
-from hdopt.diagnosis.search.penalty import NOTHING_SUBTRACTED, Scale, SubtractedTerms, penalty
+from hdopt.diagnosis.search.penalty import NOTHING_SUBTRACTED, Scale, SubtractedTerms, of_far_base, penalty
 from hdopt.effects.term import Term
 from hdopt.parallel.shared_memory import each
 
@@ -156,13 +156,17 @@ def replace_terms(fit: Fit, terms: Sequence[Term]) -> Fit:
     return evaluate(fit.problem, fit.errors, fit.offsets, terms, [np.zeros(t.width) for t in terms])
 
 
-def weigh(fit: Fit, base: Fit, scale: Scale, top_gain: float | None = None) -> Candidate:
+def weigh(fit: Fit, base: Fit, scale: Scale, top_gain: float | None = None, far_pays: bool = True) -> Candidate:
     """Log Bayes factor of a joint `fit` against the `base` alone, where the best explanation gains `top_gain` noise
-    variances (None: this one). `scale` is what penalties are measured by.
+    variances (None: this one). `scale` is what penalties are measured by; `far_pays`: whether a drive far outside its
+    tolerances does.
     """
     gain = (base.objective - fit.objective) / fit.problem.noise.sigma**2
-    top = gain if top_gain is None else top_gain
-    return Candidate(fit, gain / scale.inflation / 2 - penalty(fit.terms, max(top, 0.0), scale), gain)
+    top = max(gain if top_gain is None else top_gain, 0.0)
+    cost = penalty(fit.terms, top, scale)
+    if far_pays and fit.terms and is_far(fit).any():
+        cost += of_far_base(top, scale)
+    return Candidate(fit, gain / scale.inflation / 2 - cost, gain)
 
 
 def without_each(fit: Fit) -> list[Fit]:

@@ -7,6 +7,7 @@ wrong shape leaves must not be named as further physics.
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -72,6 +73,14 @@ def penalty(terms: Sequence[Term], gain: float, scale: Scale) -> float:
     return cost + len(terms) * s.effect_cost + inexact / scale.inflation / 2
 
 
+def of_far_base(gain: float, scale: Scale) -> float:
+    """Log evidence that a set pays whose drive lies far outside the tolerances of its kind, where the best explanation
+    gains `gain` noise variances: such a drive stands for physics that the set leaves out, and pays as an effect of
+    another kind does. `scale` is what penalties are measured by.
+    """
+    return scale.settings.effect_cost + scale.settings.other_kind * gain / scale.inflation / 2
+
+
 def searched(term: Term) -> float:
     """What the search over a term's shapes cost, in log evidence, and the odds against its variant."""
     return math.log(max(term.trials, 1.0)) - term.odds
@@ -88,13 +97,27 @@ def discrepancy(terms: Sequence[Term], settings: PenaltySettings = DEFAULT.penal
     without physics could be the misfit of anything. Many waves of both splines' teeth pay for bending, each to the
     misfit of the other, and not for being alike too. `settings` are the thresholds.
     """
-    kinds = {kind_of(term) for term in terms if not is_outside(term.effect)}
-    flexible = sum(flexibility(term, settings) for term in terms)
-    of_teeth = sum(flexibility(term, settings) for term in terms if isinstance(term.met, Waves))
-    alike = max(len(terms) - max(len(kinds), 1) - max(of_teeth - 1, 0), 0)
-    # Sines of known orders leave nothing for each other: their shape is exact.
-    each_alike = settings.other_kind if all(has_exact_shape(term) for term in terms) else settings.discrepancy
-    return max(len(kinds) - 1, 0) * settings.other_kind + alike * each_alike + flexible * settings.discrepancy
+    of_kinds: dict[str, list[Term]] = defaultdict(list)
+    for term in terms:
+        if not is_outside(term.effect):
+            of_kinds[kind_of(term)].append(term)
+    share = sum(_among_alike(alike, settings) for alike in of_kinds.values())
+    share += max(len(of_kinds) - 1, 0) * settings.other_kind
+    outside = sum(is_outside(term.effect) for term in terms)
+    share += max(outside - (not of_kinds), 0) * _each_alike(terms, settings)
+    return share + sum(flexibility(term, settings) for term in terms) * settings.discrepancy
+
+
+def _among_alike(alike: Sequence[Term], settings: PenaltySettings) -> float:
+    """Share of the explained power that terms of one kind pay for being `alike`."""
+    of_teeth = sum(flexibility(term, settings) for term in alike if isinstance(term.met, Waves))
+    return max(len(alike) - 1 - max(of_teeth - 1, 0), 0) * _each_alike(alike, settings)
+
+
+def _each_alike(terms: Sequence[Term], settings: PenaltySettings) -> float:
+    """What each of `terms` after the first pays. Sines of known orders leave nothing for each other, whatever other
+    kind stands beside them."""
+    return settings.other_kind if all(leaves_nothing(term) for term in terms) else settings.discrepancy
 
 
 def has_exact_shape(term: Term) -> bool:

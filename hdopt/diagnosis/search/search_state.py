@@ -59,9 +59,10 @@ class SearchState:
         """Orders that are looked at."""
         return self.plan.order_range or (0.0, self.base.problem.rows.highest_order)
 
-    def weigh(self, fit: Fit, top_gain: float | None = None) -> Candidate:
-        """`fit` as a candidate, where the best explanation gains `top_gain` (None: this one)."""
-        return weigh(fit, self.base, self.scale, top_gain)
+    def weigh(self, fit: Fit, top_gain: float | None = None, far_pays: bool = True) -> Candidate:
+        """`fit` as a candidate, where the best explanation gains `top_gain` (None: this one); `far_pays` as in
+        `candidates.weigh`."""
+        return weigh(fit, self.base, self.scale, top_gain, far_pays)
 
     def log_bayes_factor(self, fit: Fit) -> float:
         """That of `fit` against the base alone."""
@@ -81,10 +82,11 @@ class SearchState:
 
     def is_better(self, fit: Fit, known: Fit, by: float) -> bool:
         """Of two fits of the same effects, whose variants may differ in width, whether the first has more evidence, by
-        so much.
+        so much. Which drive stands beside them is the data's to say: one far outside its tolerances pays only against
+        other effects.
         """
         top = max(self.weigh(fit).gain, self.weigh(known).gain)
-        first, second = (self.weigh(f, top).log_bayes_factor for f in (fit, known))
+        first, second = (self.weigh(f, top, far_pays=False).log_bayes_factor for f in (fit, known))
         return first > second + by
 
     def would_take(self, fit: Fit) -> bool:

@@ -19,7 +19,7 @@ from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import Candidate, joint_fit, search_terms, without_each
 from hdopt.diagnosis.search.explore import explore
-from hdopt.diagnosis.search.penalty import flexibility
+from hdopt.diagnosis.search.penalty import flexibility, leaves_nothing, penalty
 from hdopt.diagnosis.search.refinement import (
     otherwise_acceptable,
     shortened,
@@ -65,7 +65,7 @@ def select(base: Fit, inflation: float, rng: np.random.Generator, plan: SearchPl
     state = SearchState(base, plan or SearchPlan(), inflation, rng)
     for stage in STAGES:
         state = stage(state)
-    candidates = acceptable_first(ranked(state), state.settings.close_behind)
+    candidates = completed(state, acceptable_first(ranked(state), state.settings.close_behind))
     best = candidates[0]
     fuller = widened_where_it_pays(best.fit, state.base, inflation, state.order_range) if best.fit.terms else best.fit
     return Selection(state.base, (replace(best, fit=fuller), *candidates[1:]), inflation)
@@ -283,6 +283,42 @@ def ranked(state: SearchState) -> list[Candidate]:
         others = otherwise_acceptable(candidate.fit, state.plan.skip, state.order_range)
         candidates += [state.weigh(fit, top) for fit in others]
     return sorted(candidates, key=lambda c: -c.log_bayes_factor)
+
+
+def completed(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
+    """`candidates` in order of evidence, the first only begun where it leaves far more than noise and sines of known
+    orders beside it leave noise alone: what an inexact shape leaves no such sine takes up to the last, so that these do
+    not pay for it. `state` is where the work stands.
+    """
+    first, rows, settings = candidates[0], state.scale.rows, state.settings
+    if not first.fit.terms or above_noise(state, first.fit) < settings.begun * rows:
+        return candidates
+    found = []
+    for candidate in candidates[1:]:
+        beside = [term for term in candidate.fit.terms if term.effect not in first.effects]
+        if set(first.effects) < set(candidate.effects) and all(leaves_nothing(term) for term in beside):
+            if above_noise(state, candidate.fit) <= settings.complete * rows:
+                found.append(without_inexactness(state, first, candidate))
+    if not found:
+        return candidates
+    best = max(found, key=lambda c: c.log_bayes_factor)
+    return sorted([best, *(c for c in candidates if c.fit is not best.fit)], key=lambda c: -c.log_bayes_factor)
+
+
+def above_noise(state: SearchState, fit: Fit) -> float:
+    """By how much what `fit` leaves is above what the noise makes, in noise variances. `state` is where the work
+    stands.
+    """
+    return fit.objective / fit.problem.noise.sigma**2 / state.inflation - state.scale.rows
+
+
+def without_inexactness(state: SearchState, first: Candidate, more: Candidate) -> Candidate:
+    """The candidate of `more` effects than the `first`, of which those beside it pay for their freedom alone. `state`
+    is where the work stands.
+    """
+    paid = [penalty(candidate.fit.terms, 0.0, state.scale) for candidate in (first, more)]
+    gained = (more.gain - first.gain) / state.inflation / 2
+    return replace(more, log_bayes_factor=first.log_bayes_factor + gained - (paid[1] - paid[0]))
 
 
 def acceptable_first(candidates: Sequence[Candidate], close_behind: float) -> list[Candidate]:

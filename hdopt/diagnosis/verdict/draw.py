@@ -10,7 +10,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.localization import locate
-from hdopt.diagnosis.inference.base_fit import base_estimate, beat_warning
+from hdopt.diagnosis.inference.base_fit import base_estimate, beat_warning, is_far
 from hdopt.diagnosis.inference.catalogue import NEW_ZERO, SKEW, VARYING_CONTACT, is_effect
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.nuisance import estimated, notes
@@ -158,9 +158,7 @@ def _coefficients(evidence: Evidence, effect: str) -> list[Array]:
 
 def base_notes(model: Fit) -> tuple[str, ...]:
     """A base of `model` far outside the errors that its prior allows."""
-    if model.problem.base is None:
-        return ()
-    far = np.abs(model.errors) > model.problem.settings.verdict.far_base * model.problem.prior
+    far = is_far(model)
     if not far.any():
         return ()
     listed = ", ".join(f"{CARTESIAN_NAMES[i]} {model.errors[i]:.3g} mm" for i in np.flatnonzero(far))
