@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -21,7 +22,7 @@ from hdopt.diagnosis.orientation import Orientation, is_decisive, preference, tu
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.high_order import find_ripple, strong_ripple, subtract, subtracted_terms
 from hdopt.diagnosis.search.search_state import SearchPlan, SearchState, names_of
-from hdopt.diagnosis.search.subset_search import Selection, first_look, select
+from hdopt.diagnosis.search.subset_search import Selection, first_look, leading_evidence, select, select_from
 from hdopt.diagnosis.settings import DiagnosisSettings
 from hdopt.diagnosis.state import Guess, State
 from hdopt.effects.sines import sine_columns
@@ -232,10 +233,10 @@ def better_way(state: State, turned: State) -> State:
     convention, where that is a tie. A first look decides where it is clear enough.
     """
     other, settings = fit_base_in_noise(turned), state.settings.orientation
-    ways = in_one_noise(state, other)
+    ways = [with_first_look(way) for way in in_one_noise(state, other)]
     gap = gap_at_first_look(ways)
     if abs(gap) > settings.first_look:
-        return state if gap > 0 else other
+        return ways[0] if gap > 0 else other
     ways = [search_effects(way) for way in ways]
     scores = [way.selection.best.log_bayes_factor - unexplained(way) for way in ways]
     if abs(scores[0] - scores[1]) < settings.tie:
@@ -247,7 +248,8 @@ def better_way(state: State, turned: State) -> State:
 def likelier_way_with_effects(state: State, turned: State) -> State:
     """Of `state` and its `turned` counterpart the one in which a first look at the effects explains more."""
     other = fit_base_in_noise(turned)
-    return state if gap_at_first_look(in_one_noise(state, other)) >= 0 else other
+    ways = [with_first_look(way) for way in in_one_noise(state, other)]
+    return ways[0] if gap_at_first_look(ways) >= 0 else other
 
 
 def in_one_noise(state: State, other: State) -> list[State]:
@@ -260,11 +262,16 @@ def in_one_noise(state: State, other: State) -> list[State]:
     return ways
 
 
+def with_first_look(way: State) -> State:
+    """`way` with the first look about its base, from which a search goes on."""
+    return replace(way, looked=first_look(way.base, way.inflation, way.draws(), plan_of(way)))
+
+
 def gap_at_first_look(ways: Sequence[State]) -> float:
     """By how much log evidence the first of two `ways` explains more than the second, its base and the leader of a
     first look at the effects together.
     """
-    first, second = (first_look(way.base, way.inflation, way.draws(), plan_of(way)) - unexplained(way) for way in ways)
+    first, second = (leading_evidence(way.looked) - unexplained(way) for way in ways if way.looked is not None)
     return first - second
 
 
@@ -285,8 +292,13 @@ def search_effects(state: State) -> State:
     """
     if state.searched:
         return state
-    rng = state.draws()
-    return replace(state.found(select(state.base, state.inflation, rng, plan_of(state))), rng=rng, searched=True)
+    if state.looked is None:
+        rng = state.draws()
+        found = select(state.base, state.inflation, rng, plan_of(state))
+    else:
+        rng = copy.deepcopy(state.looked.rng)
+        found = select_from(replace(state.looked, rng=rng))
+    return replace(state.found(found), rng=rng, searched=True, looked=None)
 
 
 def try_guesses(state: State) -> State:

@@ -11,6 +11,7 @@ from hdopt.arrays import Array
 from hdopt.diagnosis.inference.fit import Fit, FitProblem
 from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.orientation import AS_COUNTED, Orientation
+from hdopt.diagnosis.search.search_state import SearchState
 from hdopt.diagnosis.search.subset_search import Selection
 from hdopt.diagnosis.settings import DiagnosisSettings
 from hdopt.effects.term import Shape
@@ -40,8 +41,9 @@ class State:
     (n,) arcmin (`ripple`, None for nothing). `inflation` says how much rougher the noise is than its model. `rng` is
     the stream of random drives: a stage draws from a copy (`draws`) and hands that on, so that it can be run again.
     `orientation` says which way the angles were counted: `recordings` and everything after stand as counted there.
-    `searched`: whether the `selection` is that of a search in the noise that stands here. `guesses` are what was found
-    elsewhere and is tried here too.
+    `searched`: whether the `selection` is that of a search in the noise that stands here; `looked` is where one stands
+    after its first look about this base in this noise (None: not begun). `guesses` are what was found elsewhere and is
+    tried here too.
     """
 
     recordings: tuple[Recording, ...]
@@ -56,6 +58,7 @@ class State:
     rng: np.random.Generator
     orientation: Orientation = AS_COUNTED
     searched: bool = False
+    looked: SearchState | None = None
     guesses: tuple[Guess, ...] = ()
 
     @property

@@ -270,14 +270,19 @@ def test_a_scale_that_is_right_is_one(in_noise):
     assert scale.ratio == pytest.approx(RATIO, rel=2e-5)
 
 
+def looked_at_nothing(base, inflation, rng, plan):
+    return SearchState(base, plan, inflation, rng)
+
+
 @pytest.mark.parametrize(("ahead", "counted"), [(1e-3, 1), (-1e-3, -1)])
 def test_on_a_part_of_the_turns_an_open_orientation_is_not_searched_for(in_noise, monkeypatch, ahead, counted):
     """Would catch two more searches in every held-out figure, three quarters of a diagnosis's time."""
     looks = iter([ahead, 0.0, ahead, 0.0])
     monkeypatch.setattr(stages, "preference", lambda as_counted, turned: 0.0)
     monkeypatch.setattr(stages, "unexplained", lambda way: 0.0)
-    monkeypatch.setattr(stages, "first_look", lambda *about: next(looks))
-    monkeypatch.setattr(stages, "select", None)
+    monkeypatch.setattr(stages, "first_look", looked_at_nothing)
+    monkeypatch.setattr(stages, "leading_evidence", lambda look: next(looks))
+    monkeypatch.setattr(stages, "select_from", None)
     assert choose_orientation_at_first_look(in_noise).orientation.input == counted
     with pytest.raises(TypeError, match="not callable"):
         choose_orientation(in_noise)
@@ -309,29 +314,50 @@ def test_waves_of_teeth_do_not_turn_a_recording_round():
 def test_a_clear_first_look_saves_the_search_both_ways(in_noise, monkeypatch, ahead, counted):
     looks = iter([ahead, 0.0])
     monkeypatch.setattr(stages, "preference", lambda as_counted, turned: 0.0)
-    monkeypatch.setattr(stages, "first_look", lambda *about: next(looks))
+    monkeypatch.setattr(stages, "first_look", looked_at_nothing)
+    monkeypatch.setattr(stages, "leading_evidence", lambda look: next(looks))
     monkeypatch.setattr(stages, "select", None)
+    monkeypatch.setattr(stages, "select_from", None)
     after = choose_orientation(in_noise)
     assert (after.orientation.input, after.orientation.decided_by) == (counted, "data")
     assert not after.searched
+    # The noise of the turned way is another: what was looked at in that of the first is no beginning there.
+    assert (after.looked is not None) == (counted == 1)
 
 
 def test_what_was_searched_for_the_orientation_is_not_searched_again(in_noise, monkeypatch):
     """A first look that decides nothing, then a search each way: the one as counted stands in its own noise."""
     monkeypatch.setattr(stages, "preference", lambda as_counted, turned: 0.0)
     monkeypatch.setattr(stages, "unexplained", lambda way: 0.0)
-    monkeypatch.setattr(stages, "first_look", lambda *about: 1.0)
+    monkeypatch.setattr(stages, "first_look", looked_at_nothing)
+    monkeypatch.setattr(stages, "leading_evidence", lambda look: 1.0)
+    monkeypatch.setattr(stages, "select", None)
     searches = []
 
-    def searched(base, inflation, rng, plan):
-        searches.append(base)
-        return only_base(base, inflation)
+    def searched(look):
+        searches.append(look.base)
+        return only_base(look.base, look.inflation)
 
-    monkeypatch.setattr(stages, "select", searched)
+    monkeypatch.setattr(stages, "select_from", searched)
     after = choose_orientation(in_noise)
     assert len(searches) == 2
     assert after.searched
     assert search_effects(after) is after
+
+
+def test_a_first_look_is_taken_once(in_noise, monkeypatch):
+    """Would catch a search that begins anew: the same random drives, fitted twice to the same rows."""
+    look = SearchState(in_noise.base, SearchPlan(), 2.0, np.random.default_rng(3))
+    begun = replace(in_noise, looked=replace(look, fits={frozenset({"a"}): in_noise.base}))
+    monkeypatch.setattr(stages, "select", None)
+    seen = []
+    monkeypatch.setattr(stages, "select_from", lambda state: seen.append(state) or only_base(state.base, 2.0))
+    after = search_effects(begun)
+    assert after.searched and after.looked is None
+    (state,) = seen
+    assert (state.fits, state.inflation) == (begun.looked.fits, 2.0)
+    assert state.rng is after.rng is not look.rng  # a stage draws from a copy
+    assert state.rng.random() == look.rng.random()
 
 
 def test_a_search_in_another_noise_goes_on_from_what_was_found(searched, monkeypatch):

@@ -108,8 +108,9 @@ def test_what_is_left_counts_in_noise_variances_half(monkeypatch):
     """log likelihood of what is left: half its power over that of the noise, which is rougher by the inflation."""
     assert stages.unexplained(state_of(Told("", 12.0, Problem(noise_of(0.5))), inflation=3.0)) == pytest.approx(8.0)
     monkeypatch.setattr(stages, "plan_of", lambda way: way.base.name)
-    monkeypatch.setattr(stages, "first_look", lambda base, inflation, rng, plan: {"one": 10.0, "two": 4.0}[plan])
-    both = [state_of(Told("one", 6.0)), state_of(Told("two", 10.0))]
+    monkeypatch.setattr(stages, "first_look", lambda base, inflation, rng, plan: plan)
+    monkeypatch.setattr(stages, "leading_evidence", {"one": 10.0, "two": 4.0}.get)
+    both = [stages.with_first_look(state_of(Told(*told))) for told in (("one", 6.0), ("two", 10.0))]
     assert stages.gap_at_first_look(both) == pytest.approx((10 - 3) - (4 - 5))
 
 
@@ -145,6 +146,7 @@ def test_after_both_searches_what_effects_and_base_explain_together_decides(monk
     other = replace(ways[1], inflation=3.0, orientation=Orientation(-1, -1, "data"))
     monkeypatch.setattr(stages, "fit_base_in_noise", lambda turned: other)
     monkeypatch.setattr(stages, "in_one_noise", lambda state, turned: list(ways))
+    monkeypatch.setattr(stages, "with_first_look", lambda way: way)
     monkeypatch.setattr(stages, "gap_at_first_look", lambda both: 499.0)
     monkeypatch.setattr(stages, "search_effects", searched)
     monkeypatch.setattr(stages, "unexplained", lambda way: way.base.objective / 2)

@@ -62,20 +62,28 @@ def select(base: Fit, inflation: float, rng: np.random.Generator, plan: SearchPl
     """The candidates that explain best beside `base`, in noise rougher by `inflation`, by alternating search about the
     best fit and joint fits of the leaders; `rng` draws new drives, `plan` says where to look.
     """
-    state = SearchState(base, plan or SearchPlan(), inflation, rng)
+    return select_from(SearchState(base, plan or SearchPlan(), inflation, rng))
+
+
+def select_from(state: SearchState) -> Selection:
+    """`select` where the work stands at `state`: a first look is not taken twice."""
     for stage in STAGES:
         state = stage(state)
     candidates = completed(state, acceptable_first(ranked(state), state.settings.close_behind))
     best = candidates[0]
-    fuller = widened_where_it_pays(best.fit, state.base, inflation, state.order_range) if best.fit.terms else best.fit
-    return Selection(state.base, (replace(best, fit=fuller), *candidates[1:]), inflation)
+    if best.fit.terms:
+        best = replace(best, fit=widened_where_it_pays(best.fit, state.base, state.inflation, state.order_range))
+    return Selection(state.base, (best, *candidates[1:]), state.inflation)
 
 
-def first_look(base: Fit, inflation: float, rng: np.random.Generator, plan: SearchPlan) -> float:
-    """The log Bayes factor of the leader after one look about `base` alone, 0 where none leads; `inflation`, `rng` and
-    `plan` as for `select`.
-    """
-    leader = explore_base(SearchState(base, plan, inflation, rng)).leader
+def first_look(base: Fit, inflation: float, rng: np.random.Generator, plan: SearchPlan) -> SearchState:
+    """Where a search stands after one look about `base` alone; `inflation`, `rng` and `plan` as for `select`."""
+    return explore_base(SearchState(base, plan, inflation, rng))
+
+
+def leading_evidence(state: SearchState) -> float:
+    """The log Bayes factor of the leader of `state`, 0 where none leads."""
+    leader = state.leader
     return 0.0 if leader is None else leader.log_bayes_factor
 
 
