@@ -5,6 +5,8 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
+import hdopt.bench.real_residuals as bench
+from hdopt.bench.motion import draw_plans
 from hdopt.errors import HdoptError
 from hdopt.studies.real_residuals import judged, recordings_folder, residuals_section
 from hdopt.study import load_study
@@ -15,6 +17,8 @@ from hdopt.workflow.steps import Context, find_step
 @pytest.mark.recordings
 def test_known_physics_in_real_noise(recordings, tmp_path, monkeypatch):
     monkeypatch.setenv("HDOPT_RECORDINGS", str(recordings))
+    # Forty samples a turn in place of hundreds: what is asked of the study does not hang on them.
+    monkeypatch.setattr(bench, "draw_plans", lambda rng, needs, _: draw_plans(rng, needs, "brief"))
     size = (
         "residuals.nothing=1",
         "residuals.severities=[1.0]",
