@@ -132,7 +132,7 @@ SPEEDS = {"hysteresis": (1.0, 2.0)}
 )
 def test_parameters_come_back_within_their_intervals(study, drive, name, parameters):
     """Within twice the 95 % interval: of three, one may well lie outside of it once."""
-    diagnosis = diagnose(bench(study, HIDDEN[name], speeds=SPEEDS.get(name, (1.0,)), seed=5), drive)
+    diagnosis = diagnose(bench(study, HIDDEN[name], rate=50, speeds=SPEEDS.get(name, (1.0,)), seed=5), drive)
     for parameter, value in parameters.items():
         found = diagnosis.effects[0].parameters[parameter]
         assert abs(found.value - value) < found.high - found.low
@@ -141,7 +141,7 @@ def test_parameters_come_back_within_their_intervals(study, drive, name, paramet
 
 @pytest.mark.slow
 def test_structure_outside_the_catalogue_is_unknown(study, drive):
-    diagnosis = diagnose(bench(study, lambda s: 0.12 * np.sin(3.37 * s["theta"])), drive)
+    diagnosis = diagnose(bench(study, lambda s: 0.12 * np.sin(3.37 * s["theta"]), rate=50), drive)
     assert diagnosis.verdict == "unknown"
     assert diagnosis.effects == ()
     assert diagnosis.where["orders_per_input_turn"][0] == pytest.approx(3.37, abs=0.02)
@@ -197,7 +197,7 @@ def test_the_catalogue_is_complete_and_speaks():
 
 
 def test_command_writes_the_contract(study, tmp_path):
-    record = bench(study, HIDDEN["output_coupling"])[0]
+    record = bench(study, HIDDEN["output_coupling"], rate=50)[0]
     table = pd.DataFrame(
         {
             "time_s": record.time,

@@ -88,7 +88,7 @@ def test_a_new_zero_is_taken_from_the_record_itself(study):
 
 @pytest.mark.slow
 def test_the_contract_holds_the_conditions(study):
-    records = bench(study, HIDDEN["channel_delay"], turns=8, speeds=(1.0, 5.0))
+    records = bench(study, HIDDEN["channel_delay"], turns=8, rate=50, speeds=(1.0, 5.0))
     result = diagnose(records, study.drive).to_dict()
     fit = result["fit"]
     assert fit["heldout_conditions_rms_extended_arcmin"] < 0.2 * fit["heldout_conditions_rms_base_arcmin"]
