@@ -9,7 +9,7 @@ SHIPPED := csf-25-80 paper-reproduction csf-25-80-design-trade
 unexport PYTHONDONTWRITEBYTECODE
 
 # `docs` is a folder too, which would else count as made.
-.PHONY: install study test check lint types lock docs benchmark fuzz mutants faults clean
+.PHONY: install study test every-test check lint types lock docs benchmark fuzz mutants faults clean
 
 # hdopt alone, without a study.
 install: $(VENV)/ready
@@ -21,8 +21,11 @@ test:
 	rm -rf $(TEST_VENV)
 	$(MAKE) $(TEST_VENV)/ready-to-test VENV=$(TEST_VENV)
 	$(TEST_VENV)/bin/ruff check .
-	$(MAKE) types VENV=$(TEST_VENV)
-	$(TEST_VENV)/bin/python -m pytest -n 2 --dist worksteal -m "not measurement" --benchmark-disable $(PYTEST_ARGS)
+	$(MAKE) -j 2 types every-test VENV=$(TEST_VENV)
+
+# Beside the types, which take a minute on one core where nothing of them is known yet.
+every-test:
+	$(VENV)/bin/python -m pytest -n 2 --dist worksteal -m "not measurement" --benchmark-disable $(PYTEST_ARGS)
 
 check: lint types
 	$(VENV)/bin/python -m pytest -q -m "not slow and not timed and not browser and not measurement" --benchmark-disable -x -n 2 $(PYTEST_ARGS)
