@@ -53,7 +53,7 @@ def fit_mesh(rows: Rows, free: Array, bare: Teeth) -> Teeth:
     some = slice(None, None, -(-len(rows) // FIT_ROWS))
     seen = rows.theta[some], rows.error[some]
     share = VALUES_PER_TURN * rows.span_turns / len(seen[0])
-    found = replace(bare, errors=_modest(bare, seen, free[some], share))
+    found = replace(bare, errors=modest(bare, seen, free[some], share))
     for _ in range(ROUNDS):
         tables = _tables(rows, free, found, count)
         found = replace(found, cs=found.cs + _cells(tables[0]), fs=found.fs + _cells(tables[1]))
@@ -100,8 +100,8 @@ def _cells(table: Array) -> Array:
     return np.asarray(np.interp(place, np.arange(len(table) + 1), np.append(table, table[0])), float)
 
 
-def _modest(bare: Teeth, seen: tuple[Array, Array], free: Array, share: float) -> Array:
-    """Errors (12,) mm of the usual size that leave hardly more of `seen` than those of `bare`.
+def modest(bare: Teeth, seen: tuple[Array, Array], free: Array, share: float) -> Array:
+    """Errors (12,) mm of the usual size that leave hardly more of `seen`, beside `free` columns, than those of `bare`.
 
     Eccentricities and sines of the teeth make nearly the same error, so that a fit may set large ones against each
     other; then the zones' places are off by more than a tooth. A `share` of the values is independent.

@@ -114,10 +114,16 @@ def fit_teeth(rows: Rows, free: Array, start: Teeth, variance: Array) -> Teeth:
 
 
 def refit_waves(
-    found: Teeth, seen: tuple[Array, Array], free: Array, variance: Array, waves: Index, rounds: int = ROUNDS
+    found: Teeth,
+    seen: tuple[Array, Array],
+    free: Array,
+    variance: Array,
+    waves: Index,
+    rounds: int = ROUNDS,
+    under: tuple[Array, Array] | None = None,
 ) -> Teeth:
     """`found` with `waves` (w,) and its errors fitted anew to `seen`, the angles (n,) rad and errors (n,) arcmin, in at
-    most so many `rounds`; what else stands on its splines stays.
+    most so many `rounds`; what else stands on its splines stays, and what is `under` the waves, (`CELLS`,) mm of each.
 
     `free` (n, q) and `variance` (12,) as in `fit_teeth`. A step that would leave more is shortened.
     """
@@ -127,9 +133,11 @@ def refit_waves(
     band = np.r_[band, band.max() + 1 + band]
     loose = np.r_[1.0 / (LOOSE * np.maximum(variance, 1e-12)), np.full(free.shape[1], 1e-12)]
     around = np.asarray(np.arange(CELLS) * (2 * np.pi / CELLS), float)
-    here = np.r_[_coefficients(found.cs, waves), _coefficients(found.fs, waves), found.errors]
     p = len(band)
-    stays = [beyond_waves(table, waves) for table in (found.cs, found.fs)]
+    below = under or (np.zeros(1), np.zeros(1))
+    above = [np.broadcast_to(table, CELLS) - base for table, base in zip((found.cs, found.fs), below, strict=True)]
+    here = np.r_[_coefficients(above[0], waves), _coefficients(above[1], waves), found.errors]
+    stays = [beyond_waves(table, waves) + base for table, base in zip(above, below, strict=True)]
 
     def at(state: Array) -> Teeth:
         parts = state[: p // 2], state[p // 2 : p]

@@ -10,6 +10,7 @@ from typing import Any  # Any: values of JSON
 
 from hdopt.compensation.mesh import Beat
 from hdopt.compensation.of_speed import Angular, OfSpeed
+from hdopt.compensation.pulse import Pulse
 from hdopt.compensation.surface import Crossing, Grid, Harmonics, Surface
 from hdopt.compensation.zones import Zones
 
@@ -38,6 +39,8 @@ def _csv(given: Found, facts: Mapping[str, Any]) -> str:
     if not isinstance(found, Grid):
         if isinstance(found, Zones):
             head.append(f"# error_arcmin: sum 0, with the half return, + the {_which(found)} of sums 1 and 2")
+            head += [f"# pulses: {PULSES}"] * bool(found.pulses)
+            head += [f"# pulse: {','.join(map(repr, _pulse(pulse)))}" for pulse in found.pulses]
         return "\n".join([*head, *_csv_terms(found, own)]) + "\n"
     head += [f"# of_speed: {rpm!r},{k},{j},{c!r},{s!r}" for rpm, k, j, c, s in own]
     inputs, outputs = found.values.shape
@@ -49,6 +52,18 @@ def _csv(given: Found, facts: Mapping[str, Any]) -> str:
         for i, row in enumerate(found.values.tolist())
     ]
     return "\n".join([*head, *rows]) + "\n"
+
+
+PULSE = ("sum", "j", "centre_rad", "cos_rad", "sin_rad", "half_width_rad", "height_arcmin")
+PULSES = (
+    "sum, j, centre, cos, sin, half_width (rad), height (arcmin): to that sum add height (1 - |d|/half_width) where "
+    "|d| < half_width, d = input + j output - centre - cos cos(output) - sin sin(output), less whole turns"
+)
+
+
+def _pulse(pulse: Pulse) -> tuple[int, int, float, float, float, float, float]:
+    """The values of `PULSE`."""
+    return (pulse.zone + 1, pulse.j, pulse.centre, pulse.cos, pulse.sin, pulse.half_width, pulse.height)
 
 
 BETWEEN = (
@@ -103,6 +118,9 @@ def _json(given: Found, facts: Mapping[str, Any]) -> str:
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
     if isinstance(found, Zones):
         content["error"] = f"sum 0 + the {_which(found)} of sums 1 and 2"
+        if found.pulses:
+            content["pulses_say"] = PULSES
+            content["pulses"] = [dict(zip(PULSE, _pulse(pulse), strict=True)) for pulse in found.pulses]
     names = (*TERM, "sum") if isinstance(found, Zones) else TERM
     content["terms"] = [dict(zip(names, term, strict=False)) for term in _terms(found)]
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
@@ -142,10 +160,23 @@ double hdopt_error_arcmin(double input_rad, double output_rad, double path)
     for (int i = 0; i < HDOPT_TERMS; i++) {{
         double phase = hdopt_k[i] * input_rad + hdopt_j[i] * output_rad;
         error[hdopt_sum[i]] += hdopt_cos[i] * cos(phase) + hdopt_sin[i] * sin(phase);
-    }}
+    }}{pulses}
     return error[0] + {larger}(error[1], error[2]);
 }}
 """
+
+_C_PULSES = """
+    /* A damaged tooth: {says} */
+    static const double pulse[][7] = {{
+        {rows}
+    }};
+    for (int i = 0; i < {count}; i++) {{
+        double d = input_rad + pulse[i][1] * output_rad - pulse[i][2];
+        d -= pulse[i][3] * cos(output_rad) + pulse[i][4] * sin(output_rad);
+        d = fabs(remainder(d, 6.283185307179586476925));
+        if (d < pulse[i][5])
+            error[(int)pulse[i][0]] += pulse[i][6] * (1 - d / pulse[i][5]);
+    }}"""
 
 _C_TABLE = """
 #define HDOPT_INPUTS {inputs}
@@ -249,11 +280,18 @@ def _c(found: Found, facts: Mapping[str, Any]) -> str:
         columns = list(zip(*_terms(found), strict=True)) or [()] * 5
         numbers = {name: _list(column) for name, column in zip(("k", "j", "cos", "sin", "sum"), columns, strict=True)}
         larger = "fmin" if isinstance(found, Zones) and found.sense < 0 else "fmax"
-        return head + _C_TERMS.format(count=len(found), back=repr(found.back), larger=larger, **numbers)
+        pulses = _c_pulses(found.pulses) if isinstance(found, Zones) and found.pulses else ""
+        count = len(list(_terms(found)))
+        return head + _C_TERMS.format(count=count, back=repr(found.back), larger=larger, pulses=pulses, **numbers)
     rows = ",\n".join("{" + _list(row) + "}" for row in found.values.tolist())
     inputs, outputs = found.values.shape
     form = _C_TABLE if isinstance(found, Surface) else _C_BEAT
     return head + form.format(inputs=inputs, outputs=outputs, rows=rows, back=repr(found.back))
+
+
+def _c_pulses(pulses: Sequence[Pulse]) -> str:
+    rows = ",\n        ".join("{" + _list(_pulse(pulse)) + "}" for pulse in pulses)
+    return _C_PULSES.format(says=PULSES, rows=rows, count=len(pulses))
 
 
 def _moves(crossing: Crossing) -> str:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdopt.arrays import Array
+from hdopt.compensation.pulse import COEFFICIENTS, Damage, Pulse
 from hdopt.compensation.surface import (
     COARSE,
     FINE,
@@ -30,6 +31,8 @@ LEAST = 1e-5
 MOST_TERMS = 64
 EVERY = 3
 """Forms are compared at every third point of a grid each way: whole steps and halves of one half as fine."""
+BEAT = 30_000
+"""Places round a beat at which a form with a damaged tooth is compared: some ten on a tooth at 80:1."""
 SMALL = 0.05
 """Share of the peak-to-peak that is left anyway by which a form may be off."""
 
@@ -37,15 +40,16 @@ SMALL = 0.05
 @dataclass(frozen=True)
 class Zones:
     """What two meshing zones make, `first` and `second`, arcmin: the larger drives, or the smaller where `sense` is -1
-    (the angles count the other way round); `rest` is added to it, with the return error."""
+    (the angles count the other way round), each with its `pulses`; `rest` is added to it, with the return error."""
 
     first: Harmonics
     second: Harmonics
     rest: Harmonics
     sense: float = 1.0
+    pulses: tuple[Pulse, ...] = ()
 
     def __len__(self) -> int:
-        return len(self.first) + len(self.second) + len(self.rest)
+        return len(self.first) + len(self.second) + len(self.rest) + COEFFICIENTS * len(self.pulses)
 
     @property
     def back(self) -> float:
@@ -58,13 +62,17 @@ class Zones:
     def at(self, inputs: Array, outputs: Array, direction: Array | float = 0.0) -> Array:
         """Error (arcmin, n) at input and output angles `inputs`, `outputs` (n,) rad and `direction` +1, -1, 0 or the
         path between (`path_of`)."""
-        first, second = self.first.at(inputs, outputs), self.second.at(inputs, outputs)
-        larger = np.maximum(first, second) if self.sense > 0 else np.minimum(first, second)
+        both = [self.first.at(inputs, outputs), self.second.at(inputs, outputs)]
+        for pulse in self.pulses:
+            both[pulse.zone] = both[pulse.zone] + pulse.at(inputs, outputs)
+        larger = np.maximum(*both) if self.sense > 0 else np.minimum(*both)
         return np.asarray(larger + self.rest.at(inputs, outputs, direction), float)
 
     def on_grid(self, cells: tuple[int, ...]) -> Array:
         """Error (arcmin) without the return error on the points of `grid_angles` of `cells`, (n_input, n_output)."""
         both = np.stack([self.first.on_grid(cells), self.second.on_grid(cells)])
+        for pulse in self.pulses:
+            both[pulse.zone] += pulse.at(*grid_angles(cells))
         return np.asarray(driving(both, self.sense) + self.rest.on_grid(cells), float)
 
 
@@ -87,17 +95,21 @@ def in_terms(values: Array, rest: Harmonics, sense: float, terms: int) -> Zones 
     held, fine = rest.for_table(values.shape[1:])
     both = surface_of([held], driving(values, sense), rest.back, rest.crossing)
     one = both.harmonics(max(terms - len(fine), 0)) + fine
-    spectra = [spectrum_of(zone) for zone in values]
-    means = [float(zone.mean()) for zone in values]
-    left = terms - len(rest) - len(values)
-    if left <= 0:
+    if terms - len(rest) - len(values) <= 0:
         return one
-    sizes = np.sort(np.concatenate([np.abs(found) for _, _, found in spectra]))[::-1]
-    least = max(float(sizes[min(left, len(sizes) - 1)]), LEAST * float(sizes[0]))
-    zones = [_kept(spectrum, mean, least) for spectrum, mean in zip(spectra, means, strict=True)]
-    two = Zones(zones[0], zones[1], rest, sense)
+    two = _two(values, rest, sense, terms)
     whole = surface_of([fine], both.values)
     return two if np.std(_off(two, whole)) < np.std(_off(one, whole)) else one
+
+
+def _two(values: Array, rest: Harmonics, sense: float, terms: int) -> Zones:
+    """`in_terms` as the larger of two sums, for so many `terms` that some are left for them."""
+    spectra = [spectrum_of(zone) for zone in values]
+    left = terms - len(rest) - len(values)
+    sizes = np.sort(np.concatenate([np.abs(found) for _, _, found in spectra]))[::-1]
+    least = max(float(sizes[min(left, len(sizes) - 1)]), LEAST * float(sizes[0]))
+    zones = [_kept(spectrum, float(zone.mean()), least) for spectrum, zone in zip(spectra, values, strict=True)]
+    return Zones(zones[0], zones[1], rest, sense)
 
 
 def _kept(spectrum: Spectrum, mean: float, least: float) -> Harmonics:
@@ -136,3 +148,21 @@ def formed(teeth: Teeth, rest: Harmonics, terms: int | None, left: float) -> tup
     coarse = replace(table, values=table.values[::2, ::2])
     off = float(np.ptp(_off(coarse, table)))
     return (coarse, off + lost.reach) if off < SMALL * left else (table, lost.reach)
+
+
+def formed_damaged(
+    teeth: Teeth, damage: Damage, rest: Harmonics, terms: int | None, left: float
+) -> tuple[Zones | Harmonics | Surface, float]:
+    """`formed` for `teeth` with one tooth's `damage`, whose pulses count as `COEFFICIENTS` each; `rest`, `terms`,
+    `left` and the answer as there."""
+    most = MOST_TERMS if terms is None else terms
+    pulses = damage.met(teeth.model, teeth.errors, teeth.sense)
+    room = most - COEFFICIENTS * len(pulses)
+    if room - len(rest) <= 2:
+        return formed(damage.on(teeth), rest, terms, left)
+    values = zone_values(teeth)
+    found = replace(_two(values, rest, teeth.sense, room), pulses=pulses)
+    ratio = 1 / (teeth.model.advance - 1)
+    theta = np.linspace(0.0, 2 * np.pi * ratio, BEAT)
+    off = found.at(theta, theta / ratio) - damage.on(teeth).at(theta) - rest.at(theta, theta / ratio)
+    return found, float(np.ptp(off))

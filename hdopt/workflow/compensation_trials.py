@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from hdopt.arrays import Array, Index, Mask
+from hdopt.compensation.damage import fit_damage
 from hdopt.compensation.fine import LEAST_TURNS
 from hdopt.compensation.mesh import ROWS_PER_TOOTH, fit_mesh, formed_mesh, shows_mesh
 from hdopt.compensation.of_speed import Angular, OfSpeed, signed_rpm
@@ -16,7 +17,7 @@ from hdopt.compensation.pursuit import dictionary, independent_share, pursue
 from hdopt.compensation.surface import AT_ONCE, COARSE, Crossing, nothing, surface_of
 from hdopt.compensation.teeth import Teeth, fit_teeth
 from hdopt.compensation.writers import Found
-from hdopt.compensation.zones import MOST_TERMS, formed
+from hdopt.compensation.zones import MOST_TERMS, formed, formed_damaged
 from hdopt.drive.geometry import Drive
 from hdopt.effects.tooth_mesh import mesh_order
 from hdopt.recordings.recording import TURN, Recording
@@ -204,6 +205,16 @@ def candidates(
         spread = float(np.ptp(left - rest.at(*angles)))
         rest = rest.sharpened(rows.ratio, width, count)
         made[name] = formed(one.sharpened(width, count), rest, terms, spread)
+    damaged = fit_damage(rows, free, bare, teeth)
+    if damaged is not None:
+        under, damage = damaged
+        left = rows.error - damage.on(under, width if count > 1 else 0.0).at(rows.theta)
+        rest = replace(pursue(angles, left, zeros, path, pairs, most // 2), crossing=crossing)
+        spread = float(np.ptp(left - rest.at(*angles)))
+        rest = rest.sharpened(rows.ratio, width, count)
+        made["model, a damaged tooth and harmonics"] = formed_damaged(
+            under.sharpened(width, count), damage, rest, terms, spread
+        )
     if shows_mesh(rows):
         mesh = fit_mesh(rows, free, bare)
         left = rows.error - mesh.at(rows.theta)

@@ -13,6 +13,7 @@ import pytest
 
 from hdopt.cli import main
 from hdopt.compensation.of_speed import OfSpeed, lag_of, shows_lag
+from hdopt.compensation.pulse import Pulse
 from hdopt.compensation.surface import Crossing, Harmonics, surface_of
 from hdopt.compensation.writers import written
 from hdopt.compensation.zones import Zones
@@ -136,6 +137,18 @@ OWN = terms(3), terms(0), terms(2)
 KINDS = {
     "terms": OfSpeed(SUM, 0.002, (-50.0, 40.0, 90.0), OWN),
     "zones": OfSpeed(Zones(terms(4), terms(4), terms(2, 0.03), -1.0), -0.001, (-50.0, 40.0, 90.0), OWN),
+    "a damaged tooth": OfSpeed(
+        Zones(
+            terms(4),
+            terms(4),
+            terms(2, 0.03),
+            -1.0,
+            (Pulse(0, 0, 1.0, 0.01, -0.02, 0.5, -0.4), Pulse(1, 1, -2.0, 0.0, 0.1, 0.9, 0.6)),
+        ),
+        -0.001,
+        (-50.0, 40.0, 90.0),
+        OWN,
+    ),
     "table": OfSpeed(surface_of([SUM], back=0.05), 0.002, (-50.0, 40.0, 90.0), OWN),
     "lag alone": OfSpeed(SUM, 0.002),
     "one speed": OfSpeed(SUM, 0.0, (60.0,), OWN[:1]),
@@ -190,7 +203,7 @@ def wave(term, a, b):
 
 
 @pytest.mark.parametrize("form", ["csv", "json"])
-@pytest.mark.parametrize("kind", ["terms", "zones"])
+@pytest.mark.parametrize("kind", ["terms", "zones", "a damaged tooth"])
 def test_csv_and_json_read_back_compute_the_same(kind, form):
     """Read as the head says, by other code than the writer's."""
     text = written(KINDS[kind], form, {})
@@ -199,6 +212,7 @@ def test_csv_and_json_read_back_compute_the_same(kind, form):
         back, lag, common = said["half_return_arcmin"], said["lag_arcmin_per_input_rpm"], said["terms"]
         own = [(one["speed_input_rpm"], term) for one in said["speeds"] for term in one["terms"]]
         speeds = [one["speed_input_rpm"] for one in said["speeds"]]
+        pulses = [list(one.values()) for one in said.get("pulses", [])]
     else:
         facts = dict(line[2:].split(": ", 1) for line in text.splitlines() if line.startswith("# "))
         back, lag = float(facts["half_return_arcmin"]), float(facts["lag_arcmin_per_input_rpm"])
@@ -207,11 +221,16 @@ def test_csv_and_json_read_back_compute_the_same(kind, form):
         read = list(csv.DictReader([lines[0].replace("k_input", "k").replace("j_output", "j"), *lines[1:]]))
         common = [one for one in read if not one["speed_input_rpm"]]
         own = [(float(one["speed_input_rpm"]), one) for one in read if one["speed_input_rpm"]]
+        pulses = [[*map(float, line[9:].split(","))] for line in text.splitlines() if line.startswith("# pulse: ")]
     ours = KINDS[kind].at(*asked())
     for a, b, path, rpm, mine in zip(*asked(), ours, strict=True):
         sums = [0.0, 0.0, 0.0]
         for term in common:
             sums[int(term.get("sum") or 0)] += wave(term, a, b)
+        for pulse in pulses:
+            off = a + pulse[1] * b - pulse[2] - pulse[3] * np.cos(b) - pulse[4] * np.sin(b)
+            off = abs((off + np.pi) % TURN - np.pi)
+            sums[int(pulse[0])] += pulse[6] * max(0.0, 1 - off / pulse[5])
         value = sums[0] + min(sums[1], sums[2]) + path * back + lag * rpm
         value += sum(share(rpm, speed, speeds) * wave(term, a, b) for speed, term in own)
         assert value == pytest.approx(mine, abs=1e-9)
