@@ -214,6 +214,15 @@ def test_a_screening_samples_what_is_correlated():
     assert stats.pearsonr(*stats.norm.ppf(found.X).T).statistic == pytest.approx(0.8, abs=0.05)
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_a_screening_of_too_few_points_is_refused(method):
+    """128 are enough for any; the message says so, and how many the method takes as a rule."""
+    uniform = Uniform(lower=0.0, upper=1.0)
+    said = f"n is 127, too small for {method}; take at least 128, as a rule {METHODS[method].n}"
+    with pytest.raises(HdoptError, match=said):
+        run_screening(total, space_of(uniform, uniform), method, n=127)
+
+
 def test_a_screening_has_its_seed():
     uniform = Uniform(lower=0.0, upper=1.0)
     one, same, other = (
