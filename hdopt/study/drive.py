@@ -157,11 +157,15 @@ class TeethSection(Section):
     """[cs_teeth] and [fs_teeth]: teeth that were measured one by one."""
 
     file: str
-    """CSV of tooth, flank, fp_um, relative to the study file."""
+    """CSV of tooth, flank, fp_um, or XML (.xml), relative to the study file."""
     deviation: Literal["cumulative", "single"]
     """What the file gives: the deviation from tooth 1's pitch, or from the tooth before."""
     flank: str | None = None
     """Which flank carries, where the file has both."""
+    xml_path: str | None = None
+    """Of XML only: where the deviations stand, as XPath without namespaces; left out, fitting paths are listed."""
+    xml_unit: Literal["um", "mm"] | None = None
+    """Of XML only: the unit of its deviations."""
     first_tooth_deg: float = 0.0
     """Where tooth 1 lies, clockwise from the major axis at input angle 0."""
     recentre: bool = True
@@ -172,7 +176,16 @@ class TeethSection(Section):
     def build(self, teeth: int, folder: Path) -> MeasuredTeeth:
         """The record for a spline of so many `teeth`; the file lies in `folder`."""
         path = folder / self.file
-        values = read_teeth(path, teeth, self.flank)
+        if path.suffix.lower() == ".xml":
+            if self.flank is not None:
+                raise HdoptError(f"{path} is XML: its flank is said by xml_path, [@attribute='value']; leave flank out")
+            from hdopt.drive.teeth_xml import read_teeth_xml
+
+            values = read_teeth_xml(path, teeth, self.xml_path, self.xml_unit)
+        elif self.xml_path is not None or self.xml_unit is not None:
+            raise HdoptError(f"{path} is no XML file (.xml): leave xml_path and xml_unit out")
+        else:
+            values = read_teeth(path, teeth, self.flank)
         first = math.radians(self.first_tooth_deg)
         return MeasuredTeeth.of(values, self.deviation, first, self.recentre, source=self.file)
 
