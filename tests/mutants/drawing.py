@@ -20,7 +20,7 @@ from tests.mutants.hand_made import ROOT, Fault, faults_of, rooms
 SEED = 2026
 ON_BITS = ("BitOr", "BitAnd", "BitXor", "LShift", "RShift", "Invert")
 """Left out: on floats these raise, so that whatever runs the line notices; nine in ten mutants would be of them."""
-OVER_EVERY = {"effects": ("unit/test_effects.py",)}
+OVER_EVERY = {"effects": ("unit/test_effects.py", "unit/test_effect_numbers.py")}
 """Properties over all that is registered in a room: they are about each of its files, which they do not name."""
 MOST_TEST_FILES = 3
 """A mutant that survives costs the quick tests of so many files."""

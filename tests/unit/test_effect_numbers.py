@@ -240,6 +240,30 @@ def test_strongest_orders_are_separate_and_within_the_record():
     assert found == pytest.approx([7.0, 3.0], abs=0.5 / 20 / 4)
 
 
+def test_each_wave_of_an_encoder_has_its_own_pair():
+    """Sine 3 and cosine 4 are 5 at once a turn, 12 and 5 are 13 at twice, 8 and -6 are 10 at three times."""
+    effect = EFFECTS["encoder_output_eccentricity"]
+    term = Term(effect.id, {"orders": (1, 2, 3), "shaft": Shaft.OUTPUT}, columns=np.zeros((4, 6)))
+    found = effect.parameters(term, FitEstimate(np.array([3.0, 4.0, 12.0, 5.0, 8.0, -6.0]), 1e-10 * np.eye(6)))
+    sizes = [one.value for name, one in found.items() if name.startswith("amplitude")]
+    phases = [one.value for name, one in found.items() if name.startswith("phase")]
+    assert sizes == pytest.approx([5.0, 13.0, 10.0], abs=1e-6)
+    assert phases == pytest.approx(np.degrees(np.arctan2([4.0, 5.0, -6.0], [3.0, 12.0, 8.0])), abs=1e-6)
+
+
+@pytest.mark.parametrize("seat", [Seat.CIRCULAR_SPLINE, Seat.CIRCULAR_SPLINE_TWICE])
+@pytest.mark.parametrize("at", [0.3, 2.0, 2.9])
+def test_pulses_are_looked_for_where_the_folded_residual_has_them(seat, at):
+    """A pulse of 3 deg over one turn, or over half of one where it is met twice; a cell of the fold is 2.8 deg."""
+    period = TURN / (2 if seat.twice else 1)
+    theta = np.linspace(0, 20 * TURN, 20_000)
+    off = np.mod(theta - at + period / 2, period) - period / 2
+    probe = SimpleNamespace(residual=np.exp(-0.5 * (off / np.radians(3)) ** 2), samples=SimpleNamespace(ratio=80.0))
+    found = EFFECTS["local_tooth_defect"]._candidates(probe, theta, TURN, seat)
+    strongest = [centre for centre, _ in found[1::2]]
+    assert strongest == pytest.approx([at] * len(strongest), abs=np.radians(2.9))
+
+
 def test_an_encoders_second_cycle_is_that_of_half_its_lines():
     """100 lines of one shaft are part of 200 of the same; 200 are none of 100, nor those of the other shaft."""
     effect = EFFECTS["encoder_interpolation"]

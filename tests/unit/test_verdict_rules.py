@@ -11,7 +11,7 @@ from hdopt.diagnosis import diagnose
 from hdopt.diagnosis.checks.confounding import Confounding
 from hdopt.diagnosis.inference.cross_validation import HeldOut
 from hdopt.diagnosis.settings import DEFAULT
-from hdopt.diagnosis.verdict.draw import base_notes, prior_notes
+from hdopt.diagnosis.verdict.draw import base_notes, prior_notes, scale_notes
 from hdopt.diagnosis.verdict.facts import Facts, resolution
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.diagnosis.verdict.rivals import imitating_sets, placebo_as_good, shared_with_imitators
@@ -237,3 +237,16 @@ def test_an_envelope_is_not_diagnosed(rows, verdict):
     if verdict == "insufficient":
         assert "rows an input turn" in diagnosis.says
         assert "forty times an input turn" in diagnosis.separating_test
+
+
+def test_a_scale_that_is_off_is_told_of_the_shaft_that_it_is_on():
+    """Of the input where its angle counts too far, else of ratio or output; nothing where none was found."""
+
+    def told(input_gain, found=True):
+        scale = SimpleNamespace(found=found, input_gain=input_gain, ratio=120.12, gain=1.001)
+        return scale_notes(SimpleNamespace(scale=scale, rows=SimpleNamespace(ratio=120.0)))
+
+    (of_input,), (of_output,) = told(1.002), told(1.0)
+    assert "the input angle counts 1.002 times too far" in of_input
+    assert "as if the ratio were 120.12 in place of 120, or the output encoder's gain 1.001" in of_output
+    assert told(1.002, found=False) == () == scale_notes(SimpleNamespace(scale=None))
