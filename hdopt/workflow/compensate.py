@@ -265,8 +265,9 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
         lambda train: None if whole is None or drive is None else model_of(train, drive, seed, whole.sign),
     )
     before = centred(rows.error, rows, fold)
-    nested, method = choose(trials, fold)
-    common, off = candidates(still, whole, terms, paths)[method]
+    made = candidates(still, whole, terms, paths)
+    nested, method = choose({name: left for name, left in trials.items() if name in made}, fold)
+    common, off = made[method]
     # What no other recording met is extrapolated in angle when held out; a fresh run over the same angles is not.
     again = centred(still.error - said_of(common, still), rows, np.zeros_like(fold))
     own, with_own = own_of_each_speed(rows, again, min(OWN_TERMS, terms or OWN_TERMS))

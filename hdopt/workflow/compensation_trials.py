@@ -39,6 +39,7 @@ FALLS = 0.9
 """Part of what the model leaves that may be left beside those waves for a fit with them: less is no reason for one."""
 MEETS_AGAIN = 0.8
 """Share of the stretches that a pass back, or another recording, must reach over to have met them too."""
+TEETH = "model, teeth and harmonics"
 BOTH_WAYS = "stretches of either direction"
 STRETCHES = "stretches of the one output turn"
 
@@ -96,6 +97,8 @@ def tried(
 ) -> dict[str, Array]:
     """What each way leaves (n,) arcmin on every part, fitted to the others; `split` is the rows and the part of each.
 
+    Where the others show no damaged tooth, the way that has one leaves what `TEETH` does.
+
     `terms`, `paths` as for `candidates`; `fit` gives the model fitted to some rows, None for harmonics alone.
     """
     rows, fold = split
@@ -105,6 +108,8 @@ def tried(
         for name, (found, _) in candidates(train, fit(train), terms, some_of(paths, fold != k)).items():
             left = trials.setdefault(name, np.full(len(rows), np.nan))
             left[test] = rows.error[test] - said_of(found, rows)[test]
+    for name, left in trials.items():
+        trials[name] = np.where(np.isnan(left), trials[TEETH], left) if np.isnan(left).any() else left
     return {name: centred(left, rows, fold) for name, left in trials.items()}
 
 
@@ -196,7 +201,7 @@ def candidates(
     free = zeros if path is None else np.column_stack([zeros, path])
     bare = Teeth.bare(fit.model, fit.errors, fit.sign)
     teeth = fit_teeth(rows, free, bare, np.diag(fit.covariance))
-    for name, one in {"model": bare, "model and harmonics": bare, "model, teeth and harmonics": teeth}.items():
+    for name, one in {"model": bare, "model and harmonics": bare, TEETH: teeth}.items():
         left = rows.error - one.at(rows.theta)
         rest = nothing(0.0 if path is None else half_return(left, zeros, path))
         if name != "model":

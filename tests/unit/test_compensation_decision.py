@@ -15,8 +15,10 @@ from hdopt.compensation.zones import formed
 from hdopt.drive.errors import DriveErrors
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.rows import gather
 from hdopt.study import load_study
 from hdopt.workflow import compensate as module
+from hdopt.workflow import compensation_trials as trials_module
 from hdopt.workflow.compensate import compensation_of
 
 RATIO, TURN, NOISE, PER_TURN = 80.0, 2 * np.pi, 0.01, 20
@@ -179,3 +181,31 @@ def test_what_is_expected_is_said_of_each_direction_and_speed_with_its_interval(
     for one in (*ways.values(), slow, quick):
         assert 0.7 * one["expected"] < one["low"] < one["expected"] < one["high"] < 1.3 * one["expected"]
     assert compensation_of(runs[:2], None, 64, 1).speeds == {}
+
+
+def test_a_way_that_a_part_does_not_show_is_judged_by_what_it_falls_back_to(monkeypatch):
+    """A damaged tooth that the rows of one part do not show: not a number there, it was chosen and then refused."""
+    rows = gather([recorded(1)])
+    fold = np.arange(len(rows)) % 4
+    begun = iter(range(4))
+
+    def some(train, *_):
+        made = {"model, teeth and harmonics": (nothing(), 0.0)}
+        return made if next(begun) == 2 else made | {"a damaged tooth": (SWINGS, 0.0)}
+
+    monkeypatch.setattr(trials_module, "candidates", some)
+    tried = trials_module.tried((rows, fold), 64, {}, lambda _: None)
+    assert not np.isnan(tried["a damaged tooth"]).any()
+    same = tried["a damaged tooth"] == tried["model, teeth and harmonics"]
+    assert same[fold == 2].all() and not same[fold != 2].any()
+
+
+def test_what_the_whole_record_does_not_show_is_not_chosen(monkeypatch):
+    """Parts that show a damaged tooth where the whole does not: nothing could be written."""
+
+    def both(split, *_):
+        left = split[0].error - split[0].error.mean()
+        return {"harmonics": 0.5 * left, "a damaged tooth": 0.1 * left}
+
+    monkeypatch.setattr(module, "tried", both)
+    assert compensation_of([recorded(1)], None, 64, 1).method == "harmonics"
