@@ -1,0 +1,58 @@
+"""What stays of a residual once base, offsets and kept terms are taken out, against the normal equations."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.settings import DEFAULT
+
+N, SIGMA = 60, 0.2
+
+
+def probe_of(design, precision, residual, weights=None):
+    """A probe on a fit without terms, whose rows weigh as `weights` say."""
+    weights = np.ones(N) if weights is None else weights
+    noise = SimpleNamespace(sigma=SIGMA, whiten=lambda rows: (weights * np.asarray(rows).T).T)
+    problem = SimpleNamespace(settings=DEFAULT, rows=SimpleNamespace(highest_order=9.0), noise=noise)
+    fit = SimpleNamespace(terms=(), problem=problem, motion=None, residual=residual)
+    fit.design = lambda keep: design
+    fit.prior_precision = lambda width: precision
+    return FitProbe(fit)
+
+
+@pytest.mark.parametrize("weigh", [False, True])
+def test_what_is_fitted_is_taken_out_as_far_as_its_prior_lets_it(weigh):
+    """(1 - A (A'A + sigma^2 P)^-1 A') r, with whitened rows. Would catch a prior that is left out or measured in other
+    noise, and rows that are not whitened."""
+    rng = np.random.default_rng(1)
+    design, residual, precision = rng.normal(size=(N, 4)), rng.normal(size=N), np.array([0.0, 100.0, 900.0, 0.0])
+    weights = rng.uniform(0.5, 2.0, N) if weigh else np.ones(N)
+    probe = probe_of(design, precision, residual, weights)
+    white, r = weights[:, None] * design, weights * residual
+    left = r - white @ np.linalg.solve(white.T @ white + SIGMA**2 * np.diag(precision), white.T @ r)
+    assert probe.white_residual == pytest.approx(left, abs=1e-12)
+    assert probe.project(white[:, 0]) == pytest.approx(np.zeros(N), abs=1e-12)
+    assert np.linalg.norm(probe.project(white[:, 2])) > 0.1
+
+
+def test_a_column_that_is_there_twice_takes_out_no_more():
+    """Nor does one of zeros. Would catch a direction that is nothing but rounding, taken out of every residual."""
+    rng = np.random.default_rng(2)
+    design, residual = rng.normal(size=(N, 3)), rng.normal(size=N)
+    twice = np.column_stack([design, 2 * design[:, 1], np.zeros(N)])
+    one, two = (probe_of(a, np.zeros(a.shape[1]), residual).white_residual for a in (design, twice))
+    assert two == pytest.approx(one, abs=1e-10)
+
+
+def test_noise_with_the_signs_of_turns_is_projected_as_the_residual_is():
+    rng = np.random.default_rng(3)
+    design, residual, signs = rng.normal(size=(N, 3)), rng.normal(size=N), rng.choice([-1.0, 1.0], N)
+    probe = probe_of(design, np.zeros(3), residual)
+    flipped = probe.flipped(signs)
+    assert flipped.residual == pytest.approx(signs * residual)
+    assert design.T @ flipped.white_residual == pytest.approx(np.zeros(3), abs=1e-12)
+    assert flipped.white_residual == pytest.approx(probe.project(signs * probe.white_residual))
+    other = probe.on(2 * residual)
+    assert other.white_residual == pytest.approx(2 * probe.white_residual)
