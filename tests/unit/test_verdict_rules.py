@@ -9,9 +9,17 @@ import pytest
 
 from hdopt.diagnosis import diagnose
 from hdopt.diagnosis.checks.confounding import Confounding
+from hdopt.diagnosis.inference.catalogue import NEW_ZERO, SKEW, VARYING_CONTACT
 from hdopt.diagnosis.inference.cross_validation import HeldOut
 from hdopt.diagnosis.settings import DEFAULT
-from hdopt.diagnosis.verdict.draw import base_notes, prior_notes, scale_notes
+from hdopt.diagnosis.verdict.draw import (
+    base_notes,
+    contact_notes,
+    prior_notes,
+    scale_notes,
+    skew_notes,
+    zero_notes,
+)
 from hdopt.diagnosis.verdict.facts import Facts, resolution
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.diagnosis.verdict.rivals import imitating_sets, placebo_as_good, shared_with_imitators
@@ -250,3 +258,20 @@ def test_a_scale_that_is_off_is_told_of_the_shaft_that_it_is_on():
     assert "the input angle counts 1.002 times too far" in of_input
     assert "as if the ratio were 120.12 in place of 120, or the output encoder's gain 1.001" in of_output
     assert told(1.002, found=False) == () == scale_notes(SimpleNamespace(scale=None))
+
+
+def test_what_is_told_aside_is_told_with_its_numbers():
+    """A clock in millionths, zeros by recording from the second, shares of k_e in per cent by waves a turn."""
+
+    def evidence(told):
+        terms = [SimpleNamespace(effect=effect) for effect in told]
+        fit = SimpleNamespace(terms=terms, coefficients=[np.array(values) for values in told.values()])
+        return SimpleNamespace(selection=SimpleNamespace(best=SimpleNamespace(fit=fit)))
+
+    (slow,), (fast,) = skew_notes(evidence({SKEW: [2.5e-5]})), skew_notes(evidence({SKEW: [-4e-6]}))
+    assert "runs 25 millionths slow" in slow and "runs -4 millionths fast" in fast
+    (zeros,) = zero_notes(evidence({NEW_ZERO: [0.25, -1.5]}))
+    assert zeros.endswith("0.25 arcmin in recording 2, -1.5 arcmin in recording 3")
+    (contact,) = contact_notes(evidence({VARYING_CONTACT: [0.03, 0.04, 0.0, -0.12]}))
+    assert contact.endswith("5 % at 1 a turn, 12 % at 2 a turn")
+    assert skew_notes(evidence({"hysteresis": [1.0]})) == ()
