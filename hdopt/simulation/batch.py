@@ -12,7 +12,7 @@ import numpy as np
 
 from hdopt.arrays import Array, Index
 from hdopt.drive.errors import DriveErrors
-from hdopt.drive.geometry import Drive
+from hdopt.drive.geometry import Drive, Structure
 from hdopt.effects.met import Spline
 from hdopt.errors import HdoptError
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
@@ -23,7 +23,9 @@ from hdopt.simulation.model import ExtendedModel
 from hdopt.simulation.operation import Operation
 
 if TYPE_CHECKING:
+    from hdopt.simulation.beat.effects import Beat
     from hdopt.simulation.cell_kernel import CellTable, SplineTables
+    from hdopt.simulation.turn.effects import Turn
     from hdopt.simulation.walk_kernel import Added
 
 WALK_PER_TURN, TABLE_PER_TURN = 180, 1440
@@ -52,6 +54,9 @@ class AddedTable:
     stride: int
     cs: Array = field(default_factory=lambda: NO_PLACES)
     fs: Array = field(default_factory=lambda: NO_PLACES)
+    _in_lanes: dict[tuple[float, int, float, bool], tuple[list[Turn], list[Beat]]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     @cached_property
     def walked(self) -> Added:
@@ -68,6 +73,25 @@ class AddedTable:
         from hdopt.simulation.walk_kernel import Added
 
         return Added(self.zones, self.beside, self.cs, self.fs)
+
+    def in_lanes(self, per_mm: float, turns: int, advance: float, fold: bool = True) -> tuple[list[Turn], list[Beat]]:
+        """The same for the lanes, direction by direction: where all repeat in each of so many input `turns` as one turn
+        of each, else as all turns; neither where they are too fine for either. `per_mm` is arcmin per mm of arc times
+        k_e, `advance` Z_CS/Z_FS; without `fold` turns count one by one though they repeat. Made once."""
+        key = (per_mm, turns, advance, fold)
+        if key not in self._in_lanes:
+            from hdopt.simulation.beat.effects import beat_of
+            from hdopt.simulation.turn.effects import turn_of
+
+            zones = [zones + beside / per_mm for zones, beside in zip(self.zones, self.beside, strict=True)]
+            each = [None if self.fs.size or not fold else turn_of(table, self.cs, turns, per_mm) for table in zones]
+            repeating, every = [turn for turn in each if turn is not None], []
+            if len(repeating) < len(zones):
+                found = [beat_of(table, self.cs, self.fs, turns, advance, per_mm) for table in zones]
+                repeating, every = [], [beat for beat in found if beat is not None]
+                every = every if len(every) == len(zones) else []
+            self._in_lanes[key] = repeating, every
+        return self._in_lanes[key]
 
     @property
     def widest_arcmin(self) -> float:
@@ -183,31 +207,34 @@ class CellsOfTurn:
 
 def stacked_peak_to_peak_arcmin(drive: Drive, matrix: Array, added: AddedTable, homogenization: float = 1.0) -> Array:
     """The same as `matrix_peak_to_peak_arcmin` of `drive`, `matrix` (n, 12), `added` and `homogenization`, (n,), for as
-    many drives as a stack has: some twelve times as fast where the effects repeat every input turn.
+    many drives as a stack has: some twelve times as fast.
 
-    Then in single precision, within 1e-3 arcmin of it for 99 % of drives at up to three times the shipped tolerances;
-    else the same figures.
+    In single precision, within 1e-3 arcmin of it for 99 % of drives at up to three times the shipped tolerances; the
+    same figures where effects are so fine that neither one turn nor all of them fit into tables.
     """
-    from hdopt.simulation.turn.effects import turn_of
+    from hdopt.kinematics.kernel import design_of
 
     gear = drive.geometry
     scale = homogenization * gear.arcmin_per_mm
-    turns = [
-        None if added.fs.size else turn_of(zones + beside / scale, added.cs, gear.beat_phases, scale)
-        for zones, beside in zip(added.zones, added.beside, strict=True)
-    ]
-    repeating = [turn for turn in turns if turn is not None]
-    if len(repeating) < len(turns):
-        return matrix_peak_to_peak_arcmin(drive, matrix, added, homogenization)
-    from hdopt.kinematics.kernel import design_of
-    from hdopt.simulation.turn.kernel import extremes_block
-
     matrix, design = np.ascontiguousarray(matrix, dtype=np.float64), design_of(drive)
     lowered = np.full((len(matrix), 2), np.inf)
+    # Held along the minor axis both zones' rims change almost together, which one turn for all tells less well.
+    fold = drive.wave_generator.structure is not Structure.ONE_WAY_MINOR
+    turns, beats = added.in_lanes(scale, gear.beat_phases, gear.flexspline_advance, fold)
+    if not (turns or beats):
+        return matrix_peak_to_peak_arcmin(drive, matrix, added, homogenization)
 
     def fill(rows: slice) -> None:
-        for turn in repeating:
-            extremes_block(design, matrix[rows], turn, lowered[rows])
+        if turns:
+            from hdopt.simulation.turn.kernel import extremes_block
+
+            for turn in turns:
+                extremes_block(design, matrix[rows], turn, lowered[rows])
+        else:
+            from hdopt.simulation.beat.kernel import beat_block
+
+            for beat in beats:
+                beat_block(design, matrix[rows], beat, lowered[rows])
 
     in_blocks(len(matrix), LANES_BLOCK, fill)
     return np.asarray(-scale * lowered.sum(axis=1))

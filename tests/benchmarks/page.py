@@ -72,11 +72,16 @@ LOBING = EffectValues("circular_spline_lobing", {"lobes": 6}, (0.001, 0.0005))
 MESH = EffectValues("tooth_mesh", {"sidebands": (0,)}, (0.02, 0.01))
 BEARING = EFFECTS["bearing_pass"]
 CAGE = EffectValues(BEARING.id, *BEARING.values(BEARING.examples[1], CSF_25_80))
+ENCODER, WAVES = (EFFECTS[name] for name in ("encoder_output_eccentricity", "fs_tooth_harmonics"))
+OUTPUT = EffectValues(ENCODER.id, *ENCODER.values(ENCODER.examples[0], CSF_25_80))
+ON_FS = EffectValues(WAVES.id, *WAVES.values(WAVES.examples[0], CSF_25_80))
 BENCHES = {
     "none": ([], DRIVES // 4),
     "lobes, every input turn": ([LOBING], DRIVES // 4),
     "a ripple at the teeth": ([MESH], DRIVES // 16),
-    "a bearing's cage, no whole turn": ([CAGE], SOME),
+    "a bearing's cage, no whole turn": ([CAGE], DRIVES // 16),
+    "an output encoder off its centre": ([OUTPUT], DRIVES // 16),
+    "waves of the FS teeth": ([ON_FS], DRIVES // 16),
 }
 """Effects, and of how many drives."""
 

@@ -45,9 +45,12 @@ from hdopt.kinematics.lanes.single import (
     angle_of,
     clipped,
     rotated,
+    sine_cosine,
     single,
 )
 
+PER_TURN = single(1 / (2 * math.pi))
+"""Turns in a radian."""
 GROUP = 16
 """Lanes of a group: lists are padded to whole ones."""
 LONG = single(0.009)
@@ -269,6 +272,35 @@ def lowest_of_branches(one: Zone, two: Zone, fs: float, phase: float, design: De
     least = _lowest_of_stretch(before, fs, phase, design, ZERO, look, Least(HUGE, ZERO))
     least = _lowest_of_stretch(_stretch(earlier, later, of_one, of_two), fs, phase, design, shortest, look, least)
     return _lowest_of_stretch(after, fs, phase, design, ZERO, look, least)
+
+
+@inlined
+def _lowest_at_phase(part: Stretch, fs: float, phase: float, advance: float, shortest: float, best: Least) -> Least:
+    """The lower of `best` and the least driving deviation on a stretch that is longer than the shortest that counts,
+    for the one FS phase that is `phase` at the angle 0."""
+    x = clipped(ZERO, part.low, part.high)
+    part = _seen_from(part, x)
+    turns = (phase + advance * x + part.d) * PER_TURN
+    sin, cos = sine_cosine(turns - np.floor(turns + HALF))
+    teeth = FsTeeth(fs * (ONE - HALF * part.h * part.h), advance, True)
+    least = _lowest_of_phase(part, teeth, cos, sin, Least(HUGE, ZERO))
+    less = least.value < best.value and part.high - part.low > shortest
+    return Least(least.value if less else best.value, least.x + x if less else best.x)
+
+
+@inlined
+def lowest_of_turn(one: Zone, two: Zone, fs: float, phase: float, advance: float, low: float, high: float) -> Least:
+    """The same as `lowest_of_branches` of zones `one` and `two` where the FS phase is known: `phase` (rad) at the
+    place; `fs` is the FS amplitude, mm of arc, `advance` Z_CS/Z_FS; branches are followed from `low` to `high`, rad."""
+    earlier, later = clipped(min(one.change, two.change), low, high), clipped(max(one.change, two.change), low, high)
+    ahead = one.change < two.change
+    of_one = _chosen(ahead, one.after, one.before)
+    of_two = _chosen(ahead, two.before, two.after)
+    before, after = _stretch(low, earlier, one.before, two.before), _stretch(later, high, one.after, two.after)
+    shortest = min(SLIVER * abs(earlier * later) + TIE / max(min(one.rate, two.rate), TINY), LONG)
+    least = _lowest_at_phase(before, fs, phase, advance, ZERO, Least(HUGE, ZERO))
+    least = _lowest_at_phase(_stretch(earlier, later, of_one, of_two), fs, phase, advance, shortest, least)
+    return _lowest_at_phase(after, fs, phase, advance, ZERO, least)
 
 
 @inlined

@@ -22,6 +22,9 @@ def single(value: float) -> float:
 narrowed = cast("Callable[[float], float]", np.float32)
 """The same inside kernels."""
 
+unsigned = cast("Callable[[int], int]", np.uintp)
+"""A place in an array that is not counted from its end: the compiler need not ask."""
+
 ZERO, HALF, ONE, TWO = single(0.0), single(0.5), single(1.0), single(2.0)
 PI, HALF_PI, TURN = single(math.pi), single(math.pi / 2), single(2 * math.pi)
 TINY = single(1e-30)

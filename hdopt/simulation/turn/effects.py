@@ -66,27 +66,27 @@ def turn_of(zones: Array, cs: Array, turns: int, per_mm: float) -> Turn | None:
     folded = zones.reshape(2, turns, -1)
     if float(np.ptp(folded, axis=1).max()) * per_mm > REPEATS:
         return None
-    fixed, on_cs = _spectrum(folded[:, 0]), _spectrum(cs if cs.size else np.zeros((2, 2)))
-    bend = max(_largest(fixed, 3), _largest(on_cs, 3)) * per_mm
-    cells = max(FEWEST_CELLS, _parts(bend, LEFT_BY_CELL))
+    fixed, on_cs = spectrum_of(folded[:, 0]), spectrum_of(cs if cs.size else np.zeros((2, 2)))
+    bend = max(largest(fixed, 3), largest(on_cs, 3)) * per_mm
+    cells = max(FEWEST_CELLS, parts(bend, LEFT_BY_CELL))
     if cells > MOST_CELLS:
         return None
-    places = max(folded.shape[2], _parts(bend, LEFT_BY_PLACE))
-    tables = [_table(spectrum, places) for spectrum in (fixed, on_cs)]
+    places = max(folded.shape[2], parts(bend, LEFT_BY_PLACE))
+    tables = [table_of(spectrum, places) for spectrum in (fixed, on_cs)]
     width = 2 * math.pi / cells
     of_cs = tables[1] if cs.size else tables[1][:0]
     return Turn(
-        _scan(fixed, on_cs, cells),
+        scan_of(fixed, on_cs, cells),
         tables[0],
         of_cs,
-        cs_bend=single(_largest(on_cs, 2)),
-        cs_slope=single(_largest(on_cs, 1)),
+        cs_bend=single(largest(on_cs, 2)),
+        cs_slope=single(largest(on_cs, 1)),
         cs_range=single(float(np.ptp(tables[1][:, [0, 3]]))),
         reach=single(min(FARTHEST, OVERLAP / 2 * width)),
     )
 
 
-def _spectrum(values: Array) -> Array:
+def spectrum_of(values: Array) -> Array:
     """Fourier coefficients of `values` (2, n) over a turn, the highest order left out where its phase is unknown."""
     found: Array = np.fft.rfft(values) / values.shape[1]
     if values.shape[1] % 2 == 0:
@@ -94,57 +94,59 @@ def _spectrum(values: Array) -> Array:
     return found
 
 
-def _derived(spectrum: Array, times: int, places: int) -> Array:
-    """The function, or so many `times` its derivative, on at least so many even `places` of a turn, (2, places)."""
+def derived(spectrum: Array, times: int, places: int) -> Array:
+    """The function of a `spectrum` (2, orders), or so many `times` its derivative, on so many even `places` of a turn,
+    (2, places)."""
     orders = np.arange(spectrum.shape[1])
     return np.asarray(np.fft.irfft(spectrum * (1j * orders) ** times, places) * places)
 
 
-def _largest(spectrum: Array, times: int) -> float:
-    """The largest value of that in either zone."""
-    return float(np.abs(_derived(spectrum, times, 2 * spectrum.shape[1])).max())
+def largest(spectrum: Array, times: int) -> float:
+    """The largest value in either zone of the function of a `spectrum`, or of so many `times` its derivative."""
+    return float(np.abs(derived(spectrum, times, 2 * spectrum.shape[1])).max())
 
 
-def _parts(bend: float, left: float) -> int:
-    """Parts of a turn within half of which a parabola leaves no more than so much, by the largest third derivative."""
+def parts(bend: float, left: float) -> int:
+    """Parts of a turn within half of which a parabola leaves at most `left`, by the third derivative's most, `bend`."""
     return math.ceil(math.pi * math.cbrt(bend / (6 * left)))
 
 
-def _table(spectrum: Array, places: int) -> Singles:
-    """Value, slope and curvature of both zones on so many places, (places, 6)."""
+def table_of(spectrum: Array, places: int) -> Singles:
+    """Value, slope and curvature of both zones' `spectrum` on so many `places` at least, (places, 6)."""
     places = max(places, 2 * spectrum.shape[1])
-    rows = [_derived(spectrum, times, places)[zone] for zone in range(2) for times in range(3)]
-    return _singles(np.stack(rows, axis=1))
+    rows = [derived(spectrum, times, places)[zone] for zone in range(2) for times in range(3)]
+    return singles(np.stack(rows, axis=1))
 
 
-def _scan(fixed: Array, on_cs: Array, cells: int) -> Scan:
-    """The cells of a turn for the effects of these spectra."""
+def scan_of(fixed: Array, on_cs: Array, cells: int) -> Scan:
+    """The `cells` of a turn for the effects of the spectra `fixed` and `on_cs`."""
     inside = max(IN_CELL, 2 * math.ceil(max(fixed.shape[1], on_cs.shape[1]) / cells))
-    parts = (_derived(fixed, 0, cells * inside) + _derived(on_cs, 0, cells * inside)).reshape(2, cells, inside)
-    slopes = _derived(on_cs, 1, cells * inside)[:, ::inside]
-    first, share = parts[:, :, 0], np.arange(inside) / inside
+    inner = (derived(fixed, 0, cells * inside) + derived(on_cs, 0, cells * inside)).reshape(2, cells, inside)
+    slopes = derived(on_cs, 1, cells * inside)[:, ::inside]
+    first, share = inner[:, :, 0], np.arange(inside) / inside
     after = np.roll(first, -1, axis=1)
-    beyond = parts - (first[:, :, None] * (1 - share) + after[:, :, None] * share)
+    beyond = inner - (first[:, :, None] * (1 - share) + after[:, :, None] * share)
     below, above = np.maximum(-beyond.min(axis=(0, 2)), 0), np.maximum(beyond.max(axis=(0, 2)), 0)
-    one, two, half = first[0], first[1], parts[0] - parts[1]
+    one, two, half = first[0], first[1], inner[0] - inner[1]
     # Zone 2 meets the CS at its end less o.
     edges = np.stack([one + two, one - two, slopes[0] - slopes[1], slopes[0] + slopes[1]], axis=1) / 2
     angle, width = np.arange(cells + 1) * (2 * math.pi / cells), 2 * math.pi / cells
     middle = angle[:-1] + width / 2
     return Scan(
-        _singles(np.cos(angle)),
-        _singles(np.sin(angle)),
-        _singles(np.cos(middle)),
-        _singles(np.sin(middle)),
-        _singles(np.concatenate([edges, edges[:1]])),
-        _singles(below),
-        _singles(above),
-        _singles(half[:, inside // 2] / 2),
+        singles(np.cos(angle)),
+        singles(np.sin(angle)),
+        singles(np.cos(middle)),
+        singles(np.sin(middle)),
+        singles(np.concatenate([edges, edges[:1]])),
+        singles(below),
+        singles(above),
+        singles(half[:, inside // 2] / 2),
         sag=single(width**2 / 8),
         half=single(width / 2),
         step=single(float(np.ptp(half, axis=1).max()) / 2),
     )
 
 
-def _singles(values: Array) -> Singles:
+def singles(values: Array) -> Singles:
+    """`values` of any shape in single precision, row by row."""
     return np.ascontiguousarray(values, dtype=np.float32)

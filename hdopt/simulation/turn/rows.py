@@ -32,7 +32,9 @@ MET = LANES * (DESCRIPTION + 7)
 """Where up to four branches meet the CS, in turns."""
 CS_MET, FIXED_MET = MET + 4 * LANES, MET + 16 * LANES
 """Value, slope and curvature of the effects that up to four branches meet on the CS, and both zones otherwise."""
-AREA = MET + 22 * LANES
+FS_AT, FS_MET = MET + 22 * LANES, MET + 26 * LANES
+"""The same of the FS, for what does not repeat every turn."""
+AREA = MET + 38 * LANES
 
 # Rows of the first area alone: parts of t, d (mm of arc) and of the offset o (rad) at first order.
 T_COS, T_SIN, T_0, D_COS, D_SIN, D_0, O_COS, O_SIN, O_0 = (AREA + LANES * row for row in range(9))
@@ -52,7 +54,13 @@ LEAST, GREATEST, LEAST_SEEN, GREATEST_SEEN = (SWING + LANES * row for row in ran
 """What was found so far in mm of arc, and what the first look found."""
 LEAST_AT = SWING + 16 * LANES
 """Where the least was found, in turns."""
-LIST = SWING + 17 * LANES
+LEAST_IN = SWING + 17 * LANES
+"""In which of the turns, where they differ."""
+OFFSETS = SWING + 18 * LANES
+"""A bound of the offsets o and o', rad."""
+SLACK = SWING + 19 * LANES
+"""How far a branch may lie beyond a straight line over a cell, mm of arc."""
+LIST = SWING + 20 * LANES
 """The second area: places to look at, dense."""
 BOUNDS = LIST + AREA
 """Bounds of all cells: a row of low ones and one of high ones each."""
