@@ -28,7 +28,7 @@ def wave(effect, order):
 
 
 def test_a_bayes_factor_is_half_the_gain_less_the_penalty():
-    problem = SimpleNamespace(noise=SimpleNamespace(sigma=0.5))
+    problem = SimpleNamespace(base=None, noise=SimpleNamespace(sigma=0.5))
     term = Term("hysteresis", {}, columns=np.zeros((4, 2)))
     fit, base = SimpleNamespace(problem=problem, objective=6.0, terms=(term,)), SimpleNamespace(objective=10.0)
     scale = Scale(1000.0, inflation=2.0)
