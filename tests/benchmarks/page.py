@@ -274,6 +274,12 @@ a few, in one run: on another machine the seconds differ, the ratios less.
 ## One drive's converged peak-to-peak
 """
 ON_DRIVES = """
+Effects that differ from turn to turn take 8 to 15 us a drive and direction, not the 4 that are wanted: 33 to 50 of 192
+bounds of cells (96, the least and the greatest) do not hold over all turns at once, and each then takes 0.13 us for 80
+turns side by side, 0.07 of it the lines themselves; 5 to 10 places are looked at after that. Effects with hundreds of
+cells a turn (a damaged tooth of the FS, an output encoder of 4001 lines) take 100 us. A ripple at the teeth has no
+envelope of its own yet: it takes as many cells as its order asks for.
+
 The walks are what a plain program does and what Jia 2021's figures come from; on a fixed grid they stay below the
 converged value. Multiply-adds are those in single precision that the machine makes at its peak in the same time: what a
 way costs, not what it counts.
