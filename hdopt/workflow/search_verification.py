@@ -62,12 +62,12 @@ def quantile_blocks(
     problem, drive = drive_problem_of(study), design.drive
     response, space = problem.response, problem.space
     sampling = ScrambledSobol(BLOCKS)
+    added = None if trade.added is None else trade.added.table(drive)
     values = []
     for replicate in range(BLOCKS):
         points = np.concatenate(list(sampling.blocks(seed, replicate, drives // BLOCKS, space.dimension)))
         inputs = space.sample(points)
         rows = trade.of(response.errors(inputs).to_matrix(), design)
-        added = None if trade.added is None else trade.added.table(drive)
         if response.teeth:
             spans = SampledTeeth.of(response.teeth, inputs).peak_to_peak_arcmin(drive, rows, added=added)
         elif trade.added is None:

@@ -90,21 +90,32 @@ def _loosen_fs(rows: Singles, start: int, off: float, room: Singles) -> None:
             room[to + j] = rows[sag + j] + squared * rows[bend + j]
 
 
+@inlined
+def _at_ends(
+    phases: Singles, rows: Singles, size: int, at: int, j: int, left: End, right: End
+) -> tuple[float, float, float, float]:
+    """The zones' mean at both ends of a piece in turn `j` of `size`, then half their difference, with the effects whose
+    `rows` begin `at`."""
+    cos, sin, to = phases[j], phases[size + j], at + unsigned(KINDS) * size
+    mean, half = rows[at + j], rows[at + size + j]
+    mean_on, half_on = rows[to + j] - mean, rows[to + size + j] - half
+    return (
+        left.mean + cos * left.mean_sine + sin * left.mean_cosine + mean + left.share * mean_on,
+        right.mean + cos * right.mean_sine + sin * right.mean_cosine + mean + right.share * mean_on,
+        left.half + cos * left.half_sine + sin * left.half_cosine + half + left.share * half_on,
+        right.half + cos * right.half_sine + sin * right.half_cosine + half + right.share * half_on,
+    )
+
+
 @compiled
 def _lower(phases: Singles, rows: Singles, start: int, left: End, right: End, out: Singles) -> None:
     """Lower `out` (turns,) to the least of a piece in every turn, with the effects whose `rows` begin at `start`."""
-    size, at, first, last = unsigned(len(out)), unsigned(start), left.share, right.share
-    to, slack = at + unsigned(KINDS) * size, at + unsigned(2) * size
+    size, at = unsigned(len(out)), unsigned(start)
+    slack = at + unsigned(2) * size
     for group in range(len(out) // GROUP):
         for lane in range(GROUP):
             j = unsigned(group * GROUP + lane)
-            cos, sin = phases[j], phases[size + j]
-            mean, half = rows[at + j], rows[at + size + j]
-            mean_on, half_on = rows[to + j] - mean, rows[to + size + j] - half
-            m0 = left.mean + cos * left.mean_sine + sin * left.mean_cosine + mean + first * mean_on
-            m1 = right.mean + cos * right.mean_sine + sin * right.mean_cosine + mean + last * mean_on
-            d0 = left.half + cos * left.half_sine + sin * left.half_cosine + half + first * half_on
-            d1 = right.half + cos * right.half_sine + sin * right.half_cosine + half + last * half_on
+            m0, m1, d0, d1 = _at_ends(phases, rows, size, at, j, left, right)
             on = d1 - d0
             x = clipped(-d0 / (on if abs(on) > TINY else TINY), ZERO, ONE)
             least = min(m0 + abs(d0), m1 + abs(d1), m0 + x * (m1 - m0) + abs(d0 + x * on))
@@ -114,18 +125,12 @@ def _lower(phases: Singles, rows: Singles, start: int, left: End, right: End, ou
 @compiled
 def _raise(phases: Singles, rows: Singles, start: int, left: End, right: End, out: Singles) -> None:
     """Lower `out` (turns,) to the negative of the greatest of the same."""
-    size, at, first, last = unsigned(len(out)), unsigned(start), left.share, right.share
-    to, slack = at + unsigned(KINDS) * size, at + unsigned(2) * size
+    size, at = unsigned(len(out)), unsigned(start)
+    slack = at + unsigned(2) * size
     for group in range(len(out) // GROUP):
         for lane in range(GROUP):
             j = unsigned(group * GROUP + lane)
-            cos, sin = phases[j], phases[size + j]
-            mean, half = rows[at + j], rows[at + size + j]
-            mean_on, half_on = rows[to + j] - mean, rows[to + size + j] - half
-            m0 = left.mean + cos * left.mean_sine + sin * left.mean_cosine + mean + first * mean_on
-            m1 = right.mean + cos * right.mean_sine + sin * right.mean_cosine + mean + last * mean_on
-            d0 = left.half + cos * left.half_sine + sin * left.half_cosine + half + first * half_on
-            d1 = right.half + cos * right.half_sine + sin * right.half_cosine + half + last * half_on
+            m0, m1, d0, d1 = _at_ends(phases, rows, size, at, j, left, right)
             out[j] = min(out[j], -max(m0 + abs(d0), m1 + abs(d1)) - rows[slack + j])
 
 
