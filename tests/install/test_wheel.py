@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import venv
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,16 @@ def test_the_wheel_brings_studies_templates_and_geometry(installed):
     ran = run(hdopt, "run", "quick.toml", "-o", "out", cwd=folder)
     assert ran.returncode == 0, ran.stderr
     assert (folder / "out" / "report.html").stat().st_size > 1_000_000
+    (wheel,) = folder.glob("hdopt-*.whl")
+    brought = set(zipfile.ZipFile(wheel).namelist())
+    sources = {"hdopt": ROOT / "hdopt", "hdopt/geometry": ROOT / "geometry", "hdopt/studies": ROOT / "studies"}
+    wanted = {
+        f"{name}/{path.relative_to(source)}"
+        for name, source in sources.items()
+        for path in source.rglob("*.*")
+        if path.suffix not in (".pyc", ".nbi", ".nbc")
+    }
+    assert wanted <= brought, wanted - brought
     python = hdopt.parent / "python"
     assert run(python, "-c", "import hdopt.geometry, hdopt.studies", cwd=folder).returncode == 0
 

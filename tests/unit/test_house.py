@@ -4,6 +4,7 @@ import ast
 import io
 import re
 import tokenize
+import tomllib
 from collections import Counter
 from pathlib import Path
 
@@ -50,6 +51,13 @@ TREES = dict(trees())
 def test_no_function_is_longer_than_sixty_lines():
     long = {f"{path} {node.name}" for path, tree in TREES.items() for node in functions(tree) if length(node) > LONGEST}
     assert long == set()
+
+
+def test_every_folder_of_python_is_a_package_that_is_installed():
+    """Would catch a new folder that only a checkout has: what was installed stops at its import."""
+    installed = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["packages"]
+    dotted = {str(path.parent).replace("/", ".") for path in TREES}
+    assert set(installed) == {f"hdopt.{name}" if name in ("geometry", "studies") else name for name in dotted}
 
 
 def test_test_files_have_names_of_their_own():
