@@ -347,7 +347,7 @@ class SearchSettings:
     begun: float = threshold(
         0.5, "1", "choice: power left above the noise over it from which a leading set is taken for a part of another"
     )
-    complete: float = threshold(0.05, "1", "choice: the same up to which that other set leaves noise alone")
+    complete: float = threshold(0.1, "1", "choice: share of that power which the other set may leave")
     lost_by_trimming: float = threshold(0.005, "1", "choice: share of the gain that parts which do not show may take")
     known: int = threshold(5, "1", "choice: candidates from which a later search goes on")
     tie_of_variants: float = threshold(10.0, "1", "choice: log evidence by which a wider variant must be better")

@@ -111,6 +111,7 @@ def in_rows(monkeypatch):
     monkeypatch.setattr(search_state, "penalty_scale", lambda *about: SimpleNamespace(rows=ROWS))
     monkeypatch.setattr(subset_search, "penalty", lambda terms, gain, scale: 3.0 * len(terms) + gain)
     monkeypatch.setattr(subset_search, "leaves_nothing", lambda term: term.effect in ("sine", "cosine"))
+    monkeypatch.setattr(subset_search, "kind_of", lambda term: "turning" if "lobes" in term.effect else "load")
     problem = SimpleNamespace(**vars(PROBLEM), noise=SimpleNamespace(sigma=SIGMA))
 
     def candidate(evidence, names, left, inflation=2.0):
@@ -127,16 +128,29 @@ def in_rows(monkeypatch):
         (0.6, (("a", "sine"), 0.04), True),
         (0.6, (("sine", "a", "cosine"), -0.1), True),
         (0.4, (("a", "sine"), 0.04), False),
-        (0.6, (("a", "sine"), 0.06), False),
+        (0.6, (("a", "two lobes"), 0.04), True),
+        (1.6, (("a", "sine"), 0.15), True),
+        (1.6, (("a", "sine"), 0.17), False),
         (0.6, (("a", "b"), 0.04), False),
         (0.6, (("a", "sine", "b"), 0.04), False),
         (0.6, (("b", "sine"), 0.04), False),
     ],
-    ids=["completed", "by two", "not far above noise", "not to the noise", "no sine", "not all sines", "another set"],
+    ids=[
+        "completed",
+        "by two",
+        "not far above noise",
+        "by lobes",
+        "nearly all",
+        "not nearly all",
+        "no sine",
+        "not all sines",
+        "another set",
+    ],
 )
-def test_sines_that_leave_noise_alone_complete_a_set_that_leaves_far_more(in_rows, first, other, taken):
-    """Of a set that leaves 0.6 of the noise's power above it, and one with a sine more that leaves none, the latter,
-    whatever inexactness it would pay for. Would catch a second encoder given up beside a damaged tooth."""
+def test_sines_that_take_up_nearly_all_complete_a_set_that_leaves_far_more(in_rows, first, other, taken):
+    """Of a set that leaves 0.6 of the noise's power above it, and one with a sine more that leaves less than a tenth of
+    that, the latter, whatever inexactness it would pay for. Would catch a second encoder given up beside a damaged
+    tooth, and a spline's two lobes beside an encoder and the mesh."""
     names, left = other
     begun, more, last = in_rows(900.0, ("a",), first), in_rows(100.0, names, left), in_rows(20.0, ("c",), 2.0)
     found = subset_search.completed(state_of(), [begun, more, last])
@@ -145,6 +159,14 @@ def test_sines_that_leave_noise_alone_complete_a_set_that_leaves_far_more(in_row
         return
     assert [one.fit for one in found] == [more.fit, begun.fit, last.fit]
     assert found[0].log_bayes_factor == pytest.approx(900.0 + (first - left) * ROWS / 2 - 3.0 * (len(names) - 1))
+
+
+def test_what_bends_to_nothing_is_sines_or_turns_and_has_few_coefficients(monkeypatch):
+    monkeypatch.setattr(subset_search, "leaves_nothing", lambda term: term.effect == "sine")
+    monkeypatch.setattr(subset_search, "kind_of", lambda term: "load" if term.effect == "friction" else "turning")
+    for term, may in ((Effect("sine", 9), True), (Effect("lobes", 4), True), (Effect("teeth", 5), False)):
+        assert subset_search.may_complete(term, narrow=4) is may
+    assert not subset_search.may_complete(Effect("friction", 1), narrow=4)
 
 
 def test_of_two_completed_sets_the_better_and_nothing_where_the_base_leads(in_rows):
@@ -243,6 +265,69 @@ def test_a_gear_without_a_base_has_no_other_drives(refitted):
     )
     assert subset_search.refit_close_rivals(state) is state
     assert refitted == []
+
+
+@pytest.fixture
+def beside(monkeypatch, refitted):
+    """What is fitted beside a leader with a drive that is far, or not: sets with the drives' streams, and what the
+    search went on about."""
+    streams, about = [], []
+
+    def joint_fit(start, terms, rng=None):
+        streams.append(rng)
+        refitted.append(tuple(term.effect for term in terms))
+        return Told(40.0 if terms[-1].effect == "sine" else 150.0, tuple(terms))
+
+    def on(state):
+        about.append(state.leader.effects)
+        return state
+
+    monkeypatch.setattr(subset_search, "joint_fit", joint_fit)
+    monkeypatch.setattr(subset_search, "is_far", lambda fit: np.array([False, fit.far]))
+    monkeypatch.setattr(subset_search, "leaves_nothing", lambda term: "sine" in term.effect)
+    monkeypatch.setattr(subset_search, "search_about_leader", on)
+
+    def look(state, *found):
+        asked = []
+        monkeypatch.setattr(
+            search_state, "search_terms", lambda probe, skip: asked.append(skip) or [Effect(n) for n in found]
+        )
+        return subset_search.beside_a_far_drive(state), asked, refitted, streams, about
+
+    return look
+
+
+def test_sines_are_fitted_from_new_drives_beside_a_leader_whose_drive_is_far(beside):
+    """Would catch an eccentric encoder that the drive's errors took up beside a damaged tooth."""
+    state = state_of(of(100.0, "tooth", far=True), plan=SearchPlan(skip=("asked not",)))
+    state, asked, fitted, streams, about = beside(state, "sine", "lobes", "another sine")
+    assert asked == [["asked not", "tooth"]]
+    assert fitted == [("tooth", "sine"), ("tooth", "another sine")]
+    assert len({id(stream) for stream in streams}) == 2
+    assert None not in streams
+    assert about == [("tooth", "another sine")]
+
+
+def test_a_search_goes_on_about_a_new_leader_alone(beside):
+    """What was found stays among the sets all the same: it may complete the leader."""
+    state, _, _, _, about = beside(state_of(of(100.0, "tooth", far=True)), "sine")
+    assert about == []
+    assert frozenset(("tooth", "sine")) in state.fits
+    # Every draw after it is as without it.
+    assert state.rng.bit_generator.seed_seq.n_children_spawned == 0
+
+
+def test_the_look_beside_a_far_drive_follows_the_search_about_the_leader():
+    stages = subset_search.STAGES
+    assert stages.index(subset_search.beside_a_far_drive) == stages.index(subset_search.search_about_leader) + 1
+
+
+def test_no_sine_is_fitted_beside_a_drive_within_its_tolerances(beside):
+    no_base = Told(0.0, problem=SimpleNamespace(**vars(PROBLEM) | {"base": None}))
+    for state in (state_of(of(100.0, "tooth")), state_of(), state_of(of(100.0, "tooth", far=True), base=no_base)):
+        after, asked, *_ = beside(state, "sine")
+        assert after is state
+        assert asked == []
 
 
 @pytest.mark.parametrize(("lost", "left"), [(0.9, 1), (1.1, 2)])

@@ -9,17 +9,19 @@ it stands. `STAGES` is the order of work.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hdopt.diagnosis.inference.base_fit import is_far
 from hdopt.diagnosis.inference.catalogue import is_outside
 from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import Candidate, joint_fit, search_terms, without_each
 from hdopt.diagnosis.search.explore import explore
-from hdopt.diagnosis.search.penalty import flexibility, leaves_nothing, penalty
+from hdopt.diagnosis.search.penalty import flexibility, kind_of, leaves_nothing, penalty
 from hdopt.diagnosis.search.refinement import (
     otherwise_acceptable,
     shortened,
@@ -192,6 +194,25 @@ def refit_close_rivals(state: SearchState) -> SearchState:
     return state.taking(each(fitted, zip(sets, state.rng.spawn(len(sets)), strict=True)))
 
 
+def beside_a_far_drive(state: SearchState) -> SearchState:
+    """A leader's drive far outside its tolerances stands for physics that the leader leaves out, which no look beside
+    that drive shows: each sine of known orders beside the leader, from new drives. `state` is where the work stands;
+    the draws are its own, so that a search in which nothing comes of it goes on as without it.
+    """
+    before = state.leader
+    if before is None or state.base.problem.base is None or not is_far(before.fit).any():
+        return state
+    start = before.fit
+    found = [term for term in state.terms_for(state.probe(start), *before.effects) if leaves_nothing(term)]
+
+    def fitted(numbered: tuple[Term, np.random.Generator]) -> Fit:
+        term, own_rng = numbered
+        return joint_fit(start, [*start.terms, term], own_rng)
+
+    fits = each(fitted, zip(found, copy.deepcopy(state.rng).spawn(len(found)), strict=True))
+    return about_a_new_leader(state.taking(fits), before)
+
+
 def beside_what_is_told(state: SearchState) -> SearchState:
     """What a drive as built and its bench may do without a finding, in place of the leader and beside it; where that
     leads, the search goes on about it. `state` is where the work stands.
@@ -203,6 +224,11 @@ def beside_what_is_told(state: SearchState) -> SearchState:
         for start in (state.base, *([before.fit] if before is not None else [])):
             found = search_terms(state.probe(start), only=[effect.id])
             state = state.taking([joint_fit(start, [*start.terms, term]) for term in found])
+    return about_a_new_leader(state, before)
+
+
+def about_a_new_leader(state: SearchState, before: Candidate | None) -> SearchState:
+    """The search about the leader, where it is another than `before`. `state` is where the work stands."""
     after = state.leader
     if after is None or (before is not None and after.fit is before.fit):
         return state
@@ -267,6 +293,7 @@ STAGES: tuple[Callable[[SearchState], SearchState], ...] = (
     explore_clean_base,
     look_beside_flexible_leader,
     search_about_leader,
+    beside_a_far_drive,
     refit_close_rivals,
     beside_what_is_told,
     leave_out_hidden_parts,
@@ -294,23 +321,30 @@ def ranked(state: SearchState) -> list[Candidate]:
 
 
 def completed(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
-    """`candidates` in order of evidence, the first only begun where it leaves far more than noise and sines of known
-    orders beside it leave noise alone: what an inexact shape leaves no such sine takes up to the last, so that these do
-    not pay for it. `state` is where the work stands.
+    """`candidates` in order of evidence, the first only begun where it leaves far more than noise and terms that bend
+    to nothing take up nearly all of that beside it: what an inexact shape leaves no such term takes up, so that these
+    do not pay for it. `state` is where the work stands.
     """
-    first, rows, settings = candidates[0], state.scale.rows, state.settings
-    if not first.fit.terms or above_noise(state, first.fit) < settings.begun * rows:
+    first, settings = candidates[0], state.settings
+    left = above_noise(state, first.fit)
+    if not first.fit.terms or left < settings.begun * state.scale.rows:
         return candidates
     found = []
     for candidate in candidates[1:]:
         beside = [term for term in candidate.fit.terms if term.effect not in first.effects]
-        if set(first.effects) < set(candidate.effects) and all(leaves_nothing(term) for term in beside):
-            if above_noise(state, candidate.fit) <= settings.complete * rows:
+        if set(first.effects) < set(candidate.effects) and all(may_complete(term, settings.narrow) for term in beside):
+            if above_noise(state, candidate.fit) <= settings.complete * left:
                 found.append(without_inexactness(state, first, candidate))
     if not found:
         return candidates
     best = max(found, key=lambda c: c.log_bayes_factor)
     return sorted([best, *(c for c in candidates if c.fit is not best.fit)], key=lambda c: -c.log_bayes_factor)
+
+
+def may_complete(term: Term, narrow: int) -> bool:
+    """Whether `term` is sines at lines that are known, or turns with the drive and has no more than `narrow`
+    coefficients: it bends to nothing."""
+    return leaves_nothing(term) or (kind_of(term) == "turning" and term.width <= narrow)
 
 
 def above_noise(state: SearchState, fit: Fit) -> float:
