@@ -38,8 +38,10 @@ def nested_held_out(
         return None
     state = pipeline(without_samples(recordings, hidden))
     seen = as_seen(recordings, hidden, state)
-    rows = gather(subtract(seen, ripple_of(seen, state)), neighbours_for(state.recordings))
-    share = shares_of_samples(seen, hidden, neighbours_for(state.recordings))
+    # Means of as many samples as those that it is held against: of fewer there are on the turns that are left.
+    neighbours = neighbours_for(recordings)
+    rows = gather(subtract(seen, ripple_of(seen, state)), neighbours)
+    share = shares_of_samples(seen, hidden, neighbours)
     best, base = state.selection.best.fit, state.selection.base
     errors = [_rms(refitted(fit, rows, share > 0, state).residual[share == 1]) for fit in (base, best)]
     named = {name for found in (state.selection, state.high) if found is not None for name in found.best.effects}
