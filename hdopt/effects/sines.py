@@ -99,5 +99,6 @@ def _whole_sum(phase: Array, by_order: Array) -> tuple[Array, Array]:
                 s[i], c[i] = now, beside
                 total[i] += a * now + b * beside
                 rise[i] += h * (a * beside - b * now)
-        value[start : start + here], slope[start : start + here] = total[:here], rise[:here]
+        for i in range(here):  # One by one: of slices, what they may raise takes seconds to compile.
+            value[start + i], slope[start + i] = total[i], rise[i]
     return value, slope

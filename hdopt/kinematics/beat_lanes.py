@@ -481,7 +481,9 @@ def extremes_in_lanes(walk: Walk, nodes: Nodes, lanes: Array) -> tuple[float, fl
         if _floor_between(nodes, i) - margin > best[0] and ceiling + comb.largest + margin < best[1]:
             continue
         if known == i:
-            lanes[0] = lanes[1]
+            for zone in range(2):
+                for phase in range(lanes.shape[2]):
+                    lanes[0, zone, phase] = lanes[1, zone, phase]
         for end in range(1 if known == i else 0, 2):
             for zone in range(2):
                 _lanes(comb.rows, nodes.value[i + end, zone], nodes.angle[i + end, zone], lanes[end, zone])

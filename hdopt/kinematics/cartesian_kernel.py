@@ -71,6 +71,13 @@ def _motion_of(tip: TipGeometry, p: Array) -> RigidMotion[float]:
     )
 
 
+@inlined
+def _copy(given: Array, out: Array, at: int) -> None:
+    """Copy `given` (n,) into `out` from `at` on. What an assignment of slices may raise takes seconds to compile."""
+    for i in range(len(given)):
+        out[at + i] = given[i]
+
+
 @compiled
 def _both_zones(work: Array, rim: RimConstants, motion: RigidMotion[float], p: Array, tan_alpha: float) -> None:
     """Deviation (mm of arc), deeper rim and offsets of either zone at the angles in `work`, without measured teeth;
@@ -202,27 +209,25 @@ def evaluated(
     for start in range(0, n, BLOCK):
         rows = min(BLOCK, n - start)
         for row in range(4):
-            work[row * BLOCK : row * BLOCK + rows] = rotation[row, start : start + rows]
+            _copy(rotation[row, start : start + rows], work, row * BLOCK)
         if has_extra:
             for number in range(2):
-                at = EXTRA + number * BLOCK
-                work[at : at + rows] = extra[number, start : start + rows]
+                _copy(extra[number, start : start + rows], work, EXTRA + number * BLOCK)
         if has_rises:
             for k in range(4):
-                at = RISE + k * BLOCK
-                work[at : at + rows] = rises[k // 2, k % 2, start : start + rows]
+                _copy(rises[k // 2, k % 2, start : start + rows], work, RISE + k * BLOCK)
         _both_zones(work, rim, motion, p, tan_alpha)
         if len(cs) > 0:
             _add_measured(work, cs, COS, SIN, OFFSET, RISE_CS)
         if len(fs) > 0:
             _add_measured(work, fs, COS_FS, SIN_FS, OFFSET_FS, RISE_FS)
         _driving(work, tip, rim, motion, p, tan_alpha, scale)
-        value[start : start + rows] = work[VALUE : VALUE + rows]
+        _copy(work[VALUE : VALUE + rows], value, start)
         for i in range(rows):
             zone[start + i] = np.int64(work[DRIVES + i])
         for row in range(PARAMETERS):
             at = SLOPES + row * BLOCK
-            slopes[row, start : start + rows] = work[at : at + rows]
+            _copy(work[at : at + rows], slopes[row], start)
     return value, zone, slopes
 
 
