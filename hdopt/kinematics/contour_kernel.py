@@ -15,9 +15,11 @@ from numba import njit
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
-from hdopt.kinematics.beat_lanes import FLOORS, Walk, extremes_in_lanes, fill_comb, new_nodes, second_difference
+from hdopt.kinematics.beat_grid import DEPTH, ON_CS, ON_FS, Walk, grid_angles, margins, new_work
+from hdopt.kinematics.beat_lanes import extremes_in_lanes
+from hdopt.kinematics.beat_tables import FLOORS, WRAPPED, circle, differences, fill_comb, with_sine, wrap
 from hdopt.kinematics.exact import GRID_POINTS, LONGEST_STEP, NEWTON_STEPS, ZONE_HALF_WIDTH
-from hdopt.kinematics.teeth_kernel import depth_bend, with_sine
+from hdopt.kinematics.load_sharing import PLACES_PER_TOOTH
 
 CONTOUR_PLACES = 8192
 """Places of a turn at which points and slopes of the contour are tabulated; cubics between them leave 1e-12 mm of an
@@ -40,7 +42,8 @@ class ContourConstants(NamedTuple):
     """What the kernel knows of a design: the contour's `points` (4, n), x and y (mm, y along the major axis) and their
     slopes (mm a place); the place where each zone's rim reaches farthest by its motion across, `starts` (2, K); L_W and
     b/2 (mm); which eccentricity is passed; tan of the pressure angle times the share of misalignment; the factor of
-    tooth sines; Z_CS/Z_FS; the number of FS phases; cos and sin of the grid angles, (m,) each."""
+    tooth sines; Z_CS/Z_FS; the number of FS phases; cos and sin of the grid angles, (2, m + 4), and of the places of
+    either spline's table, (2, 12 Z) each."""
 
     points: Array
     starts: Array
@@ -52,8 +55,9 @@ class ContourConstants(NamedTuple):
     sine_share: float
     advance: float
     phases: int
-    cos: Array
-    sin: Array
+    angles: Array
+    cs_circle: Array
+    fs_circle: Array
 
 
 class Rim(NamedTuple):
@@ -73,7 +77,6 @@ def contour_constants(drive: Drive, misalignment: float = 1.0, sine_share: float
     sines make, where the teeth in contact share them."""
     gear, generator = drive.geometry, drive.wave_generator
     m = max(FEWEST_ANGLES, int(ANGLES_PER_TOOTH * gear.circular_spline_teeth))
-    theta = np.arange(m) * (2 * math.pi / m)
     phi = np.arange(CONTOUR_PLACES) * (2 * math.pi / CONTOUR_PLACES)
     r, slope = generator.profile.radius(phi), generator.profile.radius(phi, 1)
     sin, cos, step = np.sin(phi), np.cos(phi), phi[1]
@@ -91,8 +94,9 @@ def contour_constants(drive: Drive, misalignment: float = 1.0, sine_share: float
         sine_share,
         gear.flexspline_advance,
         gear.beat_phases,
-        np.cos(theta),
-        np.sin(theta),
+        grid_angles(m),
+        circle(PLACES_PER_TOOTH * gear.circular_spline_teeth),
+        circle(PLACES_PER_TOOTH * gear.flexspline_teeth),
     )
 
 
@@ -192,7 +196,7 @@ def _frame(tilt_y: float, tilt_x: float) -> Array:
 def _motion(constants: ContourConstants, row: Array, axis: Array, own: Array, j: int, out: Array) -> None:
     """Fill `out` (2, 4) with how the contour lies at grid angle `j` along and across: factors of x, of y and of the
     height, and the offset (mm). `axis` and `own` are the frames of input axis and wave generator, `row` the errors."""
-    cos, sin = constants.cos[j], constants.sin[j]
+    cos, sin = constants.angles[0, j], constants.angles[1, j]
     x, y = row[4] * math.sin(row[5]), row[4] * math.cos(row[5])
     x, y = x * cos + y * sin, y * cos - x * sin
     centre_x = axis[0, 0] * x + axis[0, 1] * y + row[0] * math.sin(row[1])
@@ -209,12 +213,12 @@ def _motion(constants: ContourConstants, row: Array, axis: Array, own: Array, j:
 
 
 @compiled
-def _sample(constants: ContourConstants, row: Array, depth: Array, offset_cs: Array, offset_fs: Array) -> None:
-    """Fill the branches (2, 2, m) of one drive on the grid angles."""
+def _sample(constants: ContourConstants, row: Array, branches: Array) -> None:
+    """Fill the `branches` (3, 2, 2, m + 4) of one drive on the grid angles."""
     points, n = constants.points, constants.points.shape[1]
     axis, own = _frame(row[2], row[3]), _frame(row[6], row[7])
     at = np.empty((2, 4))
-    for j in range(len(constants.cos)):
+    for j in range(constants.angles.shape[1]):
         _motion(constants, row, axis, own, j, at)
         for zone in range(2):
             side = 1.0 - 2.0 * zone
@@ -227,9 +231,9 @@ def _sample(constants: ContourConstants, row: Array, depth: Array, offset_cs: Ar
                 start, steps = _start(constants, zone, rim)
                 place = _polished(points, start, rim, steps)
                 u, v, _, _, _, _ = _at(points, place, rim)
-                depth[zone, k, j] = math.sqrt(u * u + v * v) - constants.semi_major
-                offset_cs[zone, k, j] = math.atan2(v, side * u)
-                offset_fs[zone, k, j] = side * (place - zone * n / 2) * (2 * math.pi / n)
+                branches[DEPTH, zone, k, j] = math.sqrt(u * u + v * v) - constants.semi_major
+                branches[ON_CS, zone, k, j] = math.atan2(v, side * u)
+                branches[ON_FS, zone, k, j] = side * (place - zone * n / 2) * (2 * math.pi / n)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=False)
@@ -238,19 +242,20 @@ def contour_extremes_block(constants: ContourConstants, cs: Array, fs: Array, ro
 
     `constants` of the design; `cs`, `fs` tables over one turn of the splines, (1, 12 Z) for all drives or (n, 12 Z).
     """
-    m, phases = len(constants.cos), constants.phases
+    m, phases = constants.angles.shape[1] - WRAPPED, constants.phases
     n_cs, n_fs = cs.shape[1], fs.shape[1]
     stride_cs, stride_fs = (n_cs + m - 1) // m, (n_fs + m - 1) // m
-    depth, offset_cs, offset_fs = np.empty((2, 2, m)), np.empty((2, 2, m)), np.empty((2, 2, m))
-    nodes, lanes = new_nodes(m), np.empty((2, 2, phases))
-    comb_rows, floor = np.empty((n_fs // phases, 2 * phases)), np.empty(FLOORS)
-    on_cs, on_fs = np.empty(n_cs), np.empty(n_fs)
+    branches = np.empty((3, 2, 2, m + WRAPPED))
+    work = new_work(m, phases)
+    comb_rows, floor = np.empty((n_fs // phases + WRAPPED, 2 * phases)), np.empty(FLOORS)
+    on_cs, on_fs, wrapped = np.empty(n_cs), np.empty(n_fs), np.empty(n_cs + WRAPPED)
     for i in range(len(rows)):
-        row = rows[i]
-        with_sine(cs[i if len(cs) > 1 else 0], constants.sine_share * row[8], row[9], on_cs)
-        with_sine(fs[i if len(fs) > 1 else 0], constants.sine_share * row[10], row[11], on_fs)
+        row, share = rows[i], constants.sine_share
+        with_sine(cs[i if len(cs) > 1 else 0], share * row[8], row[9], constants.cs_circle, on_cs)
+        with_sine(fs[i if len(fs) > 1 else 0], share * row[10], row[11], constants.fs_circle, on_fs)
+        wrap(on_cs, wrapped)
         comb = fill_comb(on_fs, phases, stride_fs, comb_rows, floor)
-        _sample(constants, row, depth, offset_cs, offset_fs)
-        bend = constants.tan_alpha * depth_bend(depth) + second_difference(on_cs, stride_cs)
-        walk = Walk(depth, offset_cs, offset_fs, on_cs, constants.tan_alpha, constants.advance, comb, bend)
-        out[i, 0], out[i, 1] = extremes_in_lanes(walk, nodes, lanes)
+        _sample(constants, row, branches)
+        margin, beside = margins(branches, constants.tan_alpha, differences(on_cs, stride_cs), comb, work)
+        walk = Walk(branches, wrapped, constants.tan_alpha, constants.advance, comb, margin, beside)
+        out[i, 0], out[i, 1] = extremes_in_lanes(walk, work)

@@ -118,7 +118,7 @@ def misalignment_share(drive: Drive) -> float:
 def mesh_range(drive: Drive) -> float:
     """How far the measured teeth of `drive` can move the driving deviation, mm of arc: the ranges of both tables, and
     what a cubic can pass the places of a table by. 0 without measured teeth."""
-    from hdopt.kinematics.beat_lanes import second_difference
+    from hdopt.kinematics.beat_tables import second_difference
 
     tables = [table for table in mesh_tables(drive) if len(table)]
     return float(sum(np.ptp(table) + second_difference(table, 1) / 2 for table in tables))

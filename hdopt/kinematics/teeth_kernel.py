@@ -14,7 +14,9 @@ from numba import njit
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
-from hdopt.kinematics.beat_lanes import FLOORS, Walk, extremes_in_lanes, fill_comb, new_nodes, second_difference
+from hdopt.kinematics.beat_grid import DEPTH, ON_CS, ON_FS, Walk, grid_angles, margins, new_work
+from hdopt.kinematics.beat_lanes import extremes_in_lanes
+from hdopt.kinematics.beat_tables import FLOORS, WRAPPED, circle, differences, fill_comb, with_sine, wrap
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
 from hdopt.kinematics.compiled_closed_form import motion_at, motion_of_row, rim_constants, rim_depth
 from hdopt.kinematics.load_sharing import PLACES_PER_TOOTH
@@ -28,15 +30,17 @@ compiled = njit(error_model="numpy", fastmath=False)
 
 class BeatConstants(NamedTuple):
     """What the kernel knows of a design: its tip; tan of the pressure angle times the share of misalignment; the factor
-    of tooth sines; Z_CS/Z_FS; the number of FS phases; cos and sin of the grid angles, (m,) each."""
+    of tooth sines; Z_CS/Z_FS; the number of FS phases; cos and sin of the grid angles, (2, m + 4), and of the places of
+    either spline's table, (2, 12 Z) each."""
 
     tip: TipGeometry
     tan_alpha: float
     sine_share: float
     advance: float
     phases: int
-    cos: Array
-    sin: Array
+    angles: Array
+    cs_circle: Array
+    fs_circle: Array
 
 
 def beat_constants(drive: Drive, misalignment: float = 1.0, sine_share: float = 1.0) -> BeatConstants:
@@ -44,7 +48,6 @@ def beat_constants(drive: Drive, misalignment: float = 1.0, sine_share: float = 
     table make, where the teeth in contact share them."""
     gear = drive.geometry
     m = max(FEWEST_ANGLES, int(ANGLES_PER_TOOTH * gear.circular_spline_teeth))
-    theta = np.arange(m) * (2 * math.pi / m)
     tan_alpha = misalignment * math.tan(gear.pressure_angle)
     return BeatConstants(
         tip_geometry(drive),
@@ -52,8 +55,9 @@ def beat_constants(drive: Drive, misalignment: float = 1.0, sine_share: float = 
         sine_share,
         gear.flexspline_advance,
         gear.beat_phases,
-        np.cos(theta),
-        np.sin(theta),
+        grid_angles(m),
+        circle(PLACES_PER_TOOTH * gear.circular_spline_teeth),
+        circle(PLACES_PER_TOOTH * gear.flexspline_teeth),
     )
 
 
@@ -70,42 +74,18 @@ def whole_tables(drive: Drive, tables: tuple[Array, Array]) -> tuple[Array, Arra
 
 
 @compiled
-def _sample(constants: BeatConstants, row: Array, depth: Array, offset_cs: Array, offset_fs: Array) -> None:
-    """Fill the branches (2, 2, m) of one drive on the grid angles."""
+def _sample(constants: BeatConstants, row: Array, branches: Array) -> None:
+    """Fill the `branches` (3, 2, 2, m + 4) of one drive on the grid angles."""
     tip = constants.tip
     motion, _, _ = motion_of_row(tip, row)
     rim = rim_constants(tip)
-    for j in range(len(constants.cos)):
-        e_a, e_l, t_a, t_l = motion_at(motion, constants.cos[j], constants.sin[j])
+    cos, sin = constants.angles[0], constants.angles[1]
+    for j in range(len(cos)):
+        e_a, e_l, t_a, t_l = motion_at(motion, cos[j], sin[j])
         for zone in range(2):
             for k in range(2):
                 found = rim_depth(rim, e_a, e_l, t_a, t_l, 1.0 - 2.0 * zone, 1.0 - 2.0 * k)
-                depth[zone, k, j], offset_cs[zone, k, j], offset_fs[zone, k, j] = found
-
-
-@compiled
-def depth_bend(depth: Array) -> float:
-    """Largest second difference of any branch of `depth` (2, 2, m), mm, over its grid."""
-    found = 0.0
-    for zone in range(2):
-        for k in range(2):
-            found = max(found, second_difference(depth[zone, k], 1))
-    return found
-
-
-@compiled
-def with_sine(table: Array, amplitude: float, phase: float, out: Array) -> None:
-    """Fill `out` (n,) with a spline's `table` (n,) and a sine of `amplitude` and `phase` (rad) of one wave beside it,
-    mm of arc; rotated step by step.
-    """
-    n = len(table)
-    turn, cos_turn, sin_turn = 2 * math.pi / n, math.cos(2 * math.pi / n), math.sin(2 * math.pi / n)
-    cos, sin = math.cos(phase), math.sin(phase)
-    for i in range(n):
-        if i % 64 == 0:
-            cos, sin = math.cos(phase + i * turn), math.sin(phase + i * turn)
-        out[i] = table[i] + amplitude * sin
-        cos, sin = cos * cos_turn - sin * sin_turn, sin * cos_turn + cos * sin_turn
+                branches[DEPTH, zone, k, j], branches[ON_CS, zone, k, j], branches[ON_FS, zone, k, j] = found
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=False)
@@ -114,25 +94,28 @@ def beat_extremes_block(constants: BeatConstants, cs: Array, fs: Array, rows: Ar
 
     `constants` of the design; `cs`, `fs` tables over one turn of the splines, (1, 12 Z) for all drives or (n, 12 Z).
     """
-    m, phases = len(constants.cos), constants.phases
+    m, phases = constants.angles.shape[1] - WRAPPED, constants.phases
     n_cs, n_fs = cs.shape[1], fs.shape[1]
     stride_cs, stride_fs = (n_cs + m - 1) // m, (n_fs + m - 1) // m
-    depth, offset_cs, offset_fs = np.empty((2, 2, m)), np.empty((2, 2, m)), np.empty((2, 2, m))
-    nodes, lanes = new_nodes(m), np.empty((2, 2, phases))
-    comb_rows, floor = np.empty((n_fs // phases, 2 * phases)), np.empty(FLOORS)
-    on_cs, on_fs = cs[0], fs[0]
-    with_cs, with_fs = np.empty(n_cs), np.empty(n_fs)
-    cs_bend = second_difference(on_cs, stride_cs)
-    comb = fill_comb(on_fs, phases, stride_fs, comb_rows, floor)
+    branches = np.empty((3, 2, 2, m + WRAPPED))
+    work = new_work(m, phases)
+    comb_rows, floor = np.empty((n_fs // phases + WRAPPED, 2 * phases)), np.empty(FLOORS)
+    on_cs, on_fs, wrapped = np.empty(n_cs), np.empty(n_fs), np.empty(n_cs + WRAPPED)
+    wrap(cs[0], wrapped)
+    cs_bends = differences(cs[0], stride_cs)
+    comb = fill_comb(fs[0], phases, stride_fs, comb_rows, floor)
     for i in range(len(rows)):
         row = rows[i]
         if len(cs) > 1 or row[8] > 0.0:
-            with_sine(cs[i if len(cs) > 1 else 0], constants.sine_share * row[8], row[9], with_cs)
-            on_cs, cs_bend = with_cs, second_difference(with_cs, stride_cs)
+            own = cs[i if len(cs) > 1 else 0]
+            with_sine(own, constants.sine_share * row[8], row[9], constants.cs_circle, on_cs)
+            wrap(on_cs, wrapped)
+            cs_bends = differences(on_cs, stride_cs)
         if len(fs) > 1 or row[10] > 0.0:
-            with_sine(fs[i if len(fs) > 1 else 0], constants.sine_share * row[10], row[11], with_fs)
-            comb = fill_comb(with_fs, phases, stride_fs, comb_rows, floor)
-        _sample(constants, row, depth, offset_cs, offset_fs)
-        bend = constants.tan_alpha * depth_bend(depth) + cs_bend
-        walk = Walk(depth, offset_cs, offset_fs, on_cs, constants.tan_alpha, constants.advance, comb, bend)
-        out[i, 0], out[i, 1] = extremes_in_lanes(walk, nodes, lanes)
+            own = fs[i if len(fs) > 1 else 0]
+            with_sine(own, constants.sine_share * row[10], row[11], constants.fs_circle, on_fs)
+            comb = fill_comb(on_fs, phases, stride_fs, comb_rows, floor)
+        _sample(constants, row, branches)
+        margin, beside = margins(branches, constants.tan_alpha, cs_bends, comb, work)
+        walk = Walk(branches, wrapped, constants.tan_alpha, constants.advance, comb, margin, beside)
+        out[i, 0], out[i, 1] = extremes_in_lanes(walk, work)

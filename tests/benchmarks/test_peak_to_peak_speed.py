@@ -25,9 +25,9 @@ pytestmark = [
 
 DRIVES = 1_000_000
 
-MEASURED_TEETH_AT_MOST = 130
-"""Times the sine's cost. The goal of 20 is missed since the sine runs in single precision, six to seven times as fast:
-the beat's own 20 us a drive are as they were. 90 to 100 are measured; more than this is slower than it was."""
+MEASURED_TEETH_AT_MOST = 80
+"""Times the sine's cost. The goal of 20 was met before the sine's kernel ran in single precision, six to seven times as
+fast, and is missed since: 50 to 60 are measured; more than this is slower than it was."""
 
 
 def in_earnest(request) -> bool:
