@@ -6,7 +6,6 @@ functions that are in memory. Where a fault is more than that, a process that ha
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 import json
 import os
@@ -22,6 +21,7 @@ from typing import NoReturn, TextIO
 
 from tests.mutants.hand_made import ROOT, Fault
 from tests.mutants.in_memory import NotInMemory, forget_modules, forget_results, put_in_memory
+from tests.mutants.machine_code import folder_of
 from tests.mutants.order import LikelyFirst, Watch
 
 LOG = "faults-last.log"
@@ -201,7 +201,7 @@ def _in_session(work: Callable[[], int], tree: Path, folder: Path) -> NoReturn:
         log = os.open(folder / LOG, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         os.dup2(log, 1)
         os.dup2(log, 2)
-        os.environ["NUMBA_CACHE_DIR"] = str(_machine_code(tree, folder))
+        os.environ["NUMBA_CACHE_DIR"] = str(folder_of(tree, folder / "faults-compiled"))
         numba.core.config.reload_config()
         os.chdir(tree)
         sys.path[:] = [str(tree), *(path for path in sys.path if Path(path or ".").resolve() != ROOT)]
@@ -210,16 +210,6 @@ def _in_session(work: Callable[[], int], tree: Path, folder: Path) -> NoReturn:
     finally:
         sys.stdout.flush()
         os._exit(code)
-
-
-def _machine_code(tree: Path, folder: Path) -> Path:
-    """Where machine code is kept: its own place for every state of the compiled files, which take each other in."""
-    digest = hashlib.sha256()
-    for path in sorted((tree / "hdopt").rglob("*.py")):
-        text = path.read_bytes()
-        if b"njit" in text or b"closed_form" in path.name.encode():
-            digest.update(text)
-    return folder / "faults-compiled" / digest.hexdigest()[:16]
 
 
 def _pytest(file: str, plugin: object = None) -> int:

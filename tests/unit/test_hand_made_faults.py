@@ -7,11 +7,13 @@ from itertools import islice
 from pathlib import Path
 
 import pytest
+from numba.core import caching
 
 from tests.mutants import drawing, in_memory
 from tests.mutants.faults import with_sections
 from tests.mutants.hand_made import ROOT, faults_of, rooms
 from tests.mutants.ledger import asked, digest_of, is_known, keep
+from tests.mutants.machine_code import folder_of, imported
 
 FAULTS = [fault for room in rooms() for fault in faults_of(room)]
 
@@ -84,3 +86,41 @@ def test_functions_tell_that_they_were_called():
         function.__code__ = before
         del sys._fault_called  # type: ignore[attr-defined]
     assert called == [7]
+
+
+def test_machine_code_of_what_imports_a_fault_is_made_anew_and_no_other(tmp_path):
+    """Would catch a fault in a file that a kernel takes in, asked of the kernel as it was compiled without it."""
+    texts = {
+        "__init__": "",
+        "rows": "from hdopt import constants\ndef row(): pass\n",
+        "constants": "MARGIN = 1.0\n",
+        "turn": "from hdopt.rows import (\n    row,\n)\n\n@entry\ndef block(): pass\n",
+        "noise": "@njit(cache=True)\ndef filtered(): pass\n",
+    }
+    tree, kept = tmp_path / "tree", tmp_path / "compiled"
+    (tree / "hdopt").mkdir(parents=True)
+    for name, text in texts.items():
+        (tree / "hdopt" / f"{name}.py").write_text(text)
+    sound = folder_of(tree, kept)
+    assert folder_of(tree, kept) == sound
+    below = sound / caching._CacheLocator.get_suitable_cache_subpath(str(tree / "hdopt" / "turn.py"))
+    below.mkdir(exist_ok=True)
+    for name in ("turn.block-3.py311.nbi", "turn.block-3.py311.1.nbc", "noise.filtered-1.py311.nbi"):
+        (below / name).write_text(name)
+    for name in ("rows", "constants"):
+        path = tree / "hdopt" / f"{name}.py"
+        path.write_text(texts[name] + "# a fault\n")
+        faulty = folder_of(tree, kept)
+        assert faulty != sound and [one.name for one in faulty.rglob("*.nb?")] == ["noise.filtered-1.py311.nbi"], name
+        path.write_text(texts[name])
+    assert folder_of(tree, kept) == sound and len(list(below.iterdir())) == 3
+
+
+def test_a_kernel_knows_the_files_that_are_compiled_into_it():
+    sources = {path.relative_to(ROOT).as_posix(): path.read_bytes() for path in (ROOT / "hdopt").rglob("*.py")}
+    turn = imported(sources, "hdopt/simulation/turn/kernel.py")
+    beat = imported(sources, "hdopt/simulation/beat/kernel.py")
+    lanes = {f"hdopt/kinematics/lanes/{name}.py" for name in ("compiled", "minima", "motion", "single")}
+    assert turn > lanes | {f"hdopt/simulation/turn/{name}.py" for name in ("lows", "rows", "scan", "tops")}
+    assert beat > lanes | {f"hdopt/simulation/beat/{name}.py" for name in ("edges", "looks", "turns")}
+    assert not any("simulation" in name for name in imported(sources, "hdopt/kinematics/kernel.py"))
