@@ -17,10 +17,10 @@ import numpy as np
 from hdopt.arrays import Array, Index, Mask
 from hdopt.diagnosis.inference.base_excitation import driven_by, excites, is_driven, motion_of, transmitted
 from hdopt.diagnosis.inference.catalogue import explanations
-from hdopt.diagnosis.inference.newey_west import newey_west
+from hdopt.diagnosis.inference.newey_west import newey_west, reach_95
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.normal_equations import solved
-from hdopt.diagnosis.numerical import TINY
+from hdopt.diagnosis.numerical import NORMAL_95, TINY
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
 from hdopt.effects.base import Explanation
 from hdopt.effects.estimate import FitEstimate
@@ -208,7 +208,8 @@ class Fit:
 
     def covariance(self) -> Array:
         """Covariance of all parameters, robust against what the noise model misses: the larger, parameter by parameter,
-        of the model-based one and the sandwich over whole turns."""
+        of the model-based one and the sandwich over whole turns, whose variance is as much larger as makes +-1.96
+        standard deviations hold 95 %: it is known from few turns that do not hang together."""
         settings = self.problem.settings.fit
         design, residual, sigma2, inverse = self._curvature
         block = self.problem.rows.block
@@ -218,7 +219,7 @@ class Fit:
         lags = min(settings.lags_turns, len(scores) // settings.turns_a_lag)
         sandwich = inverse @ newey_west(scores, lags) @ inverse
         blocks = block[-1] + 1
-        sandwich *= blocks / max(blocks - 1, 1)
+        sandwich *= blocks / max(blocks - 1, 1) * (reach_95(lags, blocks) / NORMAL_95) ** 2
         ratio = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(inverse), TINY), 1.0))
         robust: Array = inverse * np.outer(ratio, ratio)
         return robust
