@@ -3,13 +3,15 @@
 Offsets of the sine and cosine signals make an error of one cycle a line, unequal amplitudes and a wrong phase two
 cycles (Heydemann, Applied Optics 20 (1981) 3382). With L lines a turn the orders are L and 2 L of the input (divided
 by N), or L/N and 2 L/N of the output encoder, whose phase follows the angle that it reads itself: with thousands of
-lines an arcmin of kinematic error or drift moves it by a radian. Units: arcmin at the output; lines a whole number.
+lines an arcmin of kinematic error or drift moves it by a radian. Of a whole ratio N, L lines of the input and N L of
+the output stand at the same orders. Units: arcmin at the output; lines a whole number.
 Prior: 8 to 20000 lines; fewer than 17 are rare (two to eight poles of a resolver).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,8 +37,12 @@ SEARCHED = ((1,), (1, 2), (1, 2, 3, 4))
 """Two cycles a line without the first cannot be told from one cycle of twice as many lines."""
 SHOWS = 0.01
 """Power over that of its double or triple from which a line is taken for the encoder's own."""
+WHOLE = 1e-9
+"""Relative rounding within which lines are a whole number."""
 HARMONICS_OF_TEETH = 40
 """Waves round the splines, h and h (1 + 1/N) up to so many, and the mesh order are the teeth's."""
+OTHER = "lines_of_the_other"
+"""Key of a term's shape: the lines of the other shaft's encoder at the same orders, 0 where it has none."""
 FEW_LINES, FEW_LINES_ODDS = 17, -8.0
 """Below so many lines a turn bolts and teeth are likelier than an encoder; log odds."""
 SINES = Sines(
@@ -63,6 +69,15 @@ def is_of_teeth(order: float, multiples: Sequence[int], ratio: float, output: bo
     waves = (order, order / (1 + 1 / ratio)) if output else ()
     round_a_spline = any(abs(wave - round(wave)) < 1e-6 and round(wave) <= HARMONICS_OF_TEETH for wave in waves)
     return round_a_spline or any(abs(m * order - mesh_order(ratio)) < 1e-6 for m in multiples)
+
+
+def lines_of_the_other(lines: int, ratio: float, output: bool) -> int:
+    """Lines a turn of the other shaft's encoder that stand at the same orders as these `lines` of the `output` encoder
+    or the input's, of a drive of `ratio` N; 0 where there is no whole number of them, or too few for an encoder.
+    """
+    other = lines / ratio if output else lines * ratio
+    whole = round(other)
+    return whole if whole >= LOWEST_ORDER and abs(other - whole) < WHOLE * other else 0
 
 
 class EncoderInterpolation(Effect):
@@ -133,7 +148,8 @@ class EncoderInterpolation(Effect):
         odds = FEW_LINES_ODDS if shape["lines"] < FEW_LINES else 0.0
         order = shape["lines"] / (conditions.ratio if output else 1.0)
         doubtful = is_of_teeth(order, shape["cycles"], conditions.ratio, output)
-        return Term(self.id, dict(shape), columns=columns, trials=trials, odds=odds, doubtful=doubtful)
+        other = {OTHER: lines_of_the_other(int(shape["lines"]), conditions.ratio, output)}
+        return Term(self.id, dict(shape) | other, columns=columns, trials=trials, odds=odds, doubtful=doubtful)
 
     def is_part_of(self, shape: Shape, other: Shape) -> bool:
         """Whether `shape` has the lines of an encoder of which `other` holds a multiple."""
@@ -155,15 +171,20 @@ class EncoderInterpolation(Effect):
         return {"shaft": str(shape["shaft"]), "lines": int(shape["lines"])} | sines
 
     def parameters(self, term: Term, estimate: FitEstimate) -> dict[str, Parameter]:
+        lines, other = term.shape["lines"], term.shape[OTHER]
+        both = [float(number) for number in (lines, other or lines)]
         return {
-            "lines": counted(term.shape["lines"]),
+            "lines": replace(counted(lines), low=min(both), high=max(both)),
             "amplitude_arcmin": estimate.amplitude(0, 1),
             "phase_deg": estimate.phase_deg(0, 1),
         }
 
     def sentence(self, shape: Shape, parameters: Mapping[str, Parameter], rms_arcmin: float) -> str:
+        lines, other = f"{parameters['lines'].value:.0f}", shape.get(OTHER)
+        shaft = Shaft.INPUT if shape["shaft"] == Shaft.OUTPUT else Shaft.OUTPUT
+        instead = f" (or the {shaft} encoder between its {other:.0f}, at the same orders)" if other else ""
         return (
-            f"The {shape['shaft']} encoder interpolates unevenly between its {parameters['lines'].value:.0f} lines: "
+            f"The {shape['shaft']} encoder interpolates unevenly between its {lines} lines{instead}: "
             f"{parameters['amplitude_arcmin'].value:.2g} arcmin at the output."
         )
 

@@ -282,6 +282,28 @@ def test_an_encoder_whose_second_cycle_stands_at_the_mesh_is_doubtful():
     assert spanned(effect.term(c, {**lines, "cycles": (1,)}).columns, np.sin(51 * c.theta + 0.2))
 
 
+@pytest.mark.parametrize(
+    ("lines", "shaft", "ratio", "other"),
+    [
+        (9, Shaft.INPUT, 80.0, 720),
+        (720, Shaft.OUTPUT, 80.0, 9),
+        (560, Shaft.OUTPUT, 80.0, 0),
+        (500, Shaft.OUTPUT, 80.0, 0),
+        (9, Shaft.INPUT, 79.95, 0),
+    ],
+    ids=["input", "output", "too few", "no whole number", "no whole ratio"],
+)
+def test_lines_that_stand_at_the_same_orders_on_the_other_shaft_are_said(lines, shaft, ratio, other):
+    """9 lines a turn of the input are 720 of the output at 80:1. Would catch 9 told as certain where 720 are true."""
+    effect = EFFECTS["encoder_interpolation"]
+    term = effect.term(replace(moving(), ratio=ratio), {"lines": lines, "shaft": shaft, "cycles": (1,)})
+    found = effect.parameters(term, FitEstimate(np.ones(2), np.eye(2)))
+    number = found["lines"]
+    assert (number.value, number.low, number.high) == (lines, *sorted((lines, other or lines)))
+    said = effect.sentence(term.shape, found, 0.1)
+    assert (f"between its {lines} lines" in said) and ((f"its {other}, at the same orders" in said) is bool(other))
+
+
 def test_lobes_of_a_ring_act_by_the_tangent_there_and_back():
     """30 deg, where sine and tangent are 0.500 and 0.577: 10 um of radius are 5.77 um of arc, and back."""
     effect, gear = EFFECTS["circular_spline_lobing"], SimpleNamespace(pressure_angle=math.radians(30), ratio=RATIO)
