@@ -44,6 +44,24 @@ def with_sections(page: str, written: dict[str, str]) -> str:
     return "\n".join([head.rstrip() + "\n", *(by_room[room].rstrip() + "\n" for room in sorted(by_room))])
 
 
+def summary(faults: list[Fault], found: dict[str, list[str]]) -> str:
+    """How many of all `faults` have been asked, what came, and how many answers still hold; `found` as kept."""
+    faults = [one for one in faults if not one.equivalent]
+    said = [found[one.key][0] for one in faults if one.key in found]
+    missed, left = len(said) - said.count("killed"), len(faults) - len(said)
+    noticed = "all of them are noticed" if not missed else f"all but {missed} are noticed"
+    standing = sum(is_known(one, found) for one in faults)
+    return (
+        f"Of {len(faults)} faults on the lists {len(said)} have been asked: {noticed}; {left} are not asked yet.\n"
+        f"{standing} of the answers rest on texts that stand as they stood; the other files or tests have changed.\n"
+    )
+
+
+def with_summary(page: str, text: str) -> str:
+    """`page` with `text` in place of the paragraph that says how many were asked."""
+    return re.sub(r"(?m)^Of \d+ faults on the lists (?:.+\n)+", text, page)
+
+
 def _killer_first(fault: Fault, found: dict[str, list[str]]) -> Fault:
     """`fault` with the test file first that noticed it when it was last asked."""
     by = found.get(fault.key, ["", "", ""])[2]
@@ -54,6 +72,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.mutants.faults", description=__doc__)
     parser.add_argument("rooms", nargs="*", metavar="ROOM", help=f"of {', '.join(rooms())}; all where omitted")
     parser.add_argument("--only", default="", help="only faults whose name holds this text")
+    parser.add_argument("--file", default="", help="only faults in files whose path holds this text")
     parser.add_argument("--tests", default="", help="only faults whose first test file matches this pattern")
     parser.add_argument("--afresh", action="store_true", help="ask again for those that were noticed too")
     parser.add_argument("--new", action="store_true", help="ask only for those that never were asked for")
@@ -69,6 +88,7 @@ def main() -> int:
         for fault in faults
         if not fault.equivalent
         and options.only in fault.name
+        and options.file in fault.file
         and re.search(options.tests, fault.tests[0])
         and (options.afresh or not is_known(fault, found))
         and not (options.new and fault.key in found)
@@ -85,7 +105,9 @@ def main() -> int:
     }
     print("\n".join(written.values()))
     if PAGE.exists():
-        PAGE.write_text(with_sections(PAGE.read_text(encoding="utf-8"), written), encoding="utf-8")
+        page = with_sections(PAGE.read_text(encoding="utf-8"), written)
+        every = [fault for room in rooms() for fault in faults_of(room)]
+        PAGE.write_text(with_summary(page, summary(every, found)), encoding="utf-8")
     return 0
 
 

@@ -10,7 +10,7 @@ import pytest
 from numba.core import caching
 
 from tests.mutants import drawing, in_memory
-from tests.mutants.faults import with_sections
+from tests.mutants.faults import summary, with_sections, with_summary
 from tests.mutants.hand_made import ROOT, faults_of, rooms
 from tests.mutants.ledger import asked, digest_of, is_known, keep
 from tests.mutants.machine_code import folder_of, imported
@@ -54,6 +54,18 @@ def test_a_room_that_was_run_takes_the_place_of_its_old_section():
     page = "# Head\n\nText.\n\n## beta\n\nold\n\n## gamma\n\nstays\n"
     found = with_sections(page, {"beta": "## beta\n\nnew\n", "alpha": "## alpha\n\nfirst\n"})
     assert found == "# Head\n\nText.\n\n## alpha\n\nfirst\n\n## beta\n\nnew\n\n## gamma\n\nstays\n"
+
+
+def test_the_page_says_how_many_were_asked():
+    faults = [replace(FAULTS[0], name=name, equivalent="") for name in "abc"]
+    answers = {faults[0].key: ["killed", digest_of(faults[0], faults[0].tests[:1]), faults[0].tests[0]]}
+    answers[faults[1].key] = ["survived", "", ""]
+    said = summary([*faults, replace(faults[0], name="d", equivalent="nothing to see")], answers)
+    assert said.startswith(
+        "Of 3 faults on the lists 2 have been asked: all but 1 are noticed; 1 are not asked yet.\n1 of "
+    )
+    page = "# Head\n\nOf 9 faults on the lists some\nlines.\n\nMore.\n"
+    assert with_summary(page, said) == f"# Head\n\n{said}\nMore.\n"
 
 
 def test_an_answer_holds_while_its_file_and_the_test_that_gave_it_stand(tmp_path):
