@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 import subprocess
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -19,6 +20,7 @@ from hdopt.compensation.writers import written
 from hdopt.compensation.zones import Zones
 from hdopt.recordings.read import recording_from_table
 from hdopt.workflow.compensate import compensate
+from hdopt.workflow.compensation_speeds import WORTH, _pays
 
 RATIO, TURN, NOISE, PER_TURN = 80.0, 2 * np.pi, 0.01, 40
 
@@ -121,6 +123,23 @@ def test_an_error_that_grows_with_speed_is_written_for_each(grows):
     if grows:
         assert made.found.speeds == pytest.approx((100, 200), rel=0.02)
         assert max(left_of(made, error, rpm, turns=90, back=False) for rpm in (100, 200)) < 1.1 * NOISE
+
+
+@pytest.mark.parametrize(("taken", "pays"), [(0.04, False), (0.06, True)])
+def test_terms_of_a_speed_take_a_twentieth_of_what_is_left_or_none_are_written(taken, pays):
+    """A fall of 4 % that is the same in every stretch is sure, and not worth a table of each speed."""
+    rows = SimpleNamespace(block=np.arange(400) // 4)
+    before = np.tile([1.0, -1.0], 200)
+    assert _pays(rows, before, (1 - taken) * before) is pays
+
+
+def test_a_fall_in_one_stretch_of_ten_is_chance():
+    """A tenth of the squares of all, from one stretch alone: would catch a fall that is weighed without its scatter."""
+    rows = SimpleNamespace(block=np.arange(400) // 4)
+    before = np.tile([1.0, -1.0], 200)
+    after = np.where(np.arange(400) < 40, 0.0, before)
+    assert np.std(after) < (1 - WORTH) * np.std(before)
+    assert not _pays(rows, before, after)
 
 
 RNG = np.random.default_rng(4)
