@@ -60,7 +60,7 @@ class Three(NamedTuple):
     high: float
 
 
-@compiled
+@inlined
 def _lowest_of_two(one: Three, two: Three) -> tuple[float, float]:
     """Where in -1..1 the larger of two parabolas is lowest, an end, a vertex, or where they cross; and how low."""
     slope_one, bend_one = (one.high - one.low) / 2, one.high - 2 * one.middle + one.low
@@ -99,7 +99,7 @@ def _highest(of: Three) -> tuple[float, float]:
     return x, of.middle + x * (slope + x * bend / 2)
 
 
-@compiled
+@inlined
 def _at(walk: Walk, zone: int, rim: int, place: float, phase: int) -> float:
     """Deviation of a zone at a place and phase, mm of arc."""
     value, angle = zone_at(walk, zone, rim, place)
@@ -115,51 +115,55 @@ def _narrowed(cell: Cell, x: float) -> tuple[float, float]:
     return min(cell.high - half, max(cell.low + half, centre)), half
 
 
-@compiled
+@inlined
+def _replaced(of: Three, step: int, value: float) -> Three:
+    """Three values with the one that a `step` of following looks at: 1 and 3 at the ends, all others in the middle."""
+    return Three(
+        value if step == 1 else of.low, of.middle if step == 1 or step == 3 else value, value if step == 3 else of.high
+    )
+
+
+@inlined
 def _follow_least(walk: Walk, cell: Cell, phase: int, one: Three, two: Three, best: float) -> float:
     """The lesser of `best` and the least driving deviation in a cell at one phase, of which both zones' values `one`
     and `two` at its ends are known."""
-    middle = (cell.low + cell.high) / 2
-    one = Three(one.low, _at(walk, 0, cell.one, middle, phase), one.high)
-    two = Three(two.low, _at(walk, 1, cell.two, middle, phase), two.high)
-    best = min(best, max(one.middle, two.middle))
-    x, reached = _lowest_of_two(one, two)
-    if reached - walk.beside >= best:
-        return best
-    centre, half = _narrowed(cell, x)
-    for again in range(2):
-        one_m, two_m = _at(walk, 0, cell.one, centre, phase), _at(walk, 1, cell.two, centre, phase)
-        best = min(best, max(one_m, two_m))
-        if again == 0:
-            one = Three(
-                _at(walk, 0, cell.one, centre - half, phase), one_m, _at(walk, 0, cell.one, centre + half, phase)
-            )
-            two = Three(
-                _at(walk, 1, cell.two, centre - half, phase), two_m, _at(walk, 1, cell.two, centre + half, phase)
-            )
-            best = min(best, max(one.low, two.low), max(one.high, two.high))
-            centre += half * _lowest_of_two(one, two)[0]
+    centre, half = (cell.low + cell.high) / 2, (cell.high - cell.low) / 2
+    # The middle first, then three places around the least of the parabolas, at last the least of theirs.
+    for step in range(5):
+        if step == 1 or step == 4:
+            x, reached = _lowest_of_two(one, two)
+            if step == 4:
+                centre += half * x
+            elif reached - walk.beside >= best:
+                break
+            else:
+                centre, half = _narrowed(cell, x)
+        place = centre + half * (step - 2) if 1 <= step <= 3 else centre
+        a, b = _at(walk, 0, cell.one, place, phase), _at(walk, 1, cell.two, place, phase)
+        best = min(best, max(a, b))
+        one, two = _replaced(one, step, a), _replaced(two, step, b)
     return best
 
 
-@compiled
-def _follow_largest(walk: Walk, cell: Cell, phase: int, zone: int, ends: Three, best: float) -> float:
-    """The larger of `best` and the largest deviation of a zone in a cell at one phase, of which its values at the
-    `ends` are known."""
+@inlined
+def _follow_largest(walk: Walk, cell: Cell, phase: int, zone: int, of: Three, best: float) -> float:
+    """The larger of `best` and the largest deviation of a zone in a cell at one phase, of which its values `of` at the
+    ends are known."""
+    centre, half = (cell.low + cell.high) / 2, (cell.high - cell.low) / 2
     rim = cell.one if zone == 0 else cell.two
-    of = Three(ends.low, _at(walk, zone, rim, (cell.low + cell.high) / 2, phase), ends.high)
-    best = max(best, of.middle)
-    x, reached = _highest(of)
-    if reached + walk.beside <= best:
-        return best
-    centre, half = _narrowed(cell, x)
-    for again in range(2):
-        value = _at(walk, zone, rim, centre, phase)
+    for step in range(5):
+        if step == 1 or step == 4:
+            x, reached = _highest(of)
+            if step == 4:
+                centre += half * x
+            elif reached + walk.beside <= best:
+                break
+            else:
+                centre, half = _narrowed(cell, x)
+        place = centre + half * (step - 2) if 1 <= step <= 3 else centre
+        value = _at(walk, zone, rim, place, phase)
         best = max(best, value)
-        if again == 0:
-            of = Three(_at(walk, zone, rim, centre - half, phase), value, _at(walk, zone, rim, centre + half, phase))
-            best = max(best, of.low, of.high)
-            centre += half * _highest(of)[0]
+        of = _replaced(of, step, value)
     return best
 
 
@@ -188,13 +192,18 @@ def _least_in(walk: Walk, lanes: Array, cell: Cell, best: float) -> float:
         one, two = one_a[p] if one_a[p] < one_b[p] else one_b[p], two_a[p] if two_a[p] < two_b[p] else two_b[p]
         values[p], floors[p] = a if a < b else b, one if one > two else two
     best = min(best, least_of(values, phases))
-    if least_of(floors, phases) - walk.margin >= best:
-        return best
     for p in range(phases):
-        if max(min(one_a[p], one_b[p]), min(two_a[p], two_b[p])) - walk.margin < best:
-            if _least_of_lines(one_a[p], two_a[p], one_b[p], two_b[p]) - walk.margin < best:
-                one, two = Three(one_a[p], 0.0, one_b[p]), Three(two_a[p], 0.0, two_b[p])
-                best = _follow_least(walk, cell, p, one, two, best)
+        values[p] = floors[p]
+    lowest = least_of(values, phases)
+    # The most promising phase first: what it finds rules others out.
+    for promising in (True, False):
+        if lowest - walk.margin >= best:
+            return best
+        for p in range(phases):
+            if (floors[p] == lowest) == promising and floors[p] - walk.margin < best:
+                if _least_of_lines(one_a[p], two_a[p], one_b[p], two_b[p]) - walk.margin < best:
+                    one, two = Three(one_a[p], 0.0, one_b[p]), Three(two_a[p], 0.0, two_b[p])
+                    best = _follow_least(walk, cell, p, one, two, best)
     return best
 
 
@@ -212,9 +221,12 @@ def _largest_in(walk: Walk, lanes: Array, cell: Cell, best: float) -> float:
             values[p] = -(low[p] if low[p] > high[p] else high[p])
         largest = -least_of(values, phases)
         best = max(best, largest)
-        if largest + walk.margin > best:
+        for promising in (True, False):
+            if largest + walk.margin <= best:
+                break
             for p in range(phases):
-                if max(low[p], high[p]) + walk.margin > best:
+                value = low[p] if low[p] > high[p] else high[p]
+                if (value == largest) == promising and value + walk.margin > best:
                     best = _follow_largest(walk, cell, p, zone, Three(low[p], 0.0, high[p]), best)
     return best
 
@@ -271,6 +283,13 @@ def _floor_in(walk: Walk, cell: Cell) -> float:
     return floor_of(walk.comb, one, two, turned) - walk.margin
 
 
+@inlined
+def _ceiling_in(walk: Walk, cell: Cell) -> float:
+    """What neither zone rises above in a cell."""
+    ends = max(max(cell.one_low, cell.one_high), max(cell.two_low, cell.two_high))
+    return ends + walk.margin + walk.comb.largest
+
+
 @compiled
 def _cut_cells(work: Work, count: int) -> int:
     """Fill `cuts` of `work` with the cells that its `count` changes of rims cut, and take these out of the whole ones;
@@ -324,7 +343,8 @@ def extremes_in_lanes(walk: Walk, work: Work) -> tuple[float, float]:
         cell = _cut(walk, work.cuts, i)
         if _floor_in(walk, cell) < least:
             least = _least_in(walk, lanes, cell, least)
-        largest = _largest_in(walk, lanes, cell, largest)
+        if _ceiling_in(walk, cell) > largest:
+            largest = _largest_in(walk, lanes, cell, largest)
     for j in range(grid.shape[1] - WRAPPED):
         if grid[FLOOR, j + BEFORE] < least and j != lowest:
             least = _least_in(walk, lanes, _whole(grid, j), least)

@@ -139,18 +139,31 @@ def second_difference(table: Array, stride: int) -> float:
 def differences(table: Array, stride: int) -> tuple[float, float]:
     """Largest second and third difference of a periodic `table` (n,) over so many of its places (`stride`), in its
     unit."""
-    n, second, third = len(table), 0.0, 0.0
-    longer = np.empty(n + 3 * stride)
+    n = len(table)
+    longer, seconds, thirds = np.empty(n + 3 * stride), np.empty(n), np.empty(n)
     for i in range(n):
         longer[i] = table[i]
     for i in range(3 * stride):
-        longer[n + i] = table[i % n]
+        longer[n + i] = longer[i]
     b, c, d = longer[stride:], longer[2 * stride :], longer[3 * stride :]
     for i in range(n):
         near, far = longer[i] - 2 * b[i] + c[i], b[i] - 2 * c[i] + d[i]
-        one, two = abs(near), abs(far - near)
-        second, third = second if second > one else one, third if third > two else two
-    return second, third
+        seconds[i], thirds[i] = -abs(near), -abs(far - near)
+    return -least_of(seconds, n), -least_of(thirds, n)
+
+
+@compiled
+def _range_of(table: Array) -> tuple[float, float, float]:
+    """Least and largest value of a periodic `table` (n,), and its largest step from one place to the next."""
+    n = len(table)
+    values, opposite, steps = np.empty(n), np.empty(n), np.empty(n)
+    after = table[1:]
+    for i in range(n):
+        values[i], opposite[i] = table[i], -table[i]
+    for i in range(n - 1):
+        steps[i] = -abs(after[i] - table[i])
+    steps[n - 1] = -abs(table[0] - table[n - 1])
+    return least_of(values, n), -least_of(opposite, n), -least_of(steps, n)
 
 
 @compiled
@@ -182,7 +195,7 @@ def fill_comb(table: Array, phases: int, stride: int, rows: Array, floor: Array)
     `floor` (K,); `stride` is a grid angle in places of the table."""
     n = len(table)
     apart = n // phases
-    least, largest, slope = math.inf, -math.inf, abs(table[0] - table[n - 1])
+    least, largest, step = _range_of(table)
     for row in range(apart):
         for column in range(phases):
             value = table[column * apart + row]
@@ -191,17 +204,10 @@ def fill_comb(table: Array, phases: int, stride: int, rows: Array, floor: Array)
         rows[0, column] = rows[apart, column - 1 if column > 0 else 2 * phases - 1]
         for i in range(WRAPPED - BEFORE):
             rows[apart + BEFORE + i, column] = rows[BEFORE + i, column + 1 if column + 1 < 2 * phases else 0]
-    before = table[: n - 1]
-    after = table[1:]
-    for i in range(n - 1):
-        step = abs(after[i] - before[i])
-        slope = slope if slope > step else step
-    for i in range(n):
-        least, largest = least if least < table[i] else table[i], largest if largest > table[i] else table[i]
     reach = 1.01 * (largest - least) + TINY
     _fill_floor(table, reach, floor)
     bend, bow = differences(table, stride)
-    return Comb(rows, floor, reach, least, largest, slope * n * PER_RAD, bend, bow)
+    return Comb(rows, floor, reach, least, largest, step * n * PER_RAD, bend, bow)
 
 
 @inlined
