@@ -114,19 +114,19 @@ class Study:
             material = None if given is None else given.build()
         with self._placed("load"):
             load = (self.find("load", LoadSection) or LoadSection()).build()
-        cs_teeth = self._teeth("cs_teeth", geometry.circular_spline_teeth)
-        fs_teeth = self._teeth("fs_teeth", geometry.flexspline_teeth)
+        cs_teeth = self._teeth("cs_teeth", geometry.circular_spline_teeth, geometry.module)
+        fs_teeth = self._teeth("fs_teeth", geometry.flexspline_teeth, geometry.module)
         with self._placed("cs_roundness"):
             ring = self.find("cs_roundness", RoundnessSection)
             roundness = None if ring is None else ring.build(self.folder)
         return Drive(geometry, wave_generator, clearances, material, load, cs_teeth, fs_teeth, roundness)
 
-    def _teeth(self, name: str, teeth: int) -> MeasuredTeeth | None:
+    def _teeth(self, name: str, teeth: int, module: float) -> MeasuredTeeth | None:
         from hdopt.study.drive import TeethSection
 
         with self._placed(name):
             section = self.find(name, TeethSection)
-            return None if section is None else section.build(teeth, self.folder)
+            return None if section is None else section.build(teeth, module, self.folder)
 
     @property
     def measured_instead(self) -> tuple[str, ...]:
@@ -258,12 +258,29 @@ def load_study(source: str | Path | None = None, overrides: Sequence[str] = (), 
     `source` is a TOML file or a shipped study's name; `drive` a shipped drive, which takes the place of the study's
     own; with neither, the shipped CSF-25-80. A study that names a shipped drive (`drive = "csf-25-80"`) starts from
     all that ships with it, and its own keys replace the shipped ones, key by key. `overrides` are KEY=VALUE with the
-    key's last name or dotted path. Raises `HdoptError` with file, line and key for anything that cannot be used.
+    key's last name or dotted path; a file that they name lies beside the study, or where hdopt was called. Raises
+    `HdoptError` with file, line and key for anything that cannot be used.
     """
     document, name, folder = study_document(source, drive)
     given = str(Path(source).resolve()) if source is not None and _is_file(Path(source)) else source
-    recipe = {"source": given, "overrides": list(overrides), "drive": drive}
+    overrides = [_with_whole_path(override, folder) for override in overrides]
+    recipe = {"source": given, "overrides": overrides, "drive": drive}
     return replace(study_of(apply_overrides(document, overrides), name, folder), recipe=recipe)
+
+
+def _with_whole_path(override: str, folder: Path) -> str:
+    """KEY=VALUE with the whole path where the key is a file's, which does not lie in the study's `folder` but where
+    hdopt was called: there a shell completes what is typed."""
+    key, _, value = override.partition("=")
+    path = Path(value.strip().strip("\"'"))
+    if (
+        key.strip().rpartition(".")[2] != "file"
+        or path.is_absolute()
+        or (folder / path).is_file()
+        or not path.is_file()
+    ):
+        return override
+    return f"{key}={path.resolve()}"
 
 
 def study_document(source: str | Path | None = None, drive: str | None = None) -> tuple[Document, str, Path]:

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from hdopt.arrays import Array
 from hdopt.drive.errors import PHASE_OF, STUDY_KEYS, DriveErrors, study_key
 from hdopt.drive.geometry import Clearances, DriveGeometry, Load, Material, Structure, WaveGenerator
 from hdopt.drive.profiles import Ellipse, MeasuredProfile, Resal, TwoDisk, WaveGeneratorProfile, parallel_profile
@@ -173,21 +174,29 @@ class TeethSection(Section):
     sine: Literal["instead", "beside"] = "instead"
     """Whether the table stands instead of the spline's tooth amplitude in [errors] and [tolerances], or beside it."""
 
-    def build(self, teeth: int, folder: Path) -> MeasuredTeeth:
-        """The record for a spline of so many `teeth`; the file lies in `folder`."""
+    def build(self, teeth: int, module: float, folder: Path) -> MeasuredTeeth:
+        """The record for a spline of so many `teeth` of a `module`, mm; the file lies in `folder`."""
         path = folder / self.file
+        first = math.radians(self.first_tooth_deg)
+        measured = MeasuredTeeth.of(self._values(teeth, path), self.deviation, first, self.recentre, source=self.file)
+        pitch = math.pi * module
+        if measured.largest_single > pitch / 2:
+            raise HdoptError(
+                f"{path}: a tooth is {1000 * measured.largest_single:.0f} um off its neighbour's pitch of "
+                f"{1000 * pitch:.0f} um; deviations must be in um"
+            )
+        return measured
+
+    def _values(self, teeth: int, path: Path) -> Array:
         if path.suffix.lower() == ".xml":
             if self.flank is not None:
                 raise HdoptError(f"{path} is XML: its flank is said by xml_path, [@attribute='value']; leave flank out")
             from hdopt.drive.teeth_xml import read_teeth_xml
 
-            values = read_teeth_xml(path, teeth, self.xml_path, self.xml_unit)
-        elif self.xml_path is not None or self.xml_unit is not None:
+            return read_teeth_xml(path, teeth, self.xml_path, self.xml_unit)
+        if self.xml_path is not None or self.xml_unit is not None:
             raise HdoptError(f"{path} is no XML file (.xml): leave xml_path and xml_unit out")
-        else:
-            values = read_teeth(path, teeth, self.flank)
-        first = math.radians(self.first_tooth_deg)
-        return MeasuredTeeth.of(values, self.deviation, first, self.recentre, source=self.file)
+        return read_teeth(path, teeth, self.flank)
 
 
 class RoundnessSection(Section):

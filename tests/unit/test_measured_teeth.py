@@ -10,6 +10,7 @@ from cases import BASE_ERRORS, drive
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.teeth import MeasuredTeeth, read_teeth
 from hdopt.drive.values import DriveError
+from hdopt.errors import HdoptError
 from hdopt.kinematics.extremes import converged_peak_to_peak_arcmin, extremes_arcmin
 from hdopt.kinematics.load_sharing import LoadSharing, mesh_range, mesh_tables
 from hdopt.kinematics.waveform import kinematic_error_arcmin
@@ -143,6 +144,30 @@ def study_with_teeth(tmp_path):
     (tmp_path / "cs.csv").write_text(f"tooth,flank,fp_um\n{rows}\n")
     (tmp_path / "mine.toml").write_text('drive = "csf-25-80"\n[cs_teeth]\nfile = "cs.csv"\ndeviation = "single"\n')
     return tmp_path / "mine.toml"
+
+
+def test_a_file_that_set_names_lies_beside_the_study_or_here(study_with_teeth, monkeypatch):
+    """A shell completes paths from where it is; what lies beside the study goes before. `csf-25-80` lies where hdopt is
+    installed: a table found there alone would never be the user's."""
+    monkeypatch.chdir(study_with_teeth.parent)
+    given = ["cs_teeth.file=cs.csv", "cs_teeth.deviation=single"]
+    here = load_study("csf-25-80", given)
+    assert here.drive.cs_teeth.deviations == load_study(study_with_teeth).drive.cs_teeth.deviations
+    monkeypatch.chdir("/")
+    assert load_study("csf-25-80", here.recipe["overrides"]).drive == here.drive
+    assert load_study(study_with_teeth, given).drive == load_study(study_with_teeth).drive
+    with pytest.raises(HdoptError, match="cannot be read"):
+        load_study("csf-25-80", given).drive  # noqa: B018
+
+
+def test_deviations_beyond_the_pitch_are_no_micrometres(study_with_teeth):
+    """The same table in nanometres: 1,635 arcmin were answered without a word."""
+    table = study_with_teeth.parent / "cs.csv"
+    head, *rows = table.read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    table.write_text("\n".join([head, *(f"{tooth},{side},{1000 * float(value)}" for tooth, side, value in cells)]))
+    with pytest.raises(HdoptError, match="cs_teeth.*off its neighbour's pitch of .* um; deviations must be in um"):
+        load_study(study_with_teeth).drive  # noqa: B018
 
 
 def test_a_study_takes_measured_teeth(study_with_teeth):
