@@ -69,9 +69,13 @@ def test_lanes_find_what_every_turn_for_itself_has(effects, finely):
 LOBES = EffectValues("circular_spline_lobing", {"lobes": 6}, (0.001, 0.0005))
 
 
-def test_a_drive_counts_for_itself_alone():
-    """To the bit, whatever stands beside it in its block and list."""
-    rows, table = random_errors(300, seed=2, scale=3.0).to_matrix(), tabulate(DRIVE, [LOBES], Operation())
+IN_ZONES = next(keys for name, keys in EXAMPLES if name == "tooth_mesh" and "zone_1_amplitude_um" in keys)
+
+
+@pytest.mark.parametrize("effect", [LOBES, values_of("tooth_mesh", IN_ZONES)], ids=["lobes", "ripple"])
+def test_a_drive_counts_for_itself_alone(effect):
+    """To the bit, whatever stands beside it in its block and list, also part by part of a cell."""
+    rows, table = random_errors(300, seed=2, scale=3.0).to_matrix(), tabulate(DRIVE, [effect], Operation())
     found, order = stacked_peak_to_peak_arcmin(DRIVE, rows, table), np.random.default_rng(0).permutation(300)
     assert (stacked_peak_to_peak_arcmin(DRIVE, rows[order], table) == found[order]).all()
     assert (stacked_peak_to_peak_arcmin(DRIVE, rows[7:8], table) == found[7:8]).all()
@@ -103,6 +107,19 @@ def test_any_structure_and_smooth_profile(profile, structure):
     assert np.quantile(off, 0.99) < 1e-3
     # Held along the minor axis, turns are taken one by one, and still a stretch too short to see may be believed.
     assert off.max() < (1e-2 if structure is Structure.ONE_WAY_MINOR else 5e-3)
+
+
+def test_what_ripples_is_bounded_by_its_envelope():
+    """No wave of the mesh, twice as many as parts would need, may leave what the scan grants a cell: seen at places
+    that are no cell's edge."""
+    table = tabulate(DRIVE, [values_of("tooth_mesh", IN_ZONES)], FORWARD)
+    (turn,), _ = table.in_lanes(GEAR.arcmin_per_mm, GEAR.beat_phases, GEAR.flexspline_advance)
+    cells = len(turn.scan.below)
+    assert len(turn.fine.below) == turn.fine.parts * cells > 8 * cells
+    least, greatest = table.cs.min(), table.cs.max()
+    # What is slow is nothing here, so that the envelope is all: half as much again would look at cells for nothing.
+    assert (turn.scan.below >= -least).all() and (turn.scan.below < -1.1 * least).all()
+    assert (turn.scan.above >= greatest).all() and (turn.scan.above < 1.1 * greatest).all()
 
 
 def test_k_e_evens_out_the_zones_and_not_what_is_beside():

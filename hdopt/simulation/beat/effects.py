@@ -15,6 +15,7 @@ from hdopt.simulation.turn.effects import (
     FEWEST_CELLS,
     LEFT_BY_CELL,
     LEFT_BY_PLACE,
+    NO_PARTS,
     OVERLAP,
     Scan,
     Turn,
@@ -80,6 +81,7 @@ def beat_of(zones: Array, cs: Array, fs: Array, turns: int, advance: float, per_
     bounds, scan = _bounds(zones, of_fs if fs.size else None, of_cs, (turns, cells), advance)
     turn = Turn(
         scan,
+        NO_PARTS,
         singles(rows.transpose(2, 0, 1).reshape(-1, 6)[::every]),
         on_cs if cs.size else on_cs[:0],
         cs_bend=single(largest(of_cs, 2)),

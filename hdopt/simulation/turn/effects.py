@@ -17,8 +17,14 @@ from hdopt.kinematics.lanes.single import single
 FEWEST_CELLS, MOST_CELLS = 96, 4096
 LEFT_BY_CELL, LEFT_BY_PLACE = 1e-4, 2e-5
 """What a parabola of an effect may leave within half a cell, and within half a place of the table, arcmin."""
+RIPPLE_FROM = 8 * FEWEST_CELLS
+"""So many cells and more are first bounded by the envelope of what is fast."""
+SLOW_CELLS, SLOWEST = 2 * FEWEST_CELLS, 12
+"""Cells that what is slow may ask for, and the highest order that may count as slow."""
 IN_CELL = 16
 """Places of a cell at which what goes beyond its chord is looked for."""
+WIDER = 1.2
+"""How much more of the CS a zone may pass than the wave generator turns: offsets as shipped change by 0.04 a rad."""
 REPEATS = 1e-7
 """arcmin by which turns may differ and still repeat: rounding of the input angle in effects of a high order."""
 OVERLAP, FARTHEST = 1.5, 0.12
@@ -44,12 +50,29 @@ class Scan(NamedTuple):
     step: float
 
 
+class Fine(NamedTuple):
+    """Cells for effects that ripple, `parts` of each cell of the scan, which then bounds these by what is slow and the
+    envelope of the rest; no parts where the scan tells all. Cosine and sine of the edges (n + 1,). `edges` (n + 1, 2),
+    mm of arc: of the effects that do not stand on the CS the mean of both zones and half their difference. How far all
+    go below and above their chord, (n,). The width of a part, rad."""
+
+    parts: int
+    cos: Singles
+    sin: Singles
+    edges: Singles
+    below: Singles
+    above: Singles
+    width: float
+
+
 class Turn(NamedTuple):
-    """Effects of one direction over an input turn: the `scan`; value (mm of arc), slope and curvature (per rad) in zone
-    1, then in zone 2, on even places of the input angle, `fixed` (n, 6), and of the CS, `cs` (m, 6) or (0, 6); of the
-    latter the largest curvature and slope, and the range; how far a parabola is followed, rad."""
+    """Effects of one direction over an input turn: the `scan`, with its `fine` parts; value (mm of arc), slope and
+    curvature (per rad) in zone 1, then in zone 2, on even places of the input angle, `fixed` (n, 6), and of the CS,
+    `cs` (m, 6) or (0, 6); of the latter (where there are parts, of what is slow on it) the largest curvature and slope,
+    and the range; how far a parabola is followed, rad."""
 
     scan: Scan
+    fine: Fine
     fixed: Singles
     cs: Singles
     cs_bend: float
@@ -73,17 +96,67 @@ def turn_of(zones: Array, cs: Array, turns: int, per_mm: float) -> Turn | None:
         return None
     places = max(folded.shape[2], parts(bend, LEFT_BY_PLACE))
     tables = [table_of(spectrum, places) for spectrum in (fixed, on_cs)]
-    width = 2 * math.pi / cells
     of_cs = tables[1] if cs.size else tables[1][:0]
+    if cells >= RIPPLE_FROM:
+        scan, fine, slow_cs = _with_parts(fixed, on_cs, cells, per_mm)
+        width = fine.width
+    else:
+        scan, fine, slow_cs, width = scan_of(fixed, on_cs, cells), NO_PARTS, on_cs, 2 * math.pi / cells
     return Turn(
-        scan_of(fixed, on_cs, cells),
+        scan,
+        fine,
         tables[0],
         of_cs,
-        cs_bend=single(largest(on_cs, 2)),
-        cs_slope=single(largest(on_cs, 1)),
-        cs_range=single(float(np.ptp(tables[1][:, [0, 3]]))),
+        cs_bend=single(largest(slow_cs, 2)),
+        cs_slope=single(largest(slow_cs, 1)),
+        cs_range=single(float(np.ptp(derived(slow_cs, 0, len(tables[1]))))),
         reach=single(min(FARTHEST, OVERLAP / 2 * width)),
     )
+
+
+def _with_parts(fixed: Array, on_cs: Array, cells: int, per_mm: float) -> tuple[Scan, Fine, Array]:
+    """The scan of what is slow of two spectra, widened by the envelope of what is fast, its parts, so that they are
+    `cells` at least, and what is slow on the CS."""
+
+    def wanted(highest: int) -> int:
+        bend = per_mm * sum(largest(_orders(x, 0, highest), 3) for x in (fixed, on_cs))
+        return max(FEWEST_CELLS, parts(bend, LEFT_BY_CELL))
+
+    highest = next((n for n in range(SLOWEST, 0, -1) if wanted(n) <= SLOW_CELLS), 0)
+    coarse = wanted(highest)
+    each = math.ceil(cells / coarse)
+    (slow, fast), (slow_cs, fast_cs) = (
+        (_orders(x, 0, highest), _orders(x, highest + 1, x.shape[1])) for x in (fixed, on_cs)
+    )
+    scan = scan_of(slow, slow_cs, coarse)
+    inside = math.ceil(IN_CELL * max(fixed.shape[1], on_cs.shape[1]) / coarse)
+    left = (2 * math.pi / (coarse * inside)) ** 2 / 8 * largest(fast, 2)
+    waves = derived(fast, 0, coarse * inside).reshape(2, coarse, inside)
+    first = np.roll(waves[:, :, 0], -1, axis=1)
+    beside = derived(fast_cs, 0, IN_CELL * fast_cs.shape[1])
+    lowest = np.minimum(waves.min(axis=(0, 2)), first.min(axis=0)) - left + float(beside.min())
+    highest_of = np.maximum(waves.max(axis=(0, 2)), first.max(axis=0)) + left + float(beside.max())
+    scan = scan._replace(below=singles(scan.below - lowest), above=singles(scan.above + highest_of))
+    width = 2 * math.pi / (coarse * each)
+    all_fixed = scan_of(fixed, np.zeros((2, 2), complex), coarse * each)
+    sag = (WIDER * width) ** 2 / 8 * largest(on_cs, 2)
+    fine = Fine(
+        each,
+        all_fixed.cos,
+        all_fixed.sin,
+        np.ascontiguousarray(all_fixed.edges[:, :2]),
+        all_fixed.below + single(sag),
+        all_fixed.above + single(sag),
+        single(width),
+    )
+    return scan, fine, slow_cs
+
+
+def _orders(spectrum: Array, first: int, last: int) -> Array:
+    """Only the orders of a `spectrum` from `first` to `last`."""
+    found: Array = np.zeros_like(spectrum)
+    found[:, first : last + 1] = spectrum[:, first : last + 1]
+    return found
 
 
 def spectrum_of(values: Array) -> Array:
@@ -150,3 +223,8 @@ def scan_of(fixed: Array, on_cs: Array, cells: int) -> Scan:
 def singles(values: Array) -> Singles:
     """`values` of any shape in single precision, row by row."""
     return np.ascontiguousarray(values, dtype=np.float32)
+
+
+_NONE: Singles = np.zeros(0, np.float32)
+NO_PARTS = Fine(0, _NONE, _NONE, np.zeros((0, 2), np.float32), _NONE, _NONE, single(0.0))
+"""Where the scan tells all."""

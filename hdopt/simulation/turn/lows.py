@@ -95,8 +95,9 @@ def _look(work: Singles, groups: int, design: Design, reach: float) -> None:
 
 
 @compiled
-def _look_at_list(work: Singles, lanes: Index, count: int, design: Design, turn: Turn) -> None:
-    """Lower the least of the drives in the first `count` of `lanes` to what lies near the places of the list."""
+def look_at_list(work: Singles, lanes: Index, count: int, design: Design, turn: Turn) -> None:
+    """Lower the least of the drives in the first `count` of `lanes` to what lies near the places of the list in
+    `work`, under a `design` with the effects of a `turn`."""
     groups = fill_list(work, lanes, count)
     for _ in range(LOOKS):
         _meet(work, groups * GROUP, design, turn)
@@ -109,8 +110,9 @@ def _look_at_list(work: Singles, lanes: Index, count: int, design: Design, turn:
 
 
 @compiled
-def _look_again(work: Singles, lanes: Index, design: Design, turn: Turn) -> None:
-    """Look once more where the least was found: seen from afar it may have seemed too low."""
+def look_again(work: Singles, lanes: Index, design: Design, turn: Turn) -> None:
+    """Look once more where the least of the drives of `work` was found, with `lanes`, `design` and `turn` as before:
+    seen from afar it may have seemed too low."""
     for i in range(LANES):
         work[LIST + ANGLE + i], lanes[i] = work[LEAST_AT + i], i
     groups = fill_list(work, lanes, LANES)
@@ -128,7 +130,7 @@ def find_least(work: Singles, lanes: Index, design: Design, turn: Turn) -> None:
     for i in range(LANES):
         work[LEAST + i] = HUGE
         work[LIST + ANGLE + i], lanes[i] = middle(work[LOWEST_AT + i], cells), i
-    _look_at_list(work, lanes, LANES, design, turn)
+    look_at_list(work, lanes, LANES, design, turn)
     # Against what the first look found: so no drive's value depends on when the list was full.
     for i in range(LANES):
         work[LEAST_SEEN + i] = work[LEAST + i] + work[MARGIN + i]
@@ -143,8 +145,8 @@ def find_least(work: Singles, lanes: Index, design: Design, turn: Turn) -> None:
                 work[LIST + ANGLE + count], lanes[count] = middle(cell, cells), i
                 count += 1
                 if count == LANES:
-                    _look_at_list(work, lanes, count, design, turn)
+                    look_at_list(work, lanes, count, design, turn)
                     count = 0
     if count:
-        _look_at_list(work, lanes, count, design, turn)
-    _look_again(work, lanes, design, turn)
+        look_at_list(work, lanes, count, design, turn)
+    look_again(work, lanes, design, turn)

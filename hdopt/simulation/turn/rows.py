@@ -60,9 +60,17 @@ OFFSETS = SWING + 18 * LANES
 """A bound of the offsets o and o', rad."""
 SLACK = SWING + 19 * LANES
 """How far a branch may lie beyond a straight line over a cell, mm of arc."""
-LIST = SWING + 20 * LANES
+T_THEN, D_THEN, M_THEN = (SWING + LANES * row for row in range(20, 23))
+"""t, d and the effects' mean at the edge in hand, where cells have parts."""
+RIM_NEAR = SWING + 23 * LANES
+"""How near to nought t is where either rim may drive, mm of arc."""
+FINE_AT = SWING + 24 * LANES
+"""Which part was looked at first."""
+LIST = SWING + 25 * LANES
 """The second area: places to look at, dense."""
-BOUNDS = LIST + AREA
+NEAR = LIST + AREA
+"""The third area: drives whose parts of a cell are bounded, dense, with the rows of the first."""
+BOUNDS = NEAR + LIST
 """Bounds of all cells: a row of low ones and one of high ones each."""
 
 

@@ -60,8 +60,9 @@ def fill_parts(work: Singles, design: Design, turn: Turn) -> None:
 
 
 @inlined
-def _lower(work: Singles, i: int, t: float, d: float, m: float) -> float:
-    """The least of the lower bound between the edge before and one with these `t`, `d` and `m`."""
+def least_of_cell(work: Singles, i: int, t: float, d: float, m: float) -> float:
+    """The least of the lower bound of lane `i` of `work` between the edge before and one with these `t`, `d` and `m`,
+    mm of arc."""
     t0, d0, m0, a = work[i + T], work[i + D], work[i + M], work[i + FS]
     dt, dd, dm = t - t0, d - d0, m - m0
     least = min(abs(t0) + m0 + max(ZERO, abs(d0) - a), abs(t) + m + max(ZERO, abs(d) - a))
@@ -90,7 +91,7 @@ def scan(work: Singles, turn: Turn) -> None:
             t = work[i + T_COS] * cos + work[i + T_SIN] * sin + work[i + T_0]
             d = work[i + D_COS] * cos + work[i + D_SIN] * sin + work[i + D_0] + d_g + o * d_o
             m = m_g + o * m_o
-            low = _lower(work, i, t, d, m) - below
+            low = least_of_cell(work, i, t, d, m) - below
             before = abs(work[i + T]) + work[i + M] + abs(work[i + D])
             high = max(before, abs(t) + m + abs(d)) + work[i + FS] + above
             work[i + T], work[i + D], work[i + M], work[i + LOW], work[i + HIGH] = t, d, m, low, high

@@ -98,8 +98,9 @@ def _measure(work: Singles, groups: int, design: Design, reach: float) -> None:
 
 
 @compiled
-def _look_at_list(work: Singles, lanes: Index, count: int, design: Design, turn: Turn) -> None:
-    """Raise the greatest of the drives in the first `count` of `lanes` to what lies near the places of the list."""
+def look_at_list(work: Singles, lanes: Index, count: int, design: Design, turn: Turn) -> None:
+    """Raise the greatest of the drives in the first `count` of `lanes` to what lies near the places of the list in
+    `work`, under a `design` with the effects of a `turn`."""
     groups = fill_list(work, lanes, count)
     _meet(work, groups * GROUP, design, turn)
     _find(work, groups, design, turn.reach)
@@ -146,7 +147,7 @@ def find_greatest(work: Singles, lanes: Index, design: Design, turn: Turn) -> No
         work[LIST + ANGLE + i], lanes[i] = middle(work[HIGHEST_AT + i], cells), i
         s, k, _, _ = _signs(work, i, turn, int(work[HIGHEST_AT + i]))
         work[ZONE_AT + i], work[RIM_AT + i], work[LIST + ZONE + i], work[LIST + RIM + i] = s, k, s, k
-    _look_at_list(work, lanes, LANES, design, turn)
+    look_at_list(work, lanes, LANES, design, turn)
     for i in range(LANES):
         work[GREATEST_SEEN + i] = work[GREATEST + i] - work[MARGIN + i]
     for g in range(cells):
@@ -159,7 +160,7 @@ def find_greatest(work: Singles, lanes: Index, design: Design, turn: Turn) -> No
             if work[slot + i] > work[GREATEST_SEEN + i]:
                 count = _list_cell(work, lanes, count, turn, i, g, work[slot + i] - work[GREATEST_SEEN + i])
                 if count + 4 > LANES:
-                    _look_at_list(work, lanes, count, design, turn)
+                    look_at_list(work, lanes, count, design, turn)
                     count = 0
     if count:
-        _look_at_list(work, lanes, count, design, turn)
+        look_at_list(work, lanes, count, design, turn)
