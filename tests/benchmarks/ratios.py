@@ -44,6 +44,8 @@ def table(run: dict) -> str:
     teeth = measured.get("test_measured_teeth_against_the_sines", {}).get("extra_info", {})
     if "times_the_sine" in teeth:
         rows.append(f"| a drive with measured teeth over one with sines | {teeth['times_the_sine']:.3g} |")
+    if "own_times_the_sine" in teeth:
+        rows.append(f"| the same, each drive with teeth of its own | {teeth['own_times_the_sine']:.3g} |")
     exact = measured.get("test_against_the_exact_geometry", {}).get("extra_info", {})
     if "largest" in exact:
         what = f"largest difference from the exact geometry, of {exact['drives']} random drives, arcmin"
