@@ -475,6 +475,9 @@ class VerdictSettings:
         0.04, "1", "choice: share of the noise power below which structure is left alone"
     )
     base_floor: float = threshold(0.0025, "1", "choice: the same as share of the base's power")
+    unequal_teeth: float = threshold(
+        0.01, "1", "choice: share of a mesh's power that teeth which differ by a tenth or so leave below its orders"
+    )
     heldout_over_floor: float = threshold(
         1.4, "1", "measured: held-out error over noise floor is below it in 19 of 19 right names on the bench"
     )

@@ -37,6 +37,20 @@ def test_noise_of_neighbours_is_that_of_the_samples():
     assert noise_between_neighbours(records) == pytest.approx(0.3, rel=0.02)
 
 
+def test_a_ripple_that_was_found_is_no_noise_between_neighbours(monkeypatch):
+    """A mesh of two and a half samples a wave, thirty times the noise. Would catch effects beside it that are taken for
+    less than the sensors resolve."""
+    asked = []
+    monkeypatch.setattr(assessment, "noise_between_neighbours", lambda recordings: asked.append(recordings) or 0.02)
+    told = state(0.0 * THETA)
+    ripple = 0.6 * np.sin(19 * THETA)
+    (recording,) = told.recordings
+    with_mesh = replace(recording, error_arcmin=recording.error_arcmin + ripple)
+    assess(replace(told, recordings=(with_mesh,), ripple=ripple))
+    ((cleaned,),) = asked
+    np.testing.assert_allclose(cleaned.error_arcmin, recording.error_arcmin, atol=1e-12)
+
+
 def wave(trials=1.0):
     columns = np.column_stack([np.sin(3.5 * THETA), np.cos(3.5 * THETA)])
     return Term("output_coupling", {}, columns=columns, trials=trials)

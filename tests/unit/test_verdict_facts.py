@@ -267,6 +267,16 @@ def test_a_basis_without_physics_that_predicts_better_alone_wins(changes, said):
     assert beaten_by_generic(found) is said
 
 
+@pytest.mark.parametrize(("ripple", "said"), [({"tooth_mesh": 8.0}, True), ({"tooth_mesh": 10.0}, False)])
+def test_teeth_of_a_mesh_may_differ_from_each_other(ripple, said):
+    """An excess of 0.09 is more than a hundredth of a mesh of 8, and less than that of 10; lines of an encoder leave
+    nothing. Would catch a right mesh that is called incomplete for the unlike height of its teeth."""
+    for high, expected in ((ripple, said), ({"encoder_interpolation": 10.0}, True)):
+        found = evidence(base=3.0, generic_held_out=held(20, 1.0), high=SimpleNamespace(best=candidate(high)))
+        found.extended_held_out = HeldOut(np.full(20, 1.09), np.full(20, 1.09) + 0.02 * SWING[:20], np.ones(20))
+        assert beaten_by_generic(found) is expected
+
+
 def test_what_beats_the_effects_is_told_beside_them(monkeypatch):
     """With a name it is said and more; without one, that something is there."""
     where = {"domain": "speed", "rms_arcmin": 0.1, "orders_per_input_turn": [], "direction": "both"}

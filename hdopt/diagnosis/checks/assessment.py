@@ -28,6 +28,7 @@ from hdopt.diagnosis.numerical import SMALLEST_POWER, TINY
 from hdopt.diagnosis.orientation import Orientation
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import joint_fit, penalty_scale, search_terms
+from hdopt.diagnosis.search.high_order import subtract
 from hdopt.diagnosis.search.penalty import Scale as PenaltyScale
 from hdopt.diagnosis.search.penalty import penalty
 from hdopt.diagnosis.search.subset_search import Selection
@@ -36,6 +37,7 @@ from hdopt.diagnosis.state import State
 from hdopt.effects import EFFECTS, HIGH_ORDER
 from hdopt.effects.probe import strongest_orders
 from hdopt.effects.term import Term
+from hdopt.recordings.recording import Recording
 from hdopt.recordings.rows import Rows
 
 
@@ -129,11 +131,16 @@ def assess(state: State) -> Evidence:
         steps=sudden_steps(best),
         wave=slow_wave(best),
         orientation=state.orientation,
-        neighbours_arcmin=noise_between_neighbours(state.recordings),
+        neighbours_arcmin=noise_between_neighbours(without_ripple(state)),
         sensor_arcmin=max(one.quantum_arcmin for one in state.recordings),
         scale=fitted_scale(best, state.nuisances),
         passes=repeated_passes(best),
     )
+
+
+def without_ripple(state: State) -> tuple[Recording, ...]:
+    """The recordings of `state` without the ripple that was found in them: it is no noise between neighbours."""
+    return state.recordings if state.ripple is None else tuple(subtract(state.recordings, state.ripple))
 
 
 def most_flips(base: HeldOut, best: HeldOut, settings: DiagnosisSettings) -> int:

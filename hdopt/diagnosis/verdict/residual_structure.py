@@ -14,6 +14,7 @@ from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.verdict.named_effect import main_orders, share_of
 from hdopt.diagnosis.verdict.where import Where
+from hdopt.effects.tooth_mesh import ToothMesh
 
 LISTED_DIGITS = 4
 """Digits of an order in the JSON."""
@@ -108,6 +109,16 @@ def resolution(evidence: Evidence) -> float:
     return max(settings.model_resolution * base, sensors)
 
 
+def left_by_unequal_teeth(evidence: Evidence) -> float:
+    """Power (arcmin^2) that the teeth of a mesh found in `evidence` may leave below its orders where they differ from
+    each other; 0 without a mesh."""
+    if evidence.high is None:
+        return 0.0
+    best = evidence.high.best
+    powers = zip(term_powers(best.fit), best.effects, strict=True)
+    return evidence.settings.verdict.unequal_teeth * sum(power for power, name in powers if name == ToothMesh.id)
+
+
 def outside_share(candidate: Candidate) -> float:
     """Share of what a set explains that its descriptions without physics carry. `candidate` is that set."""
     fit = candidate.fit
@@ -132,6 +143,7 @@ def clearly_unexplained(evidence: Evidence) -> bool:
         settings.remainder_floor * evidence.remainder.held_out.variance,
         settings.base_floor * base_power,
         resolution(evidence) ** 2,
+        left_by_unequal_teeth(evidence),
     )
     return (
         evidence.remainder.t > settings.remainder_t and left > settings.remainder_share * explainable and left > floor
@@ -147,7 +159,9 @@ def beaten_by_generic(evidence: Evidence) -> bool:
     generic = evidence.generic_held_out
     best = min(evidence.base_held_out, evidence.extended_held_out, key=lambda out: out.variance)
     excess = best.variance - generic.variance
-    floor = max(settings.verdict.remainder_floor * generic.variance, resolution(evidence) ** 2)
+    floor = max(
+        settings.verdict.remainder_floor * generic.variance, resolution(evidence) ** 2, left_by_unequal_teeth(evidence)
+    )
     chance = paired_chance(best.white, generic.white, settings.held_out)
     return excess > floor and chance < settings.verdict.remainder_chance
 
