@@ -71,6 +71,7 @@ def assessed(monkeypatch):
             nuisances=None,
             orientation=None,
             recordings=[SimpleNamespace(quantum_arcmin=step) for step in (0.1, 0.4, 0.2)],
+            ripple=None,
         )
         return assessment.assess(state), seen
 

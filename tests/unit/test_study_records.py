@@ -155,7 +155,7 @@ def test_measured_teeth_have_their_place_and_their_centre(tmp_path):
     keys = {"file": "teeth.csv", "flank": "left", "first_tooth_deg": 30.0}
     for kind in ("cumulative", "single"):
         for recentre in (True, False):
-            built = TeethSection(**keys, deviation=kind, recentre=recentre).build(100, tmp_path)
+            built = TeethSection(**keys, deviation=kind, recentre=recentre).build(100, 0.4, tmp_path)
             assert built == MeasuredTeeth.of(values, kind, math.pi / 6, recentre, source="teeth.csv")
 
 
