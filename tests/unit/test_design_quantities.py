@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import sqrt
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -108,3 +109,12 @@ def test_slopes_are_derivatives(problem):
     assert point.slopes(square) == pytest.approx(2 * width(point.design) * slope, rel=1e-6, abs=1e-9)
     below, above = point.pair(0)
     assert slope[0] * 2e-6 == pytest.approx(width(above) - width(below), abs=1e-12)
+
+
+def test_slopes_are_central_differences_over_the_free_variables():
+    """Of x squared at 5 and -3 y, and of x y: right to rounding for squares, whatever the steps. Would catch a
+    difference over one step that is taken for two."""
+    space = SimpleNamespace(design=lambda combination, values: values)
+    point = Point(space, None, None, {"x": 5.0, "y": 2.0, "z": 1.0}, (("x", 0.1), ("y", 0.01)))
+    slopes = point.slopes(lambda v: np.array([v["x"] ** 2 - 3 * v["y"], v["x"] * v["y"] + v["z"]]))
+    np.testing.assert_allclose(slopes, [[10.0, 2.0], [-3.0, 5.0]], rtol=1e-9)
