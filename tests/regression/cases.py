@@ -1,4 +1,4 @@
-"""Sixty short recordings of the bench: made anew from their seeds, answered by `hdopt diagnose`, only answers kept."""
+"""Short recordings of the bench: made anew from their seeds, answered by `hdopt diagnose`, only answers kept."""
 
 from __future__ import annotations
 
@@ -12,31 +12,34 @@ from tests.regression.golden import compact, hdopt
 
 # Seeds are the first, from a hundred, at which the physics can be so large in a record of at most 8000 rows.
 SINGLES = {
-    "cs_tooth_harmonics": (100, 500),
-    "fs_tooth_harmonics": (111, 510),
-    "tooth_mesh": (120, 520),
-    "torsional_windup": (130, 530),
-    "hysteresis": (140, 540),
-    "lost_motion": (150, 550),
-    "encoder_input_eccentricity": (160, 561),
-    "encoder_output_eccentricity": (170, 570),
-    "encoder_interpolation": (180, 581),
-    "output_coupling": (190, 590),
-    "bearing_pass": (200, 600),
-    "circular_spline_lobing": (210, 610),
-    "thermal_drift": (220, 620),
-    "resonance": (233, 630),
-    "local_tooth_defect": (240, 642),
-    "channel_delay": (250, 650),
+    "cs_tooth_harmonics": {0.5: 100},
+    "fs_tooth_harmonics": {1.0: 510},
+    "tooth_mesh": {0.5: 120},
+    "torsional_windup": {0.5: 130, 1.0: 530},
+    "hysteresis": {0.5: 140, 1.0: 540},
+    "lost_motion": {1.0: 550},
+    "encoder_input_eccentricity": {0.5: 160, 1.0: 561},
+    "encoder_output_eccentricity": {0.5: 170},
+    "encoder_interpolation": {0.5: 180, 1.0: 581},
+    "output_coupling": {0.5: 190},
+    "bearing_pass": {0.5: 200, 1.0: 600},
+    "circular_spline_lobing": {0.5: 210},
+    "thermal_drift": {0.5: 220},
+    "resonance": {0.5: 233},
+    "local_tooth_defect": {1.0: 642},
+    "channel_delay": {0.5: 250, 1.0: 650},
 }
-"""Effect -> the seeds of its cases at half of the drive's own error and at all of it."""
+"""Effect -> its cases: size in units of the drive's own error -> seed.
+
+Both sizes where they are answered by different rules or excuses (`tests/unit/test_named_cases.py`), and where both are
+quick; else that which is answered sooner. A second size of one effect goes the way of the first: through the same
+candidates, with another wave. What thresholds do at faint sizes is asked number by number in
+`tests/unit/test_diagnosis_numbers.py`, and case by case in a run of the proof (docs/proof.md).
+"""
 
 OUTSIDE = (
     ("belt order", 1000, 0.5),
-    ("belt order", 1500, 1.0),
     ("auxiliary gear", 1010, 0.5),
-    ("auxiliary gear", 1510, 1.0),
-    ("hub slip", 1020, 0.5),
     ("hub slip", 1520, 1.0),
     ("one-off bump", 1530, 1.0),
     ("modulated order", 1540, 1.0),
@@ -45,7 +48,10 @@ OUTSIDE = (
     ("slow wave", 1570, 1.0),
     ("stick-slip", 1580, 1.0),
 )
-NOTHING = range(2000, 2016)
+NOTHING = (2000, 2001, 2002, 2003, 2005, 2006, 2007, 2008, 2009, 2011, 2015)
+"""Seeds without hidden physics: each kind of motion that the bench draws is among them (one way and back, to and fro,
+short strokes first, two and three speeds), and 2011, in which the search finds most to look at.
+"""
 
 # A fit stands once a step drops its objective by less than 1e-5, which is sqrt(2e-5) = 0.4 % of a standard error of a
 # parameter; another order of summation moved the smallest amplitudes by 0.2 % and phases by 0.01 deg. Names are exact.
@@ -56,7 +62,7 @@ def specs() -> dict[str, Spec]:
     """Name -> what the case is to be."""
     named = {}
     for effect, seeds in SINGLES.items():
-        for seed, severity in zip(seeds, (0.5, 1.0), strict=True):
+        for severity, seed in seeds.items():
             named[f"{effect} {severity}"] = Spec("single", seed, (effect,), severity, size="brief")
     for kind, seed, severity in OUTSIDE:
         named[f"{kind} {severity}"] = Spec("unknown", seed, (), severity, kind, size="brief")
