@@ -50,8 +50,6 @@ TURN = np.linspace(0.0, 2 * math.pi, 361)
 WG_TILT_NAMES = ("wg_tilt_major", "wg_tilt_minor")
 WG_TILTS = tuple(ERROR_NAMES.index(name) for name in WG_TILT_NAMES)
 """Their columns in `DriveErrors.to_matrix`."""
-TILT_STEP = 1e-4
-"""Step of central differences over the tilts, as a share of them."""
 
 
 @dataclass(frozen=True)
@@ -114,6 +112,10 @@ class DesignConditions:
         """`rows` of the reference's errors as they are in `design`."""
         return self.scaled(rows, self.tilt_factor(design))
 
+    def over_bore_of(self, rows: Array) -> Array:
+        """What a factor of 1 on the tilts over the bore's length adds to `rows` (n, 12): all the rest is 0."""
+        return rows - self.scaled(rows, 0.0)
+
     def errors_of(self, design: Design) -> DriveErrors:
         """The errors of the one drive as they are in `design`."""
         if not any(self.over_bore):
@@ -171,6 +173,25 @@ class Point:
             )
             self._pairs[index] = below, above
         return self._pairs[index]
+
+    @cached_property
+    def extremes(self) -> Extremes:
+        """Local extremes of the one drive, with slopes along its tilts over the bore's length."""
+        return self.extremes_of(self.trade.rows)
+
+    def extremes_of(self, rows: Array) -> Extremes:
+        """The same of the drives with `rows` of the reference's errors."""
+        return _envelope(self.design, self.trade.of(rows, self.design), self.trade.over_bore_of(rows))
+
+    @cached_property
+    def features(self) -> Array:
+        """Slopes of `tip_features` and of the factor of the tilts over the free variables, (n, 6)."""
+        factor = self.slopes(self.trade.tilt_factor)
+        return np.column_stack([self.slopes(tip_features), factor])
+
+    def along(self, slopes: Array) -> Array:
+        """`slopes` (k, 5) of extremes, mm of arc, over the free variables, (k, n)."""
+        return np.asarray(slopes @ self.features[:, (0, 1, 2, 3, 5)].T)
 
     def slopes(self, function: Callable[[Design], Array | float]) -> Array:
         """Central differences of `function` over the free variables: shape (n,) or, for vectors, (n, k)."""
@@ -233,22 +254,8 @@ def _piece(quantity: Quantity, point: Point) -> tuple[Array, Array]:
     return np.array([value]), point.slopes(lambda design: quantity.value(point.trade, design))[None, :]
 
 
-def _envelope(design: Design, rows: Array) -> Extremes:
-    return extremes_of(tip_geometry(design.drive), math.tan(design.drive.geometry.pressure_angle), rows)
-
-
-def _tilt_slopes(point: Point, rows: Array, pieces: Callable[[Extremes], Array]) -> Array:
-    """What the tilts over the bore's length add to the slopes (k, n) of `pieces` (k,) of the extremes of the drives
-    with `rows` of the reference's errors: they change with the width."""
-    trade = point.trade
-    if not any(trade.over_bore):
-        return np.zeros((len(pieces(_envelope(point.design, rows))), len(point.free)))
-    factor = trade.tilt_factor(point.design)
-    below, above = (
-        pieces(_envelope(point.design, trade.scaled(rows, factor * (1 + sign * TILT_STEP)))) for sign in (-1, 1)
-    )
-    change = point.slopes(trade.tilt_factor)
-    return np.outer((above - below) / (2 * TILT_STEP * factor), change)
+def _envelope(design: Design, rows: Array, along: Array | None = None) -> Extremes:
+    return extremes_of(tip_geometry(design.drive), math.tan(design.drive.geometry.pressure_angle), rows, along)
 
 
 def _spans(found: Extremes) -> Array:
@@ -289,12 +296,11 @@ class PeakToPeak:
             return moved(point.design), point.slopes(moved).T
         if point.design.drive.has_measured_teeth:
             return _piece(self, point)
-        found, features = _envelope(point.design, rows), point.slopes(tip_features)
+        found = point.extremes
         spans, low_slopes = _spans(found), found.low_slopes[0, :LOWEST_USED]
-        slopes = (found.high_slopes[0][:, None, :] - low_slopes[None, :, :]).reshape(-1, 4)
+        slopes = (found.high_slopes[0][:, None, :] - low_slopes[None, :, :]).reshape(len(spans), -1)
         scale = point.design.drive.geometry.arcmin_per_mm
-        over_bore = _tilt_slopes(point, trade.rows, _spans)
-        return scale * spans, scale * (slopes @ features[:, :4].T + over_bore) + np.outer(spans, features[:, 4])
+        return scale * spans, scale * point.along(slopes) + np.outer(spans, point.features[:, 4])
 
 
 @dataclass(frozen=True)
@@ -337,12 +343,11 @@ class PeakToPeakQuantile:
         if point.design.drive.has_measured_teeth or trade.teeth is not None or trade.added is not None:
             each = point.slopes(lambda design: self._sample(trade, design, chosen)).T
             return np.array([value]), (share @ each / share.sum())[None, :]
-        found, features = _envelope(point.design, trade.of(rows, point.design)), point.slopes(tip_features)
+        found = point.extremes_of(rows)
         n = np.arange(len(chosen))
         slopes = found.high_slopes[n, found.highs.argmax(axis=1)] - found.low_slopes[:, 0]
         scale = point.design.drive.geometry.arcmin_per_mm
-        over_bore = _tilt_slopes(point, rows, lambda extremes: extremes.highs.max(axis=1) - extremes.lows.min(axis=1))
-        each = scale * (slopes @ features[:, :4].T + over_bore) + np.outer(values[chosen] / scale, features[:, 4])
+        each = scale * point.along(slopes) + np.outer(values[chosen] / scale, point.features[:, 4])
         return np.array([value]), (share @ each / share.sum())[None, :]
 
 
@@ -369,13 +374,11 @@ class LargestLag:
     def pieces(self, point: Point) -> tuple[Array, Array]:
         if point.design.drive.has_measured_teeth:
             return _piece(self, point)
-        trade, scale = point.trade, point.design.drive.geometry.arcmin_per_mm
-        found, features = _envelope(point.design, trade.of(trade.rows, point.design)), point.slopes(tip_features)
-        over_bore = _tilt_slopes(point, trade.rows, lambda extremes: -extremes.lows[0, :LOWEST_USED])
+        trade, scale, found = point.trade, point.design.drive.geometry.arcmin_per_mm, point.extremes
         play = trade.needed("backlash", "the lag") - found.lows[0, :LOWEST_USED]
         slide = point.slopes(lambda design: self._slide(trade, design.drive))
-        lows = over_bore - found.low_slopes[0, :LOWEST_USED] @ features[:, :4].T
-        slopes = np.outer(play, features[:, 4]) + scale * lows
+        lows = point.along(found.low_slopes[0, :LOWEST_USED])
+        slopes = np.outer(play, point.features[:, 4]) - scale * lows
         return scale * play + self._slide(trade, point.design.drive), slopes + slide
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from cases import BASE_ERRORS, PROFILES, drive, random_errors
 
-from hdopt.drive.errors import DriveErrors
+from hdopt.drive.errors import ERROR_NAMES, DriveErrors
 from hdopt.drive.geometry import Structure
 from hdopt.kinematics import peak_to_peak_arcmin
 from hdopt.kinematics.closed_form import tip_geometry
@@ -16,6 +16,7 @@ from hdopt.kinematics.gradients import extremes, extremes_of
 from hdopt.kinematics.waveform import kinematic_error_arcmin
 
 SMOOTH = ("ellipse", "resal", "two_disk")
+TILTS = [ERROR_NAMES.index(name) for name in ("wg_tilt_major", "wg_tilt_minor")]
 
 
 def spans(drive, errors):
@@ -51,18 +52,20 @@ def test_no_walk_gets_past_it():
 def test_slopes_agree_with_differences(structure, profile):
     design, errors = drive(PROFILES[profile], structure), random_errors(100, seed=5)
     tip, tan_alpha, rows = tip_geometry(design), math.tan(design.geometry.pressure_angle), errors.to_matrix()
-    found = extremes_of(tip, tan_alpha, rows)
+    along = np.zeros_like(rows)
+    along[:, TILTS] = rows[:, TILTS] * [1.0, -0.7]
+    found = extremes_of(tip, tan_alpha, rows, along)
     n = np.arange(len(rows))
     slopes = found.high_slopes[n, found.highs.argmax(axis=1)] - found.low_slopes[:, 0]
 
     def span(place):
         changed = tip._replace(semi_major=place[0], tip_radius=place[1], half_width=place[2])
-        there = extremes_of(changed, place[3], rows)
+        there = extremes_of(changed, place[3], rows + place[4] * along)
         return there.highs.max(axis=1) - there.lows.min(axis=1)
 
-    place = np.array([tip.semi_major, tip.tip_radius, tip.half_width, tan_alpha])
-    for j, step in enumerate((1e-3, 1e-3, 1e-4, 1e-5)):
-        change = np.zeros(4)
+    place = np.array([tip.semi_major, tip.tip_radius, tip.half_width, tan_alpha, 0.0])
+    for j, step in enumerate((1e-3, 1e-3, 1e-4, 1e-5, 1e-4)):
+        change = np.zeros(5)
         change[j] = step
         differences = (span(place + change) - span(place - change)) / (2 * step)
         # Differences over two extremes that swap ranks are wrong by design: one drive in a hundred may.
