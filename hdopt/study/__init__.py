@@ -376,6 +376,7 @@ def with_values(document: Document, values: Iterable[tuple[str, Any]], place: st
     for key, value in values:
         path = (key,) if key in SECTIONS and isinstance(value, Mapping) else _resolve(key, data, place)
         set_value(data, path, value)
+        lines = {held: line for held, line in lines.items() if held[: len(path)] != path}
         lines[path] = SET_ON_COMMAND_LINE
     return replace(document, data=data, lines=lines, set_by=place)
 
@@ -403,6 +404,9 @@ def _resolve(key: str, data: Mapping[str, Any], place: str) -> tuple[str, ...]:
     if found:
         return found
     possible = {path for path in possible if ANY_NAME not in path}
+    beside = sorted({path[-1] for path in known_paths(data) if _same(path[:-1], parts[:-1], ANY_NAME)} - {ANY_NAME})
+    if len(parts) > 2 and beside:
+        raise HdoptError(f"{place} {'.'.join(parts[:-1])}: {unknown_key(parts[-1], beside)}")
     names = {path[-1] for path in possible} if len(parts) == 1 else {".".join(path) for path in possible}
     if len(parts) > 1 and not near_keys(key, names):
         names = {name for name in names if name.startswith(f"{parts[0]}.")}

@@ -11,7 +11,7 @@ from pydantic_core import ErrorDetails
 
 from hdopt.errors import HdoptError, IncompleteStudy, unknown_name
 from hdopt.study.base import Section
-from hdopt.study.document import Document
+from hdopt.study.document import Document, leaves
 from hdopt.study.nearest import unknown_key
 from hdopt.study.schema import SECTIONS, known_paths, section_model, step_sections
 from hdopt.toml_lines import Keys
@@ -85,6 +85,40 @@ def _also_needed(document: Document) -> list[Keys]:
 
 
 def _missing_line(paths: Sequence[Keys], document: Document) -> list[str]:
+    """What is said of the missing keys at `paths`: of those that a set key asks for, then of the others in one line."""
+    asked: dict[tuple[Keys, ...], list[Keys]] = {}
+    for path in paths:
+        asked.setdefault(tuple(document.made_by(path[:-1])), []).append(path)
+    paths = asked.pop((), [])
+    lines = [_asked_line(by, needed, document) for by, needed in asked.items()]
+    return lines + _missing_in_file(paths, document)
+
+
+def _asked_line(by: Sequence[Keys], needed: Sequence[Keys], document: Document) -> str:
+    """What is said where the keys `by` were set, and nothing of what they need beside them stands in the file."""
+    keys = ", ".join(".".join(path) for path in needed)
+    meant = [".".join(found) for path in by if (found := _likely_meant(path, document))]
+    other = f", unless you meant {' or '.join(meant)}" if meant else ""
+    place = ", ".join(".".join(path) for path in by)
+    return f"{document.set_by} {place}: needs {keys} too, which the study does not give; give {_it(needed)}{other}"
+
+
+def _it(things: Sequence[object]) -> str:
+    return "it" if len(things) == 1 else "them"
+
+
+def _likely_meant(path: Keys, document: Document) -> Keys | None:
+    """The one key that the study writes straight in another section and that the words of the key at `path` name."""
+    words = set(path[-1].split("_"))
+    named = [
+        written
+        for written in leaves(document.data)
+        if len(written) == 2 and written[0] != path[0] and set(written[1].split("_")) <= words
+    ]
+    return named[0] if len(named) == 1 else None
+
+
+def _missing_in_file(paths: Sequence[Keys], document: Document) -> list[str]:
     if not paths:
         return []
     if len(paths) == 1:
@@ -110,7 +144,8 @@ def _fault(fault: ErrorDetails, document: Document, section: str) -> str:
         return f"{where}: does not say its {_tag(fault)}; give it"
     if kind == "union_tag_invalid":
         choices = fault["ctx"]["expected_tags"].replace("'", "")
-        return f"{where}: its {_tag(fault)} is {fault['ctx']['tag']!r}; it must be one of {choices}"
+        where = document.where((*path, _tag(fault)))
+        return f"{where}: is {fault['ctx']['tag']!r}; it must be one of {choices}"
     if kind in ("model_type", "model_attributes_type") and not isinstance(value, Mapping):
         return f"{where}: is {value!r}; {_as_table(path)}"
     hint = _number_hint(value) if kind in ("float_type", "int_type", "float_parsing", "int_parsing") else None
@@ -169,6 +204,8 @@ def _known_keys(model: Any, path: Keys) -> tuple[str, ...]:
 
 def _path_in_file(location: tuple[Any, ...], content: Any) -> Keys:
     path = []
+    if location and location[-1] == "[key]":  # pydantic's word for the name itself, which stands before it
+        location = location[:-1]
     for part in location:
         if isinstance(content, Mapping) and part in content:
             content = content[part]

@@ -36,13 +36,32 @@ class Document:
     set_by: str = "--set"
 
     def where(self, path: Keys) -> str:
-        """'FILE, line N, a.b': the closest place in the file to the key `path`."""
-        if self.lines.get(path) == SET_ON_COMMAND_LINE:
-            return f"{self.set_by} {'.'.join(path)}"
+        """'FILE, line N, a.b': the closest place in the file to the key `path`, or what set it or all in it."""
+        if path not in self.lines and (made := self.made_by(path)):
+            return f"{self.set_by} {', '.join('.'.join(one) for one in made)}"
         for depth in range(len(path), 0, -1):
-            if self.lines.get(path[:depth], SET_ON_COMMAND_LINE) != SET_ON_COMMAND_LINE:
-                return f"{self.source}, line {self.lines[path[:depth]]}, {'.'.join(path)}"
+            line = self.lines.get(path[:depth])
+            if line == SET_ON_COMMAND_LINE:
+                return f"{self.set_by} {'.'.join(path)}"
+            if line is not None:
+                return f"{self.source}, line {line}, {'.'.join(path)}"
         return f"{self.source}, {'.'.join(path)}" if path else self.source
+
+    def made_by(self, table: Keys) -> list[Keys]:
+        """The keys that were set, where all that the `table` holds is what they set; [] where the file has a part."""
+        held: Any = self.data
+        for part in table:
+            held = held.get(part) if isinstance(held, Mapping) else None
+        if not isinstance(held, Mapping):
+            return []
+        found = {path[:depth] for path in leaves(held, table) for depth in (self._set_depth(path),)}
+        return sorted(found) if () not in found else []
+
+    def _set_depth(self, path: Keys) -> int:
+        """How many parts of `path` name what set it; 0 where the file holds it."""
+        known = (depth for depth in range(len(path), 0, -1) if path[:depth] in self.lines)
+        depth = next(known, 0)
+        return depth if self.lines.get(path[:depth]) == SET_ON_COMMAND_LINE else 0
 
 
 def read_document(path: Path) -> Document:

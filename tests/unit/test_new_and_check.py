@@ -234,12 +234,12 @@ MESSAGES = {
     "both drives": ('drive = "csf-25-80"\n[drive]\nmodule_mm = 1\n', "keep one of them"),
     "a kind": (
         "[tolerances]\naxis_tilt_x_deg = { distribution = 'norml', std = 0.1 }\n",
-        "its distribution is 'norml'; it must be one of normal, uniform",
+        ".distribution: is 'norml'; it must be one of normal, uniform",
     ),
     "a bare tolerance": ("[tolerances]\naxis_tilt_x_deg = 0.1\n", "give its distribution, as in { distribution"),
     "a cost": (
         "[tolerances]\naxis_tilt_x_deg = { distribution = 'normal', std = 0.1, cost = { model = 'x' } }\n",
-        "its model is 'x'; it must be one of reciprocal, power",
+        ".model: is 'x'; it must be one of reciprocal, power",
     ),
     "a list": ("[search]\nprofiles = 'ellipse'\n", "must be a list, in square brackets"),
     "a whole number": ("[export]\nbolt_count = 2.5\n", "must be a whole number"),
