@@ -159,9 +159,11 @@ def require_cadquery() -> None:
     try:
         import cadquery  # noqa: F401
     except ImportError as error:
-        raise MissingLibrary(
-            f"CadQuery cannot be loaded ({error}); on Debian install libgl1, then try again"
-        ) from error
+        if isinstance(error, ModuleNotFoundError) and error.name == "cadquery":
+            says = "CadQuery is not installed; pip install 'hdopt[cad]'"
+        else:
+            says = f"CadQuery cannot be loaded ({error}); on Debian install libgl1, then try again"
+        raise MissingLibrary(says) from error
 
 
 def _require_suffixes(targets: Mapping[str, Path]) -> None:

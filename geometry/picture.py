@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hdopt.arrays import Array, Index
 from hdopt.errors import HdoptError
@@ -72,11 +73,18 @@ def check_png(path: Path, job: Job, name: str) -> JsonReady:
     failures = []
     if (width, height) != SIZE:
         failures.append(f"it is {width} x {height} pixels, not {SIZE[0]} x {SIZE[1]}")
-    elif len(np.unique(vtk_to_numpy(image.GetPointData().GetScalars()), axis=0)) < LEAST_COLOURS:
+    elif _colours(vtk_to_numpy(image.GetPointData().GetScalars())) < LEAST_COLOURS:
         failures.append("it is blank")
     if failures:
         raise CheckFailed(name, failures)
     return {"width": width, "height": height}
+
+
+def _colours(pixels: NDArray[np.uint8]) -> int:
+    """How many colours `pixels` (n, 3 or more) of red, green and blue have."""
+    seen = np.zeros((256, 256, 256), bool)
+    seen[pixels[:, 0], pixels[:, 1], pixels[:, 2]] = True
+    return int(np.count_nonzero(seen))
 
 
 def _scene(job: Job) -> dict[str, Array | Index]:

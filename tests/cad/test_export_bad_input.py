@@ -157,10 +157,17 @@ def test_machine_without_the_libraries_of_cadquery(monkeypatch, tmp_path):
     from hdopt.geometry.export import export_drive
 
     monkeypatch.setitem(sys.modules, "cadquery", None)
+    files = tmp_path / "files"
+    files.mkdir()
+    with pytest.raises(HdoptError, match=r"CadQuery is not installed; pip install 'hdopt\[cad\]'"):
+        export_drive(drive(), {"step": files / "wave.step"})
+    (tmp_path / "cadquery.py").write_text("raise ImportError('libGL.so.1: cannot open shared object file')")
+    monkeypatch.delitem(sys.modules, "cadquery")
+    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(HdoptError, match="CadQuery cannot be loaded .* on Debian install libgl1"):
-        export_drive(drive(), {"step": tmp_path / "wave.step"})
-    assert list(tmp_path.iterdir()) == []
-    export_drive(drive(), {"dxf": tmp_path / "wave.dxf"})
+        export_drive(drive(), {"step": files / "wave.step"})
+    assert list(files.iterdir()) == []
+    export_drive(drive(), {"dxf": files / "wave.dxf"})
 
 
 def test_help_names_every_format():
