@@ -61,7 +61,10 @@ def sources():
 
 
 SOURCES = dict(sources())
-TREES = {module: ast.parse(file.read_text(encoding="utf-8")) for module, file in SOURCES.items()}
+
+
+def tree_of(module: str) -> ast.Module:
+    return ast.parse(SOURCES[module].read_text(encoding="utf-8"))
 
 
 def room_of(module: str) -> str | None:
@@ -101,7 +104,10 @@ def imports(tree: ast.Module, *, at_import: bool) -> set[str]:
     return found
 
 
-IMPORTS = {module: imports(tree, at_import=False) for module, tree in TREES.items()}
+@pytest.fixture(scope="module")
+def graph() -> dict[str, set[str]]:
+    """Module -> what it imports: read where it is asked for, not by all who collect tests."""
+    return {module: imports(tree_of(module), at_import=False) for module in SOURCES}
 
 
 def room_edges(graph: dict[str, set[str]]) -> dict[tuple[str, str], list[str]]:
@@ -149,19 +155,19 @@ def circles(graph: dict[str, set[str]]) -> set[frozenset[str]]:
     return found
 
 
-def test_imports_run_one_way():
-    edges = room_edges(IMPORTS)
+def test_imports_run_one_way(graph):
+    edges = room_edges(graph)
     wrong = forbidden(edges)
     assert not wrong, [line for edge in wrong for line in edges[edge]]
 
 
-def test_no_modules_import_each_other_in_a_circle():
-    found = [sorted(group) for group in circles(IMPORTS)]
+def test_no_modules_import_each_other_in_a_circle(graph):
+    found = [sorted(group) for group in circles(graph)]
     assert not found, found
 
 
-def test_the_reasons_of_neighbours_are_still_needed():
-    assert BESIDE.keys() <= room_edges(IMPORTS).keys()
+def test_the_reasons_of_neighbours_are_still_needed(graph):
+    assert BESIDE.keys() <= room_edges(graph).keys()
 
 
 CHANGE_AS_THEY_WORK = {"FilesOfWork", "AllocationWatch", "DiagnosisWatch", "Doing"}
@@ -199,5 +205,5 @@ def test_the_top_of_the_package_computes_nothing():
 
 @pytest.mark.parametrize("module", SOURCES)
 def test_heavy_libraries_are_imported_where_they_are_used(module):
-    roots = {target.split(".")[0] for target in imports(TREES[module], at_import=True)}
+    roots = {target.split(".")[0] for target in imports(tree_of(module), at_import=True)}
     assert not roots & HEAVY

@@ -8,6 +8,8 @@ import tomllib
 from collections import Counter
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 
 LONGEST = 60
@@ -39,24 +41,22 @@ def unnamed_arguments(node: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]
     return [argument.arg for argument in given if argument.arg not in words]
 
 
+@pytest.fixture(scope="module")
 def trees():
-    for top in ("hdopt", "geometry", "studies"):
-        for path in sorted((ROOT / top).rglob("*.py")):
-            yield path.relative_to(ROOT), ast.parse(path.read_text(encoding="utf-8"))
+    """Path -> syntax tree of every file of the package: read where they are asked for, not by all who collect tests."""
+    files = (path for top in ("hdopt", "geometry", "studies") for path in sorted((ROOT / top).rglob("*.py")))
+    return {path.relative_to(ROOT): ast.parse(path.read_text(encoding="utf-8")) for path in files}
 
 
-TREES = dict(trees())
-
-
-def test_no_function_is_longer_than_sixty_lines():
-    long = {f"{path} {node.name}" for path, tree in TREES.items() for node in functions(tree) if length(node) > LONGEST}
+def test_no_function_is_longer_than_sixty_lines(trees):
+    long = {f"{path} {node.name}" for path, tree in trees.items() for node in functions(tree) if length(node) > LONGEST}
     assert long == set()
 
 
-def test_every_folder_of_python_is_a_package_that_is_installed():
+def test_every_folder_of_python_is_a_package_that_is_installed(trees):
     """Would catch a new folder that only a checkout has: what was installed stops at its import."""
     installed = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["packages"]
-    dotted = {str(path.parent).replace("/", ".") for path in TREES}
+    dotted = {str(path.parent).replace("/", ".") for path in trees}
     assert set(installed) == {f"hdopt.{name}" if name in ("geometry", "studies") else name for name in dotted}
 
 
@@ -67,11 +67,11 @@ def test_test_files_have_names_of_their_own():
     assert [name for name, n in Counter(loose).items() if n > 1] == []
 
 
-def test_docstrings_name_every_argument():
+def test_docstrings_name_every_argument(trees):
     """Commands do not count: their arguments are described by their options."""
     unnamed = {
         f"{path} {node.name}: {argument}"
-        for path, tree in TREES.items()
+        for path, tree in trees.items()
         if path.parts[:2] != ("hdopt", "cli")
         for node in public_functions(tree)
         for argument in unnamed_arguments(node)
@@ -89,9 +89,9 @@ def array_aliases(tree: ast.Module) -> set[str]:
     }
 
 
-def test_array_types_are_named_once():
+def test_array_types_are_named_once(trees):
     """The bench shares no code with the rest and names its own."""
-    spelled = {path: array_aliases(tree) for path, tree in TREES.items() if path.parts[1] != "bench"}
+    spelled = {path: array_aliases(tree) for path, tree in trees.items() if path.parts[1] != "bench"}
     assert {path for path, found in spelled.items() if found} == {Path("hdopt/arrays.py")}
 
 
@@ -108,8 +108,8 @@ def tokens(source: str):
     return tokenize.generate_tokens(io.StringIO(source).readline)
 
 
-def test_what_types_leave_open_has_its_reason():
-    sources = {path: (ROOT / path).read_text(encoding="utf-8") for path in TREES}
+def test_what_types_leave_open_has_its_reason(trees):
+    sources = {path: (ROOT / path).read_text(encoding="utf-8") for path in trees}
     assert {str(path): found for path, source in sources.items() if (found := without_reason(source))} == {}
 
 
