@@ -16,6 +16,10 @@ from hdopt.files import cells_of, read_text
 from hdopt.keywords import names_keywords
 
 KINDS = ("cumulative", "single")
+FINEST = 5e-5
+"""mm: half the last digit of what gear inspection writes, 0.1 um; a whole spline is never as good."""
+ALIKE = 0.3
+"""Correlation of neighbours below which cumulative deviations look like single ones, whose own is near nought."""
 
 
 @names_keywords
@@ -33,6 +37,8 @@ class MeasuredTeeth:
     eccentricity: float = 0.0
     recentred: bool = False
     source: str = "array"
+    doubts: tuple[str, ...] = ()
+    """What makes one ask whether kind and unit of the table are those that were said, a sentence each."""
 
     @classmethod
     def of(
@@ -47,6 +53,7 @@ class MeasuredTeeth:
         values = np.asarray(values, float)
         require(len(values) >= 8, f"{len(values)} teeth are given; at least 8 are needed")
         require(bool(np.isfinite(values).all()), f"{source or 'the table'} holds a deviation that is not finite")
+        doubts = _doubts(values, kind)
         if kind == "single":
             values = np.cumsum(values - values.mean())
         values = values - values.mean()
@@ -54,7 +61,7 @@ class MeasuredTeeth:
         wave = 2 / len(values) * np.sum(values * np.exp(-1j * angles))
         if recentre:
             values = values - np.real(wave * np.exp(1j * angles))
-        return cls(tuple(map(float, values)), first_angle, float(abs(wave)), recentre, source or "array")
+        return cls(tuple(map(float, values)), first_angle, float(abs(wave)), recentre, source or "array", doubts)
 
     @property
     def total_cumulative(self) -> float:
@@ -66,6 +73,32 @@ class MeasuredTeeth:
         """f_p, the largest single pitch deviation by size, mm."""
         values = np.array(self.deviations)
         return float(np.abs(values - np.roll(values, 1)).max())
+
+
+def _doubts(values: Array, kind: str) -> tuple[str, ...]:
+    """Why the deviations `values` (mm, (n,)) may be of another unit, or of another kind than the `kind` told.
+
+    Single deviations close: they add up to nothing. Cumulative ones begin or end at 0, and neighbours are alike.
+    """
+    doubts = []
+    spread, total, largest = np.ptp(values), abs(values.sum()), np.abs(values).max()
+    rounding = 3 * FINEST * math.sqrt(len(values) / 3)
+    if 0 < spread < FINEST:
+        doubts.append(f"all deviations lie within {1000 * spread:.2g} um, less than machines resolve: are they in um?")
+    if kind == "single" and total > largest / 4 + rounding:
+        doubts.append(
+            f"the single deviations add up to {1000 * total:.3g} um where a turn closes; each was lessened by "
+            f"{1000 * total / len(values):.3g} um, as if pitches had been compared with one of them. If they are "
+            'cumulative, say so: deviation = "cumulative"'
+        )
+    if kind == "cumulative" and total < largest / 4 and values[0] != 0 and values[-1] != 0:
+        centred = values - values.mean()
+        if centred @ np.roll(centred, 1) < ALIKE * (centred @ centred):
+            doubts.append(
+                "the cumulative deviations add up to nothing, begin and end off 0, and neighbours are unlike, as "
+                'those of single ones are. If they are single, say so: deviation = "single"'
+            )
+    return tuple(doubts)
 
 
 def read_teeth(path: str | Path, teeth: int, flank: str | None = None) -> Array:
@@ -92,8 +125,12 @@ def read_teeth(path: str | Path, teeth: int, flank: str | None = None) -> Array:
     for tooth, side, value in rows:
         if flank is not None and side != flank:
             continue
-        require(1 <= tooth <= teeth, f"measured teeth {path}: tooth {tooth}; this spline has teeth 1 to {teeth}")
+        renumber = "; number them from 1" if tooth == 0 else ""
+        require(
+            1 <= tooth <= teeth, f"measured teeth {path}: tooth {tooth}; this spline has teeth 1 to {teeth}{renumber}"
+        )
         require(tooth not in found, f"measured teeth {path} gives tooth {tooth} twice; keep one row a tooth and flank")
+        require(math.isfinite(value), f"measured teeth {path}: tooth {tooth} has the deviation {value}; give a number")
         found[tooth] = value / 1000
     missing = [tooth for tooth in range(1, teeth + 1) if tooth not in found]
     some = ", ".join(map(str, missing[:5])) + (" ..." if len(missing) > 5 else "")

@@ -99,7 +99,7 @@ def _asked_line(by: Sequence[Keys], needed: Sequence[Keys], document: Document) 
     keys = ", ".join(".".join(path) for path in needed)
     meant = [".".join(found) for path in by if (found := _likely_meant(path, document))]
     other = f", unless you meant {' or '.join(meant)}" if meant else ""
-    place = ", ".join(".".join(path) for path in by)
+    place = " with ".join(".".join(path) for path in by)
     return f"{document.set_by} {place}: needs {keys} too, which the study does not give; give {_it(needed)}{other}"
 
 

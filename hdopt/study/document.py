@@ -38,7 +38,7 @@ class Document:
     def where(self, path: Keys) -> str:
         """'FILE, line N, a.b': the closest place in the file to the key `path`, or what set it or all in it."""
         if path not in self.lines and (made := self.made_by(path)):
-            return f"{self.set_by} {', '.join('.'.join(one) for one in made)}"
+            return f"{self.set_by} {' with '.join('.'.join(one) for one in made)}"
         for depth in range(len(path), 0, -1):
             line = self.lines.get(path[:depth])
             if line == SET_ON_COMMAND_LINE:

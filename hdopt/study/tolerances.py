@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal  # Any: fields that pydantic takes
@@ -228,6 +229,12 @@ class GradedTeethRow(Section):
             tolerances = iso_1328_tolerances(of_class, module, teeth)
         elif of_class is None and single is not None and cumulative is not None:
             tolerances = PitchTolerances(single / 1000, cumulative / 1000)
+            pitch = 1000 * math.pi * module
+            if single > pitch / 2:
+                raise HdoptError(
+                    f"[tolerances] {name}: a single pitch may be {single:.6g} um off at a pitch of {pitch:.0f} um; "
+                    "half the pitch is the most: give um"
+                )
         else:
             raise HdoptError(
                 f"[tolerances] {name}: give either iso_1328_class, or both single_pitch_um and cumulative_pitch_um"

@@ -22,6 +22,7 @@ def words_on_measured_parts(drive: Drive) -> list[str]:
             else f"is kept; {name}.recentre = true takes it out, for a part held off-centre"
         )
         found.append(f"{size} {done}")
+        found += [f"{name}: {doubt}" for doubt in teeth.doubts]
     ring = drive.cs_roundness
     if ring is not None:
         size = f"cs_roundness: {1000 * ring.peak_to_valley:.2f} um from peak to valley up to {ring.cutoff} UPR;"

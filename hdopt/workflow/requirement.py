@@ -43,7 +43,8 @@ class Verdict:
         says = f"requirement {'met' if self.met else 'missed'}: {self.quantity}"
         by = "to spare" if self.met else "short" if self.at_least else "too much"
         if self.at_least:
-            margin = f"{100 * abs(self.margin):.2g} % {by}"
+            by_percent = 100 * abs(self.margin)
+            margin = f"{by_percent:.0f} % {by}" if by_percent >= 10 else f"{by_percent:.2g} % {by}"
             return f"{says} {_percent(self.value)}, at least {_percent(self.limit)} needed, {margin}"
         unit = f" {self.unit}" if self.unit else ""
         margin = f"{abs(self.margin):.3g}{unit} {by}"

@@ -170,6 +170,34 @@ def test_deviations_beyond_the_pitch_are_no_micrometres(study_with_teeth):
         load_study(study_with_teeth).drive  # noqa: B018
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_a_table_told_wrongly_is_doubted_and_one_told_rightly_is_not(seed):
+    """Independent single deviations and their sums, from tooth 1 on or about their mean, as machines write them."""
+    rng = np.random.default_rng(seed)
+    single = rng.normal(0.0, 0.001, Z_CS)
+    single = single - single.mean()
+    sums = np.cumsum(single)
+    from_tooth_1, about_mean = sums - sums[0], sums - sums.mean()
+    for values, kind in ((single, "single"), (from_tooth_1, "cumulative"), (about_mean, "cumulative")):
+        assert MeasuredTeeth.of(values.round(4), kind).doubts == ()
+        assert ["less than machines" in one for one in MeasuredTeeth.of(values / 1000, kind).doubts] == [True]
+    (doubt,) = MeasuredTeeth.of(single, "cumulative").doubts
+    assert 'If they are single, say so: deviation = "single"' in doubt
+    (doubt,) = MeasuredTeeth.of(from_tooth_1, "single").doubts
+    assert 'If they are cumulative, say so: deviation = "cumulative"' in doubt
+    assert MeasuredTeeth.of(np.zeros(Z_CS)).doubts == ()
+
+
+def test_a_doubt_is_said_with_the_result(study_with_teeth):
+    """The same sums told as what they are, and as single deviations."""
+    sums = np.cumsum(np.random.default_rng(2).normal(0.0, 1.0, Z_CS))
+    rows = (f"{tooth},left,{value:.2f}\n" for tooth, value in enumerate(sums - sums[0], 1))
+    (study_with_teeth.parent / "cs.csv").write_text("".join(rows))
+    for kind, doubted in (("cumulative", False), ("single", True)):
+        notes = kinematic_error(load_study(study_with_teeth, [f"cs_teeth.deviation={kind}"])).notes
+        assert any("cs_teeth: the single deviations add up to" in note for note in notes) is doubted
+
+
 def test_a_study_takes_measured_teeth(study_with_teeth):
     study = load_study(study_with_teeth)
     assert study.errors.cs_tooth_amplitude == 0  # the table stands instead of the sine
@@ -218,6 +246,8 @@ def test_a_stack_evens_out_term_by_term_as_ke_does(study_with_teeth):
         ("1,left,0\n2,left,0\n", r"6 of 8 teeth are missing \(3, 4, 5, 6, 7 \.\.\.\); give every tooth"),
         ("1,left,0\n1,left,1\n", "gives tooth 1 twice"),
         ("9,left,0\n", "tooth 9; this spline has teeth 1 to 8"),
+        ("0,left,0\n", "tooth 0; this spline has teeth 1 to 8; number them from 1"),
+        ("1,left,0\n2,left,nan\n", "tooth 2 has the deviation nan; give a number"),
         ("1,left,0\n1,right,0\n", "has the flanks left, right; say which one carries"),
         ("tooth,flank,fp_um\n1,left\n", "line 2: '1,left'; each line must hold tooth, flank, fp_um"),
         ("tooth,flank,fp_um\n1,left,0,5\n", "line 2: '1,left,0,5'; .*between decimal commas, semicolons must part"),

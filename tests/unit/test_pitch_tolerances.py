@@ -205,6 +205,10 @@ def test_what_needs_bounds_or_neighbours_says_that_drawn_teeth_have_none():
     [
         ("{single_pitch_um=4}", "either iso_1328_class, or both"),
         ("{iso_1328_class=5, single_pitch_um=4, cumulative_pitch_um=12}", "either iso_1328_class, or both"),
+        (
+            "{single_pitch_um=4000, cumulative_pitch_um=12000}",
+            "may be 4000 um off at a pitch of 1244 um; half the pitch",
+        ),
         ("{iso_1328_class=0}", "greater than or equal to 1"),
     ],
 )

@@ -50,11 +50,11 @@ def test_what_a_table_that_was_set_replaces_is_not_pointed_to():
         ),
         (
             {"cs_teeth.recentre": False, "cs_teeth.file": "ring.csv"},
-            "--set cs_teeth.file, cs_teeth.recentre: needs cs_teeth.deviation too, which the study does not give;",
+            "--set cs_teeth.file with cs_teeth.recentre: needs cs_teeth.deviation too, which the study does not give;",
         ),
         (
             {"cs_teeth.deviation": "single", "cs_teeth.file": "no.csv"},
-            "--set cs_teeth.deviation, cs_teeth.file: measured teeth no.csv: cannot be read",
+            "--set cs_teeth.deviation with cs_teeth.file: measured teeth no.csv: cannot be read",
         ),
         ({"tolerances.axis_tilt_y_deg.cost.a": 1}, "--set tolerances.axis_tilt_y_deg.cost.a: does not say its model"),
         (

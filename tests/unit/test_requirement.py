@@ -31,6 +31,12 @@ def test_a_stack_by_its_yield_against_the_one_required():
     assert (pair(verdict), verdict.met, verdict.margin) == ((0.95, 0.97, True), False, pytest.approx(-0.02))
 
 
+@pytest.mark.parametrize(("value", "by"), [(0.0, "97 % short"), (0.87, "10 % short"), (0.9675, "0.25 % short")])
+def test_what_is_short_is_said_in_plain_digits(value, by):
+    found = SimpleNamespace(conforming=SimpleNamespace(value=value), required_yield=0.97)
+    assert of_stack(SimpleNamespace(stack=found)).line.endswith(by)
+
+
 @pytest.mark.parametrize(
     ("objective", "share", "whose", "value"),
     [
