@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal  # Any: fields that pydantic takes
 
+import numpy as np
 from pydantic import ConfigDict, Field, create_model
 
 from hdopt.drive.errors import PHASE_OF, STUDY_KEYS, study_key
@@ -15,6 +16,7 @@ from hdopt.drive.pitch_tolerances import CLASSES, PitchTolerances, iso_1328_tole
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.study.base import Positive, Section
 from hdopt.study.costs import Cost
+from hdopt.study.drive import LARGEST_ERROR_MM, STEEPEST_DEG
 from hdopt.tolerance.contributors import VECTORS, Contributor
 from hdopt.tolerance.copula import CorrelationGroup
 from hdopt.tolerance.distributions import (
@@ -274,6 +276,7 @@ class TolerancesBase(Section):
         for key, row in self.rows.items():
             try:
                 built[key] = row.build(folder)
+                _check_size(key, built[key])
             except HdoptError as error:
                 raise HdoptError(f"[tolerances] {key}: {error}") from error
         for size, direction in PHASE_OF.items():
@@ -284,6 +287,23 @@ class TolerancesBase(Section):
 
     def costs(self) -> dict[str, Cost]:
         return {key: row.cost for key, row in self.rows.items() if row.cost is not None}
+
+
+NEARLY_ALL = (0.00135, 0.99865)
+"""Six standard deviations of a normal distribution: its tails beyond have no end."""
+
+
+def _check_size(key: str, distribution: Distribution) -> None:
+    """Raise `HdoptError` where most errors of the study key `key` would be larger than [errors] may have."""
+    if key in map(study_key, PHASE_OF.values()):
+        return
+    largest, unit = (STEEPEST_DEG, "deg") if key.endswith("_deg") else (LARGEST_ERROR_MM, "mm")
+    low, high = distribution.quantile(np.array(NEARLY_ALL))
+    if max(-low, high) > largest:
+        raise HdoptError(
+            f"nearly all drives (99.73 %) would have {low:.6g} to {high:.6g} {unit}; at most {largest:g} {unit} can be "
+            "computed, as in [errors]"
+        )
 
 
 _ROWS: dict[str, Any] = {key: (AnyRow | None, None) for key in STUDY_KEYS}

@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from hdopt.drive.errors import STUDY_KEYS
+from hdopt.drive.errors import PHASE_OF, STUDY_KEYS, study_key
+from hdopt.errors import HdoptError
 from hdopt.study import load_study
 from hdopt.tolerance.distributions import Fixed, Rayleigh, Uniform
 from hdopt.tolerance.drive_inputs import drive_problem, with_free_directions
@@ -61,7 +62,7 @@ def test_without_bounds_the_worst_case_is_left_out_with_a_word():
 
 @pytest.mark.parametrize("homogenization", ["single_tooth", "contact"])
 def test_tilts_beyond_the_closed_form_have_no_proven_bound(homogenization):
-    wide = {"distribution": "uniform", "lower": -6.0, "upper": 6.0}
+    wide = {"distribution": "uniform", "lower": -5.0, "upper": 5.0}
     study = load_study("csf-25-80").with_(
         {"tolerances.axis_tilt_y_deg": wide, "width_mm": 1.0, "requirement.homogenization": homogenization}
     )
@@ -102,3 +103,19 @@ def test_a_search_with_zero_backlash_has_an_answer():
     assert found.feasible and 1.0 - 1e-3 < found.best.variables["deflection_ratio"] < 1.1
     assert found.best.quantities["trailing_flank_room_mm"] > -1e-6
     assert 0 < found.best.quantities["flank_pressure_mpa"] < float("inf")
+
+
+@pytest.mark.parametrize("key", [key for key in STUDY_KEYS if key not in map(study_key, PHASE_OF.values())])
+def test_no_tolerance_reaches_beyond_what_an_error_may_be(key):
+    """Tilts of 95 deg were drawn, and gave 1e16 arcmin."""
+    largest = 5.0
+    for upper, allowed in ((largest, True), (1.1 * largest, False)):
+        tolerance = f'tolerances.{key}={{distribution="uniform", lower=0.0, upper={upper}}}'
+        if allowed:
+            study_problem(load_study("csf-25-80", [tolerance]))
+            load_study("csf-25-80", [f"errors.{key}={upper}"]).errors  # noqa: B018
+            continue
+        with pytest.raises(HdoptError, match=rf"^--set tolerances\.{key}: .*at most 5 (deg|mm) can be computed"):
+            study_problem(load_study("csf-25-80", [tolerance]))
+        with pytest.raises(HdoptError, match="less than or equal to 5"):
+            load_study("csf-25-80", [f"errors.{key}={upper}"])
