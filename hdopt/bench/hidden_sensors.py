@@ -46,6 +46,7 @@ class Eccentricity(Hidden):
     oval_share: float
     oval_direction: float
     scale: float = 0.1  # amplitude in the kinematic error, arcmin
+    link = 2
 
     @classmethod
     def draw(cls, rng: np.random.Generator, on: str, gear: Gear = CSF) -> Self:
@@ -84,6 +85,7 @@ class Interpolation(Hidden):
     skew: float
     scale: float = 0.05
     id = "encoder_interpolation"
+    link = 3
     # A signal distorted more than this would not have passed the encoder's own supervision.
     scale_range = (1e-4, 0.4)
     needs = frozenset({"fine"})
@@ -119,6 +121,7 @@ class Coupling(Hidden):
     scale: float = 1.0  # bend, deg, squared
     ratio: float = CSF.ratio
     id = "output_coupling"
+    link = 1
     scale_range = (1e-4, 15.0**2)
 
     @classmethod

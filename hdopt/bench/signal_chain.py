@@ -30,6 +30,8 @@ class Hidden:
     variant: str
     scale: float
     scale_range = (1e-4, 1e4)
+    link: int = 0
+    """Place between a shaft and the number that is read: joint (1), disc (2), signals of its lines (3)."""
 
     @property
     def needs(self) -> frozenset[str]:
@@ -97,7 +99,8 @@ def set_up(errors: BaseErrors, run: Run, gear: Gear = CSF) -> Setup:
 
 def read_angles(setup: Setup, hidden: Sequence[Hidden] = ()) -> tuple[Array, Array]:
     """Input and output angles (n,) (rad) of the recording `setup` as ideal electronics would read them, with the
-    `hidden` physics in place, in the order of the chain: load, teeth, depth, lag, encoders, clock."""
+    `hidden` physics in place, in the order of the chain: load, teeth, depth, lag, encoders (from the shaft to the
+    number, in whatever order `hidden` is given), clock."""
     run = setup.run
     gain = np.prod([physics.torque_gain for physics in hidden])
     run = replace(run, torque=run.torque * gain)
@@ -109,7 +112,7 @@ def read_angles(setup: Setup, hidden: Sequence[Hidden] = ()) -> tuple[Array, Arr
     ke = setup.gear.rad_per_mm(run.theta) * zone_deviation_mm(setup.zones, cs_mm, fs_mm, extra).max(axis=0)
     output_angle = run.theta / run.ratio - ke - sum(physics.lag(run, ke) for physics in hidden)
     input_angle = run.theta
-    for physics in hidden:
+    for physics in sorted(hidden, key=lambda physics: physics.link):
         input_angle = physics.read_input(input_angle, run)
         output_angle = physics.read_output(output_angle, run)
     for physics in hidden:

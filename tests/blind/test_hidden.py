@@ -12,7 +12,7 @@ from hdopt.bench.hidden_load import Hysteresis, LostMotion, Resonance, ThermalDr
 from hdopt.bench.hidden_outside import ALL_KINDS, Outside
 from hdopt.bench.hidden_sensors import ChannelDelay, Coupling, Eccentricity, Interpolation
 from hdopt.bench.motion import TURN, Heat, Plan, Torque, run
-from hdopt.bench.signal_chain import hidden_wave, joint_rms, read_error, set_up
+from hdopt.bench.signal_chain import hidden_wave, joint_rms, read_angles, read_error, set_up
 
 # A drive with nothing but a sine on its circular spline: simple enough for closed forms.
 QUIET = BaseErrors(*[0.0] * 10, 0.002, 0.0)
@@ -149,6 +149,25 @@ def test_interpolation_gives_once_and_twice_a_line():
     assert amplitude_at(wave, angle, 1024) < 0.02 * amplitude_at(wave, angle, 2048)
     offset = Interpolation("output", 1024, (1.0, 0.0), 0.0, 0.0, 0.02)
     assert amplitude_at(hidden_wave(setup, [offset]), angle, 1024) == pytest.approx(0.02 / 1024 / ARCMIN, rel=0.01)
+
+
+OF_2_ARCMIN = {
+    "joint": Coupling("output", 0.4).scaled(2 / 0.262),
+    "disc": Eccentricity("encoder_output_eccentricity", "centre", 0.3, 0, 0).scaled(2.0),
+}
+
+
+@pytest.mark.parametrize("moved", OF_2_ARCMIN.values(), ids=OF_2_ARCMIN)
+@pytest.mark.parametrize("lines_first", [True, False])
+def test_lines_are_read_behind_a_joint_and_off_centre(moved, lines_first):
+    """The ripple stands at 1000 times the angle that joint and disc leave, in whatever order a case has its physics:
+    2 arcmin move it by 0.6 rad. Would catch lines that are read ahead of the joint."""
+    setup, _ = setup_for([(80, 60)], samples=250)
+    lines = Interpolation("output", 1000, (1.0, 0.0), 0.0, 0.0, 0.02)
+    both = [lines, moved] if lines_first else [moved, lines]
+    alone = read_angles(setup, [moved])[1]
+    ripple = read_angles(setup, both)[1] - alone
+    assert amplitude_at(ripple, alone, 1000) == pytest.approx(0.02 / 1000 / ARCMIN, rel=0.01)
 
 
 def test_bent_joint_of_one_degree_gives_sixteen_arcsec():
