@@ -63,7 +63,7 @@ benchmark: $(VENV)/ready-to-test
 # What `hdopt` needs to run, and what its tests need besides, at the same versions.
 LOCK := uv pip compile --universal --python-version 3.11 --no-header --no-annotate pyproject.toml
 lock:
-	$(LOCK) --upgrade --extra cad -o requirements.lock
+	$(LOCK) --upgrade -o requirements.lock
 	$(LOCK) --upgrade --all-extras -c requirements.lock -o requirements-test.lock
 
 clean:

@@ -160,7 +160,7 @@ def require_cadquery() -> None:
         import cadquery  # noqa: F401
     except ImportError as error:
         if isinstance(error, ModuleNotFoundError) and error.name == "cadquery":
-            says = "CadQuery is not installed; pip install 'hdopt[cad]'"
+            says = "CadQuery is not installed; pip install cadquery"
         else:
             says = f"CadQuery cannot be loaded ({error}); on Debian install libgl1, then try again"
         raise MissingLibrary(says) from error

@@ -159,7 +159,7 @@ def test_machine_without_the_libraries_of_cadquery(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "cadquery", None)
     files = tmp_path / "files"
     files.mkdir()
-    with pytest.raises(HdoptError, match=r"CadQuery is not installed; pip install 'hdopt\[cad\]'"):
+    with pytest.raises(HdoptError, match=r"CadQuery is not installed; pip install cadquery"):
         export_drive(drive(), {"step": files / "wave.step"})
     (tmp_path / "cadquery.py").write_text("raise ImportError('libGL.so.1: cannot open shared object file')")
     monkeypatch.delitem(sys.modules, "cadquery")
