@@ -153,21 +153,20 @@ def _look(work: Singles, room: Room, design: Design, beat: Beat, side: int, wait
 @compiled
 def _find(work: Singles, room: Room, design: Design, beat: Beat) -> None:
     """Fill the least of the drives of `work`, and the negative of the greatest."""
-    bounds, cells, lows, highs = beat.bounds, len(beat.turn.scan.below), 0, 0
+    bounds, cells, waiting = beat.bounds, len(beat.turn.scan.below), np.zeros(2, np.int64)
     for i in range(LANES):
         work[LEAST + i], work[GREATEST + i] = HUGE, HUGE
+    # Sides and numbers of places are counted, not written out: each of them would be compiled for itself.
+    fewest = len(room.lanes)
     for i in range(LANES):
         fill_edges(room.edges, work, i, design, beat.circle, beat.turn.cs, cells)
-        count, below = _gather(work, room, i, bounds, cells, beat.fs_slope, False)
-        lows = _queue(room.queue[0], lows, room, count, below, i)
-        count, below = _gather(work, room, i, bounds, cells, beat.fs_slope, True)
-        highs = _queue(room.queue[1], highs, room, count, below, i)
-        if lows >= LANES:
-            lows = _look(work, room, design, beat, 0, lows, LANES)
-        if highs >= LANES:
-            highs = _look(work, room, design, beat, 1, highs, LANES)
-    _look(work, room, design, beat, 0, lows, 1)
-    _look(work, room, design, beat, 1, highs, 1)
+        for side in range(2):
+            count, below = _gather(work, room, i, bounds, cells, beat.fs_slope, side == 1)
+            waiting[side] = _queue(room.queue[side], waiting[side], room, count, below, i)
+            if waiting[side] >= fewest:
+                waiting[side] = _look(work, room, design, beat, side, waiting[side], fewest)
+    for side in range(2):
+        _look(work, room, design, beat, side, waiting[side], len(waiting) // 2)
 
 
 @entry
