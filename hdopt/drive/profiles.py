@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, runtime_checkable
@@ -340,12 +341,23 @@ class MeasuredProfile:
         knots = np.unique(np.clip(self._spline[0], self._spline[0][5], self._spline[0][5] + 2 * math.pi))
         return sum(_arc_length(self, a, b) for a, b in itertools.pairwise(knots))
 
+    @property
+    def off_centre(self) -> float:
+        """How far the centroid of the area within the curve lies from the origin of its angles, mm."""
+        phi = np.arange(3600) * (math.pi / 1800)
+        r = self.radius(phi)
+        return float(abs(np.sum(r**3 * np.exp(1j * phi)) / 3) / (np.sum(r**2) / 2))
+
+
+_OTHER_UNIT = re.compile(r"(?<![a-zA-Z])(?:rad|[uµμ]m|inch|cm)(?![a-zA-Z])")
+"""What a header says of angles that are not in deg, or radii that are not in mm."""
+
 
 def read_polar(path: Path, what: str) -> tuple[Array, Array]:
     """Angles (rad) and radii (mm) from the CSV file `path` of rows angle_deg, radius_mm, (n,) each, as they stand.
 
     A header line is optional, `#` starts a comment; between semicolons or tabs, numbers may have a decimal comma.
-    Raises `DriveError` that names `what`, file and line.
+    Raises `DriveError`, for a header that names other units too, that names `what`, file and line.
     """
     try:
         text = read_text(path, "a CSV text file", foreign=True)
@@ -362,6 +374,12 @@ def read_polar(path: Path, what: str) -> tuple[Array, Array]:
             require(
                 header_allowed,
                 f"{what} {path}, line {number}: {shown(line)}; each line must hold two numbers, angle_deg,radius_mm",
+            )
+            other = _OTHER_UNIT.search(line)
+            require(
+                other is None,
+                f"{what} {path}, line {number}: {shown(line)} names {other[0] if other else ''}; give angles in deg "
+                "and radii in mm, and name the columns so",
             )
         else:
             points.append((math.radians(angle), radius))

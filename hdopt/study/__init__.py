@@ -118,7 +118,7 @@ class Study:
         fs_teeth = self._teeth("fs_teeth", geometry.flexspline_teeth, geometry.module)
         with self._placed("cs_roundness"):
             ring = self.find("cs_roundness", RoundnessSection)
-            roundness = None if ring is None else ring.build(self.folder)
+            roundness = None if ring is None else ring.build(geometry.module, self.folder)
         return Drive(geometry, wave_generator, clearances, material, load, cs_teeth, fs_teeth, roundness)
 
     def _teeth(self, name: str, teeth: int, module: float) -> MeasuredTeeth | None:

@@ -213,10 +213,11 @@ class RoundnessSection(Section):
     recentre: bool = True
     """Take the first wave out, as roundness does; false keeps the ring's eccentricity against the file's centre."""
 
-    def build(self, folder: Path) -> MeasuredRoundness:
-        """The record; the file lies in `folder`."""
-        points = read_roundness(folder / self.file)
-        return MeasuredRoundness.of(
+    def build(self, module: float, folder: Path) -> MeasuredRoundness:
+        """The record for a spline of a `module`, mm; the file lies in `folder`."""
+        path = folder / self.file
+        points = read_roundness(path)
+        ring = MeasuredRoundness.of(
             *points,
             self.upr,
             zero=math.radians(self.zero_deg),
@@ -224,6 +225,12 @@ class RoundnessSection(Section):
             recentre=self.recentre,
             source=self.file,
         )
+        if ring.peak_to_valley > module:
+            raise HdoptError(
+                f"{path}: the ring is {ring.peak_to_valley:.4g} mm out of round, more than the module of {module:g} "
+                "mm; radii must be in mm"
+            )
+        return ring
 
 
 class ErrorsSection(Section):

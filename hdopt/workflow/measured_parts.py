@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from hdopt.drive.geometry import Drive
+from hdopt.drive.profiles import MeasuredProfile
 
 
 def words_on_measured_parts(drive: Drive) -> list[str]:
@@ -23,6 +24,12 @@ def words_on_measured_parts(drive: Drive) -> list[str]:
         )
         found.append(f"{size} {done}")
         found += [f"{name}: {doubt}" for doubt in teeth.doubts]
+    profile = drive.wave_generator.profile
+    if isinstance(profile, MeasuredProfile):
+        found.append(
+            f"wave_generator: the measured profile lies {1000 * profile.off_centre:.2f} um off its table's centre, "
+            "which is kept as part of its shape, beside wg_eccentricity_mm"
+        )
     ring = drive.cs_roundness
     if ring is not None:
         size = f"cs_roundness: {1000 * ring.peak_to_valley:.2f} um from peak to valley up to {ring.cutoff} UPR;"

@@ -139,3 +139,32 @@ def test_a_bad_row_is_named_with_its_line(folder):
     (folder / "ring.csv").write_text("angle_deg,radius_mm\n0,32\n1,thirty-two\n", encoding="utf-8")
     with pytest.raises(HdoptError, match="measured roundness .*ring.csv, line 3: .*thirty-two"):
         kinematic_error(load_study(folder / "own.toml"))
+
+
+@pytest.mark.parametrize(
+    ("head", "factor", "said"),
+    [
+        ("angle_deg,radius_um", 1000, "line 1: .* names um; give angles in deg and radii in mm"),
+        ("angle_rad,radius_mm", 1, "line 1: .* names rad; give angles in deg"),
+        ("Winkel in Grad;Radius", 1000, "ring.csv: the ring is .* mm out of round, more than the module of 0.396 mm"),
+    ],
+)
+def test_a_ring_in_other_units_is_refused(folder, head, factor, said):
+    """Radii in um were 158 arcmin, without a word."""
+    rows = [f"{math.degrees(a):.4f};{factor * (RADIUS + 0.003 * math.cos(3 * a)):.7f}" for a in TURN]
+    (folder / "ring.csv").write_text("\n".join([head.replace(",", ";"), *rows]), encoding="utf-8")
+    with pytest.raises(HdoptError, match=said):
+        load_study(folder / "own.toml").drive  # noqa: B018
+
+
+def test_how_far_a_measured_cam_lies_off_its_centre_is_said(tmp_path):
+    """An ellipse shifted by 12 and 16 um, in polar coordinates about the old centre: 20 um."""
+    t = np.arange(1440) * np.pi / 720
+    points = 31.046 * np.cos(t) + 0.012 + 1j * (30.318 * np.sin(t) + 0.016)
+    rows = [f"{np.degrees(np.angle(z)):.6f},{abs(z):.7f}" for z in points]
+    (tmp_path / "cam.csv").write_text("angle_deg,radius_mm\n" + "\n".join(rows), encoding="utf-8")
+    keys = "[wave_generator]\nprofile = 'measured'\nsurface = 'bearing'\nfile = 'cam.csv'\n"
+    (tmp_path / "own.toml").write_text(f'drive = "csf-25-80"\n{keys}', encoding="utf-8")
+    study = load_study(tmp_path / "own.toml")
+    assert study.drive.wave_generator.profile.off_centre == pytest.approx(0.02, abs=1e-6)
+    assert any("lies 20.00 um off its table's centre, which is kept" in note for note in kinematic_error(study).notes)

@@ -176,7 +176,7 @@ def test_a_measured_ring_has_its_filter_its_zero_and_its_sense(tmp_path):
                 recentre=recentre,
                 source="ring.csv",
             )
-            assert section.build(tmp_path) == expected
+            assert section.build(0.396, tmp_path) == expected
 
 
 def test_a_measured_cam_lies_inside_the_bearing(tmp_path):
