@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
+from hdopt.errors import HdoptError
 from hdopt.figures import drawn
 from hdopt.files import ShownAsTable
 from hdopt.kinematics.model_error import ModelError
@@ -105,6 +106,18 @@ class SobolResult(ShownAsTable):
         table = self.sobol or self.shapley
         assert table is not None, "a result holds indices, effects, or both"
         return table.to_frame()
+
+    def to_salib(self) -> Any:
+        """The Sobol' indices of inputs and pairs as SALib's own result: a `ResultDict` with `to_df()` and `plot()`,
+        intervals as half widths. Raises `HdoptError` where there are Shapley effects alone."""
+        if self.sobol is None:
+            raise HdoptError(
+                "correlated inputs have no Sobol' indices, and SALib has no Shapley effects: this result is to_frame() "
+                "alone"
+            )
+        from hdopt.tolerance.sobol_in_salib import sobol_in_salib
+
+        return sobol_in_salib(self.sobol)
 
     def plot(self, backend: str = "plotly") -> go.Figure | MatplotlibFigure:
         """First-order and total index of every input, or its Shapley effect, with intervals.

@@ -6,7 +6,9 @@ import pytest
 from hdopt.errors import HdoptError
 from hdopt.tolerance.copula import CorrelationGroup
 from hdopt.tolerance.distributions import Normal, Uniform
+from hdopt.tolerance.results import SobolResult
 from hdopt.tolerance.screening import METHODS, run_screening, salib_problem
+from hdopt.tolerance.sensitivity import run_sobol
 from hdopt.tolerance.space import InputSpace, Tolerance
 
 NAMES = ("x1", "x2", "x3")
@@ -75,3 +77,30 @@ def test_correlated_inputs_are_refused_where_independence_is_needed():
         run_screening(ishigami, SPACE, "moris")
     with pytest.raises(HdoptError, match="n is 10, too small for delta; take at least 128"):
         run_screening(ishigami, SPACE, "delta", n=10)
+
+
+def test_sobol_indices_are_salibs_result_too():
+    """The same keys, shapes and tables as SALib's own analysis, which sees the same function; the numbers are ours."""
+    from SALib.analyze import sobol as analysis
+    from SALib.sample import sobol as sampler
+
+    problem = salib_problem(SPACE)
+    theirs = analysis.analyze(problem, ishigami(np.pi * (2 * sampler.sample(problem, 4096, seed=1) - 1)), seed=1)
+    found = run_sobol(ishigami, SPACE, n=2**15, engine="process")
+    ours = SobolResult("ishigami", found).to_salib()
+    assert type(ours) is type(theirs) and list(ours) == list(theirs)
+    for key in theirs:
+        assert np.isnan(ours[key]).tolist() == np.isnan(theirs[key]).tolist()
+        # their own intervals of 4096 base points are up to 0.1 wide
+        assert ours[key] == pytest.approx(theirs[key], abs=0.1, nan_ok=True)
+    for our, their in zip(ours.to_df(), theirs.to_df(), strict=True):
+        assert our.index.tolist() == their.index.tolist() and our.columns.tolist() == their.columns.tolist()
+    for i, (name, index) in enumerate(found.inputs.items()):
+        assert name == NAMES[i]
+        assert (ours["S1"][i], ours["ST"][i]) == (index.S1.value, index.ST.value)
+        assert ours["ST_conf"][i] == pytest.approx(index.ST.high - index.ST.value, rel=1e-9)
+    for (a, b), pair in found.second.items():
+        assert ours["S2"][NAMES.index(a), NAMES.index(b)] == pair.value
+    assert ours.plot() is not None
+    with pytest.raises(HdoptError, match="SALib has no Shapley effects"):
+        SobolResult("none").to_salib()
