@@ -7,6 +7,7 @@ the spline has teeth are listed.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from pathlib import Path
 from typing import Any  # Any: an element has the type of its parser
@@ -22,6 +23,7 @@ UNITS = {"um": 1e-3, "mm": 1.0}
 """mm in one unit of the file's numbers."""
 MOST_BYTES = 50_000_000
 """A file of all that was measured on a gear has a few MB."""
+DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
 LISTED = 6
 """Paths listed in a message."""
 
@@ -87,9 +89,15 @@ def _root(path: Path) -> Any:
 
 
 def _numbers(element: Any) -> list[float] | None:
-    """The numbers in the text of an `element`, apart by spaces, commas or semicolons; None where it holds others."""
+    """The numbers in the text of an `element`, apart by spaces, commas or semicolons; None where it holds others.
+
+    A comma between digits, one in what spaces and semicolons part, is that of a decimal number.
+    """
+    words: list[str] = []
+    for word in (element.text or "").replace(";", " ").split():
+        words += [word.replace(",", ".")] if DECIMAL_COMMA.fullmatch(word) else filter(None, word.split(","))
     try:
-        return [float(word) for word in (element.text or "").replace(",", " ").replace(";", " ").split()]
+        return [float(word) for word in words]
     except ValueError:
         return None
 

@@ -123,7 +123,10 @@ def of_allocation(result: AllocateResult) -> Verdict:
 
 def of_search(study: Study, result: SearchResult) -> Verdict | None:
     """The best design in the `result` of a search of `study` against [requirement], in the quantity that was searched
-    for; None where the study has none, where that is no peak-to-peak, or is of another share of drives."""
+    for; None where the study has none, where that is no peak-to-peak or of another share of drives, and where no design
+    keeps the search's own limits: the nearest is none to be built."""
+    if not result.feasible:
+        return None
     return _of_best(study, result.objective, result.setup.settings.quantile, result.best.quantities)
 
 
@@ -155,7 +158,7 @@ def of_run(study: Study, found: Mapping[str, Mapping[str, Any]]) -> Verdict | No
         if isinstance(value, float):
             return Verdict("peak-to-peak", value, section.peak_to_peak_arcmin, "arcmin")
     searched = found.get("search", {})
-    if "best" in searched:
+    if "best" in searched and searched.get("feasible", True):
         from hdopt.study.search import SearchSection
 
         share = study.section("search", SearchSection, "a search").quantile

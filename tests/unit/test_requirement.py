@@ -48,11 +48,26 @@ def test_what_is_short_is_said_in_plain_digits(value, by):
 )
 def test_a_search_by_what_the_requirement_asks_for_and_nothing_else(objective, share, whose, value):
     result = SimpleNamespace(
+        feasible=True,
         objective=objective,
         setup=SimpleNamespace(settings=SimpleNamespace(quantile=share)),
         best=SimpleNamespace(quantities={"peak_to_peak_arcmin": 1.1, "peak_to_peak_quantile_arcmin": 1.3}),
     )
     assert pair(of_search(study(homogenization=whose), result)) == (None if value is None else (value, 1.2, False))
+
+
+def test_a_design_that_breaks_the_searchs_limits_meets_no_requirement():
+    """'requirement met: ..., best design' stood under 'no design meets all limits'."""
+    result = SimpleNamespace(
+        feasible=False,
+        objective="peak_to_peak_arcmin",
+        setup=SimpleNamespace(settings=SimpleNamespace(quantile=0.97)),
+        best=SimpleNamespace(quantities={"peak_to_peak_arcmin": 1.1}),
+    )
+    assert of_search(study(), result) is None
+    result.feasible = True
+    assert of_search(study(), result).met
+    assert of_run(study(), {"search": {**SEARCH, "feasible": False}}) is None
 
 
 STACK = {"required_yield": 0.97, "yield": {"value": 0.99, "low": 0.98, "high": 1.0}}

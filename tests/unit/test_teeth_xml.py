@@ -112,3 +112,21 @@ def test_a_study_takes_them_as_it_takes_a_table(file, tmp_path):
         drive("teeth.csv", *XML)
     with pytest.raises(HdoptError, match="its flank is said by xml_path"):
         drive("teeth.xml", *XML, 'flank = "left"')
+
+
+@pytest.mark.parametrize("text", ["{}", " {} ", "{} ; {}", "{};{}", "{} {}"])
+def test_decimal_commas_are_no_further_numbers(tmp_path, text):
+    """Half as many elements as teeth, each with a comma, passed for all teeth: 1,25 was 1 and 25."""
+    given = [-1.25, 0.5, 3e-1, 12.75, 0.0, -0.125, 2.5, 7.75]
+    words = [f"{value:.3f}".replace(".", ",") for value in given]
+    each = text.count("{}")
+    elements = (text.format(*words[i : i + each]) for i in range(0, len(words), each))
+    (tmp_path / "t.xml").write_text(f"<g>{''.join(f'<v>{one}</v>' for one in elements)}</g>")
+    assert read_teeth_xml(tmp_path / "t.xml", 8, ".//v", "mm").tolist() == pytest.approx(given)
+    with pytest.raises(DriveError, match="finds 8 numbers; this spline has 16 teeth"):
+        read_teeth_xml(tmp_path / "t.xml", 16, ".//v", "mm")
+
+
+def test_commas_part_numbers_that_have_points_or_stand_in_a_row(tmp_path):
+    (tmp_path / "t.xml").write_text("<g><v>1.5,2.5</v><v>3, 4, 5</v><v>6,7,8</v></g>")
+    assert read_teeth_xml(tmp_path / "t.xml", 8, ".//v", "mm").tolist() == [1.5, 2.5, 3, 4, 5, 6, 7, 8]
