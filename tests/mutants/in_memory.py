@@ -26,7 +26,7 @@ def put_in_memory(path: Path, old: str, new: str) -> None:
     machine code was made of one of them.
     """
     changed = _changed(compile(old, str(path), "exec"), compile(new, str(path), "exec"))
-    live = [one for one in gc.get_objects() if isinstance(one, FunctionType) and _is_from(one, path)]
+    live = [one for one in _objects() if isinstance(one, FunctionType) and _is_from(one, path)]
     if not live:
         return
     if missing := set(changed) - {one.__code__.co_qualname for one in live}:
@@ -57,7 +57,7 @@ def mark_calls(path: Path, text: str, names: Set[str], number: int) -> None:
     _insert(tree, "", names, ast.parse(f'__import__("sys")._fault_called({number})').body[0])
     marked = dict(_functions(compile(ast.fix_missing_locations(tree), str(path), "exec")))
     plain = names - _compiled_functions(path)
-    for function in [one for one in gc.get_objects() if isinstance(one, FunctionType) and _is_from(one, path)]:
+    for function in [one for one in _objects() if isinstance(one, FunctionType) and _is_from(one, path)]:
         code = marked.get(function.__code__.co_qualname)
         if code is not None and function.__code__.co_qualname in plain:
             if code.co_freevars == function.__code__.co_freevars:
@@ -76,6 +76,12 @@ def _insert(node: ast.AST, prefix: str, names: Set[str], call: ast.stmt) -> None
         _insert(child, inner, names, call)
 
 
+def _objects() -> list[object]:
+    """Everything in memory, what was frozen (`tests/conftest.py`) too, which the collector would not list."""
+    gc.unfreeze()
+    return gc.get_objects()
+
+
 def _functions(code: CodeType) -> Iterator[tuple[str, CodeType]]:
     for one in _codes(code):
         if one.co_flags & CO_OPTIMIZED:
@@ -85,16 +91,16 @@ def _functions(code: CodeType) -> Iterator[tuple[str, CodeType]]:
 
 def forget_results() -> None:
     """Without what functions were told to remember, threads among it that a new process does not have."""
-    for one in gc.get_objects():
+    for one in _objects():
         if isinstance(one, functools._lru_cache_wrapper):
             one.cache_clear()
 
 
 def forget_modules(folder: Path) -> None:
-    """Without the modules below `folder`: they are read again."""
+    """Without the modules below `folder`: they are read again. What was started stays: a worker asks for its name."""
     for name, module in list(sys.modules.items()):
         file = getattr(module, "__file__", None)
-        if file is not None and Path(file).is_relative_to(folder):
+        if name != "__main__" and file is not None and Path(file).is_relative_to(folder):
             del sys.modules[name]
 
 
@@ -108,7 +114,7 @@ def _compiled_functions(path: Path) -> set[str]:
 
     from hdopt.late import Late
 
-    made = (one.py_func for one in gc.get_objects() if isinstance(one, Dispatcher | Late))
+    made = (one.py_func for one in _objects() if isinstance(one, Dispatcher | Late))
     return {one.__code__.co_qualname for one in made if _is_from(one, path)}
 
 

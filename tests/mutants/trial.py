@@ -127,6 +127,8 @@ def _session(file: str, faults: Sequence[Fault], tree: Path, folder: Path, out: 
             def child(
                 path: Path = path, before: str = before, after: str = after, first: LikelyFirst = first
             ) -> NoReturn:
+                if "distributed" in sys.modules:  # Its loop runs in a thread, which a child has not: it would wait.
+                    os._exit(99)
                 try:
                     put_in_memory(path, before, after)
                 except NotInMemory:
