@@ -92,10 +92,15 @@ def test_what_a_worker_calls_runs_in_turn():
     """Cores are shared out once: threads of threads would be four times as many as cores."""
 
     def nested(i):
-        return in_a_worker(), threads_for(100), list(Threads(8).map(lambda j: threading.current_thread().name, [i, i]))
+        own = threading.current_thread().name
+        return in_a_worker(), threads_for(100), own, list(Threads(8).map(lambda j: threading.get_ident(), [i, i]))
 
-    for inside, threads, names in Threads(2).map(nested, range(4)):
-        assert inside and threads == 1 and set(names) == {names[0]} and names[0].startswith("hdopt")
+    def whose(i):
+        return threading.current_thread().name, nested(i), threading.get_ident()
+
+    for name, (inside, threads, own, idents), ident in Threads(2).map(whose, range(4)):
+        assert inside and threads == 1 and own == name and name.startswith("hdopt")
+        assert idents == [ident, ident]  # the worker's own thread, not one of eight more that happens to be quick
     assert not in_a_worker()
 
 
