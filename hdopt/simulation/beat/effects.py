@@ -12,7 +12,6 @@ from hdopt.kinematics.lanes.minima import GROUP
 from hdopt.kinematics.lanes.single import single
 from hdopt.simulation.turn.effects import (
     FARTHEST,
-    FEWEST_CELLS,
     LEFT_BY_CELL,
     LEFT_BY_PLACE,
     NO_PARTS,
@@ -28,6 +27,8 @@ from hdopt.simulation.turn.effects import (
     table_of,
 )
 
+FEWEST_CELLS = 60
+"""Wider cells than of effects that repeat, since each is taken in every turn, and places are looked at twice."""
 MOST_BOUNDS = 2**18
 """Cells of all turns at most: 4 MiB of bounds."""
 OFFSET = 0.1

@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from hdopt.arrays import Singles
-from hdopt.kinematics.compiled_closed_form import compiled
 from hdopt.kinematics.lanes.compiled import inlined
 from hdopt.kinematics.lanes.minima import GROUP
 from hdopt.kinematics.lanes.single import HALF, HUGE, ONE, TINY, ZERO, clipped, unsigned
@@ -60,7 +59,7 @@ def _end(edges: Singles, g: int, one: int, two: int, x: float) -> End:
     return End(mean, HALF * (us + ws), HALF * (uc + wc), half, HALF * (us - ws), HALF * (uc - wc), o_one, o_two, x)
 
 
-@compiled
+@inlined
 def _meet_fs(rows: Singles, start: int, end: End, kind: int, room: Singles, side: int) -> None:
     """Put into `room`, for a side of a piece, the row of a `kind` of the effects at an end of it: the mean (0) or half
     the difference (1) with those on the FS where its zones meet them. More streams than one at a time the compiler
@@ -79,7 +78,7 @@ def _meet_fs(rows: Singles, start: int, end: End, kind: int, room: Singles, side
             room[to + j] = value + two * (rows[b] + share * (rows[b + step] - rows[b]))
 
 
-@compiled
+@inlined
 def _loosen_fs(rows: Singles, start: int, off: float, room: Singles) -> None:
     """Put into `room` how far the effects go beyond their chords where o' is at most `off`, rad."""
     turns, squared = len(room) // (2 * KINDS), off * off
@@ -107,7 +106,7 @@ def _at_ends(
     )
 
 
-@compiled
+@inlined
 def _lower(phases: Singles, rows: Singles, start: int, left: End, right: End, out: Singles) -> None:
     """Lower `out` (turns,) to the least of a piece in every turn, with the effects whose `rows` begin at `start`."""
     size, at = unsigned(len(out)), unsigned(start)
@@ -122,7 +121,7 @@ def _lower(phases: Singles, rows: Singles, start: int, left: End, right: End, ou
             out[j] = min(out[j], least - rows[slack + j])
 
 
-@compiled
+@inlined
 def _raise(phases: Singles, rows: Singles, start: int, left: End, right: End, out: Singles) -> None:
     """Lower `out` (turns,) to the negative of the greatest of the same."""
     size, at = unsigned(len(out)), unsigned(start)
@@ -156,9 +155,8 @@ def _bound_piece(
     left, right = _end(edges, g, one, two, first), _end(edges, g, one, two, last)
     start = (2 + KINDS * g) * turns
     if len(room):
-        for kind in range(2):
-            _meet_fs(bounds, start, left, kind, room, 0)
-            _meet_fs(bounds, start, right, kind, room, 1)
+        for each in range(4):
+            _meet_fs(bounds, start, left if each < 2 else right, each % 2, room, each // 2)
         off = max(max(abs(left.one), abs(left.two)), max(abs(right.one), abs(right.two)))
         _loosen_fs(bounds, start, off, room)
         left, right = _sharing(left, ZERO), _sharing(right, ONE)
@@ -182,7 +180,7 @@ def _change(edges: Singles, g: int, row: int) -> tuple[int, int, float]:
     return before, then, (here / (here - after) if before != then else ONE)
 
 
-@compiled
+@inlined
 def bound_turns(edges: Singles, g: int, bounds: Singles, room: Singles, high: bool, out: Singles) -> bool:
     """Fill `out` (turns, padded) with the least driving deviation in cell `g` of every turn, mm of arc less what the
     effects' lines leave out, or (`high`) with that of its negative: with those `edges` of the drive and these `bounds`
@@ -192,12 +190,12 @@ def bound_turns(edges: Singles, g: int, bounds: Singles, room: Singles, high: bo
         out[j] = HUGE
     one, one_then, x_one = _change(edges, g, GAP)
     two, two_then, x_two = _change(edges, g, GAP + GROUP)
-    first, last = min(x_one, x_two), max(x_one, x_two)
-    _bound_piece(edges, g, bounds, room, high, (one, 2 + two), (ZERO, first), out)
-    if first < ONE:
-        ahead = x_one < x_two
-        after = (one_then if ahead else one, 2 + (two if ahead else two_then))
-        _bound_piece(edges, g, bounds, room, high, after, (first, last), out)
-    if last < ONE:
-        _bound_piece(edges, g, bounds, room, high, (one_then, 2 + two_then), (last, ONE), out)
+    first, start = min(x_one, x_two), ZERO
+    # One loop, since each piece would else be compiled for itself.
+    for piece in range(3):
+        end = first if piece == 0 else (max(x_one, x_two) if piece == 1 else ONE)
+        if piece == 0 or end > start:
+            branches = (one if start < x_one else one_then, 2 + (two if start < x_two else two_then))
+            _bound_piece(edges, g, bounds, room, high, branches, (start, end), out)
+        start = end
     return first < ONE
