@@ -17,7 +17,7 @@ from hdopt.kinematics.peak_to_peak import beat_extremes_arcmin, matrix_peak_to_p
 from hdopt.mechanics.contact import contact_angle, meshing_teeth
 from hdopt.study import load_study
 from hdopt.tolerance.distributions import Uniform
-from hdopt.tolerance.drawn_teeth import DrawnTeeth, GradedTeeth, drawn_peak_to_peak_arcmin
+from hdopt.tolerance.drawn_teeth import DrawnTeeth, GradedTeeth, drawn_peak_to_peak_arcmin, tables_of_teeth
 from hdopt.tolerance.drive_inputs import drive_problem
 from hdopt.tolerance.linearise import linearise
 from hdopt.tolerance.screening import run_screening
@@ -273,3 +273,21 @@ def test_an_explorer_says_whose_teeth_are_drawn():
     assert any(
         "cloud's drives have teeth drawn from tolerances of pitch (cs_teeth)" in note for note in _notes(study())
     )
+
+
+def test_both_tolerances_are_told_in_micrometres():
+    """Fault caught: the single pitch's tolerance in the place of the cumulative one's."""
+    told = GradedTeeth(replace(TOLERANCES, single=0.004, cumulative=0.011)).to_dict(40)
+    assert (told["single_pitch_um"], told["cumulative_pitch_um"]) == pytest.approx((4.0, 11.0))
+
+
+def test_what_is_measured_of_a_spline_stays_beside_what_is_drawn():
+    """Fault caught: drawn teeth in the place of the measured ones."""
+    design, g = drive(), np.random.default_rng(5)
+    own, drawn = g.normal(0, 0.002, Z), g.normal(0, 0.002, (2, Z))
+    measured, rows = replace(design, cs_teeth=MeasuredTeeth(tuple(own))), slice(0, 2)
+    alone, _ = tables_of_teeth(measured, lambda rows: {})(rows)
+    beside, _ = tables_of_teeth(design, lambda rows: {"cs_teeth": drawn[rows]})(rows)
+    both, _ = tables_of_teeth(measured, lambda rows: {"cs_teeth": drawn[rows]})(rows)
+    assert np.ptp(alone) > 1e-4
+    assert both == pytest.approx(alone + beside, abs=1e-12)

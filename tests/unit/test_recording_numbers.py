@@ -12,6 +12,7 @@ from scipy import stats
 
 from hdopt.errors import HdoptError
 from hdopt.recordings import figures
+from hdopt.recordings.bench import load_bench
 from hdopt.recordings.capability import gauge, outliers, performance
 from hdopt.recordings.channels import mapped_channels, sensor_uncertainty_arcmin
 from hdopt.recordings.clocks import on_one_clock, seconds_of
@@ -565,3 +566,11 @@ def test_a_torque_of_which_nine_tenths_are_missing_is_not_filled():
     few = np.where(np.arange(1000) % 20, np.nan, 5.0)
     with pytest.raises(HdoptError, match="950 of 1000 rows hold missing values"):
         drop_incomplete_rows(rows_read(error=np.zeros(1000), torque=few))
+
+
+def test_an_encoders_step_and_uncertainty_are_each_its_own(tmp_path):
+    """Fault caught: the one in the place of the other, 0.01 deg being 36 arcsec."""
+    path = tmp_path / "bench.toml"
+    path.write_text('[columns.input]\ncolumn = "a"\nunit = "deg"\nstep_deg = 0.01\nuncertainty_arcsec = 7.0\n')
+    column = load_bench(path).columns["input"]
+    assert (column.step_deg, column.uncertainty_arcsec) == (0.01, 7.0)

@@ -16,6 +16,7 @@ from hdopt.tolerance.distributions import Normal, Uniform
 from hdopt.tolerance.drive_inputs import Direct, DriveResponse, VectorSum
 from hdopt.tolerance.empirical import KeepAll
 from hdopt.tolerance.intervals import clopper_pearson, order_statistic_ranks, smallest_n, student_half_width
+from hdopt.tolerance.linear_stack import Dimension, linear_problem
 from hdopt.tolerance.linearise import linearise
 from hdopt.tolerance.sampling import PlainMonteCarlo, ScrambledSobol
 from hdopt.tolerance.space import InputSpace, Tolerance
@@ -319,3 +320,13 @@ def test_the_widest_errors_are_the_largest_of_either_side(lower, upper):
 def test_many_teeth_even_out_the_bound():
     box = np.array([0.0, -0.2]), np.array([0.01, 0.2])
     assert response(0.2).upper_bound(*box) == pytest.approx(0.2 * response().upper_bound(*box))
+
+
+@pytest.mark.parametrize("sigmas", [3.0, 6.0])
+def test_a_dimension_has_its_sigmas_within_its_tolerance(sigmas):
+    """0.6 mm to either side: one standard deviation is 0.2 and 0.1 mm. The tails beyond the tolerance, 2.7e-3 of all at
+    three sigmas, are cut off. Fault caught: a fixed number of sigmas."""
+    _, space = linear_problem({"gap": Dimension(1.0, 0.6, sigmas)})
+    kept = stats.norm.cdf(sigmas) - stats.norm.cdf(-sigmas)
+    u = (stats.norm.cdf(1.0) - stats.norm.cdf(-sigmas)) / kept
+    assert space.sample(np.array([[u]]))[0, 0] == pytest.approx(0.6 / sigmas, rel=1e-9)
