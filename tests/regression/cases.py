@@ -32,8 +32,8 @@ SINGLES = {
 """Effect -> its cases: size in units of the drive's own error -> seed.
 
 Both sizes where they are answered by different rules or excuses (`tests/unit/test_named_cases.py`), and where both are
-quick; else that which is answered sooner. A second size of one effect goes the way of the first: through the same
-candidates, with another wave. What thresholds do at faint sizes is asked number by number in
+quick; else one of them. A second size of one effect goes the way of the first, through the same candidates, with
+another wave. What thresholds do at faint sizes is asked number by number in
 `tests/unit/test_diagnosis_numbers.py`, and case by case in a run of the proof (docs/proof.md).
 """
 
