@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import re
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -38,7 +40,7 @@ class Verification(ShownAsTable):
 
     @property
     def repeated(self) -> bool:
-        """Whether every file came out with the same bytes (the page's date and the provenance apart)."""
+        """Whether every file came out with the same bytes (the moment of writing and the provenance apart)."""
         return not self.differing
 
     def to_dict(self) -> dict[str, Any]:
@@ -113,20 +115,31 @@ def _results_of(folder: Path) -> dict[str, Any]:
     return cast(dict[str, Any], old)
 
 
+MOMENTS = {
+    ".step": re.compile(rb"(?<=')\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?=')"),
+    ".dxf": re.compile(rb"\$TD(?:CREATE|UPDATE)\n 40\n.*|(?<= @ )\d{4}-\d\d-\d\dT[\d:.+]+|(?<=date )\d{4}-\d\d-\d\d"),
+    ".html": re.compile(rb'<script type="application/octet-stream".*?</script>', re.DOTALL),
+}
+"""Where a file says when it was written; of the page the files that it carries, each of which is compared by itself."""
+
+
 def _alike(old: Path, new: Path, then: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
-    """Whether two files have the same bytes; of the page, but for its date."""
+    """Whether two files have the same bytes but for the moment that they were written."""
     try:
         one, two = old.read_bytes(), new.read_bytes()
     except OSError:
         return False
     if old.name == REPORT_FILE:
         one, two = (b.replace(p.get("date", "").encode(), b"") for b, p in ((one, then), (two, now)))
+    if one != two and old.suffix in MOMENTS:
+        one, two = (MOMENTS[old.suffix].sub(b"", content) for content in (one, two))
     return one == two
 
 
 def _moved(value: Any, folder: Path) -> Any:
     """JSON without the place of its folder."""
-    return json.loads(json.dumps(value).replace(json.dumps(str(folder))[1:-1], ""))
+    place = json.dumps(f"{folder}{os.sep}")[1:-1]
+    return json.loads(json.dumps(value).replace(place, ""))
 
 
 def _differences(old: Any, new: Any, place: str = "") -> Iterator[tuple[str, Any, Any]]:
