@@ -4,12 +4,15 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 
 def hdopt(folder, *arguments):
     command = [sys.executable, "-m", "hdopt", "run", *arguments]
     return subprocess.run(command, capture_output=True, text=True, cwd=folder)
 
 
+@pytest.mark.slow
 def test_parts_written_later_are_the_same_and_a_changed_one_is_told(tmp_path):
     """Would catch the second at which STEP and DXF, and with them the page, were written; and a mask over more."""
     made = hdopt(tmp_path, "csf-25-80", "-o", "out", "--set", 'study.steps=["geometry"]')
