@@ -31,8 +31,12 @@ def entry(function: Function) -> Function:
 
 
 def compiled(function: Function) -> Function:
-    """`function` compiled once, called by other compiled ones."""
-    return cast("Function", njit(**OPTIONS)(function))
+    """`function` for other compiled ones: LLVM puts it into each of its callers.
+
+    It must: what stays a function of its own is compiled once for itself and once more with its caller, with other
+    rounding. The process that compiles takes the first, one that loads the caller from disk the second.
+    """
+    return cast("Function", njit(forceinline=True, **OPTIONS)(function))
 
 
 rigid_motion = inlined(closed_form.rigid_motion)

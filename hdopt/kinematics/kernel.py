@@ -175,7 +175,7 @@ def _look_again(work: Singles, lanes: Index, design: Design) -> None:
         _look_at_list(work, lanes, count, design, True)
 
 
-@entry
+@compiled
 def block_of_lanes(errors: Array, work: Singles, lanes: Index, design: Design) -> None:
     """Fill VALUE of the first area of `work` (WORK,) with the peak-to-peak, mm of arc, of the drives with `errors`
     (12 LANES,), error by error; `lanes` (LANES,) is room for a list, `design` what the drives share."""

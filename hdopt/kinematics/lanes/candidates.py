@@ -13,7 +13,6 @@ from typing import NamedTuple
 from hdopt.arrays import Singles
 from hdopt.kinematics.closed_form import RigidMotion
 from hdopt.kinematics.compiled_closed_form import compiled
-from hdopt.kinematics.lanes.compiled import inlined
 from hdopt.kinematics.lanes.motion import AREA, COS, KIND, LANES, SIN, Design, Teeth, motion_of, teeth_of
 from hdopt.kinematics.lanes.single import HALF, HUGE, ONE, TINY, TWO, ZERO, clipped, single
 
@@ -70,7 +69,7 @@ class Level(NamedTuple):
     share: float
 
 
-@inlined
+@compiled
 def first_order(motion: RigidMotion[float], teeth: Teeth, tan_alpha: float) -> FirstOrder:
     """t and d of a drive of `motion` and `teeth` under a pressure angle of tangent `tan_alpha`."""
     return FirstOrder(
@@ -84,7 +83,7 @@ def first_order(motion: RigidMotion[float], teeth: Teeth, tan_alpha: float) -> F
     )
 
 
-@inlined
+@compiled
 def direction(c: float, s: float) -> tuple[float, float, float]:
     """Where c cos + s sin peaks, by cosine and sine, from its parts `c` and `s`; and the peak. (1, 0) if both are 0."""
     size = math.sqrt(c * c + s * s)
@@ -92,13 +91,13 @@ def direction(c: float, s: float) -> tuple[float, float, float]:
     return (c * per_size if size > TINY else ONE), (s * per_size if size > TINY else ZERO), size
 
 
-@inlined
+@compiled
 def at_most(c: float, s: float) -> float:
     """A bound of the length of (`c`, `s`), 12 % above it at most: cheaper than a root."""
     return max(abs(c), abs(s)) + HALF * min(abs(c), abs(s))
 
 
-@inlined
+@compiled
 def second_order(motion: RigidMotion[float], teeth: Teeth, design: Design) -> float:
     """By how much terms of second order may lower the deviation of a drive of `motion` and `teeth` under a `design`, mm
     of arc."""
@@ -110,14 +109,14 @@ def second_order(motion: RigidMotion[float], teeth: Teeth, design: Design) -> fl
     return design.tan_alpha * of_depth + (at_most(teeth.cs_cos, teeth.cs_sin) + teeth.fs) * offset
 
 
-@inlined
+@compiled
 def _found(f: FirstOrder, cos: float, sin: float, number: float) -> Candidate:
     t = f.t_cos * cos + f.t_sin * sin + f.t_0
     d = f.d_cos * cos + f.d_sin * sin + f.d_0
     return Candidate(abs(t) + max(ZERO, abs(d) - f.fs), cos, sin, number)
 
 
-@inlined
+@compiled
 def _better(work: Singles, slot: int, found: Candidate, best: Candidate) -> Candidate:
     """The better of `best` and `found`, which is stored at a `slot` of `work`."""
     work[slot + BOUNDS], work[slot + COSINES], work[slot + SINES] = found.bound, found.cos, found.sin
@@ -130,7 +129,7 @@ def _better(work: Singles, slot: int, found: Candidate, best: Candidate) -> Cand
     )
 
 
-@inlined
+@compiled
 def _best_of_pair(work: Singles, slot: int, f: FirstOrder, level: Level, number: float, best: Candidate) -> Candidate:
     """The better of `best` and both angles of a `level`, stored at a `slot` and the next one."""
     share = clipped(level.share, -ONE, ONE)

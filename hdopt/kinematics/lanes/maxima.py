@@ -10,7 +10,6 @@ from hdopt.arrays import Singles
 from hdopt.kinematics.closed_form import RigidMotion
 from hdopt.kinematics.compiled_closed_form import compiled
 from hdopt.kinematics.lanes.candidates import direction, first_order
-from hdopt.kinematics.lanes.compiled import inlined
 from hdopt.kinematics.lanes.motion import (
     LANES,
     VALUE,
@@ -61,7 +60,7 @@ class Crest(NamedTuple):
     step: float
 
 
-@inlined
+@compiled
 def crest_of(at: Branch, teeth: Teeth, design: Design, angle: Angle, s: float, k: float, farthest: float) -> Crest:
     """The crest of zone `s` and rim `k` near an `angle`, over all FS phases of the `teeth` under a `design`, at most
     `farthest` (rad) away; `at` is the branch there."""
@@ -85,14 +84,14 @@ def crest_of(at: Branch, teeth: Teeth, design: Design, angle: Angle, s: float, k
     return Crest(value, angle.cos, angle.sin, s, k, back if other else off, at.offset, step)
 
 
-@inlined
+@compiled
 def _crest(motion: RigidMotion[float], teeth: Teeth, design: Design, angle: Angle, s: float, k: float) -> Crest:
     """The crest of zone s and rim k near the angle, over all FS phases."""
     at = branch_at(place_at(motion, angle.cos, angle.sin), motion, teeth, design, s, k)
     return crest_of(at, teeth, design, angle, s, k, FARTHEST)
 
 
-@inlined
+@compiled
 def _higher(one: Crest, two: Crest) -> Crest:
     other = two.value > one.value
     return Crest(
@@ -107,7 +106,7 @@ def _higher(one: Crest, two: Crest) -> Crest:
     )
 
 
-@inlined
+@compiled
 def top_of(at: Branch, teeth: Teeth, design: Design, crest: Crest, farthest: float) -> float:
     """The height of a `crest`, mm of arc, from a parabola of the branch `at` the place to which the first one led, at
     most `farthest` (rad) away; `teeth` and `design` as before."""
@@ -120,7 +119,7 @@ def top_of(at: Branch, teeth: Teeth, design: Design, crest: Crest, farthest: flo
     return at.value + teeth.fs * cos + step * (slope + HALF * step * bend)
 
 
-@inlined
+@compiled
 def _top(motion: RigidMotion[float], teeth: Teeth, design: Design, crest: Crest) -> float:
     """The height of a crest, at the place to which its first parabola led."""
     cos, sin = rotated(crest.cos, crest.sin, crest.step)

@@ -18,7 +18,6 @@ from hdopt.kinematics.branches import TIE_MM
 from hdopt.kinematics.closed_form import RigidMotion
 from hdopt.kinematics.compiled_closed_form import compiled
 from hdopt.kinematics.lanes.candidates import TANGENT, VERTEX
-from hdopt.kinematics.lanes.compiled import inlined
 from hdopt.kinematics.lanes.motion import (
     COS,
     KIND,
@@ -119,7 +118,7 @@ class Least(NamedTuple):
     x: float
 
 
-@inlined
+@compiled
 def _stretch(low: float, high: float, one: Branch, two: Branch) -> Stretch:
     return Stretch(
         low,
@@ -137,7 +136,7 @@ def _stretch(low: float, high: float, one: Branch, two: Branch) -> Stretch:
     )
 
 
-@inlined
+@compiled
 def _seen_from(part: Stretch, x: float) -> Stretch:
     """The stretch as it looks from the angle x."""
     return Stretch(
@@ -156,7 +155,7 @@ def _seen_from(part: Stretch, x: float) -> Stretch:
     )
 
 
-@inlined
+@compiled
 def _lowest_of_phase(part: Stretch, teeth: FsTeeth, cos: float, sin: float, best: Least) -> Least:
     """The lower of `best` and the least driving deviation on a stretch for one FS phase, (cos, sin) at the angle 0."""
     fs, advance = teeth.size, teeth.advance
@@ -187,7 +186,7 @@ def _lowest_of_phase(part: Stretch, teeth: FsTeeth, cos: float, sin: float, best
     return Least(value if less else best.value, x if less else best.x)
 
 
-@inlined
+@compiled
 def _lowest_of_stretch(
     part: Stretch, fs: float, phase: float, design: Design, shortest: float, look: Look, best: Least
 ) -> Least:
@@ -219,7 +218,7 @@ def _lowest_of_stretch(
     return Least(least.value if less else best.value, least.x + x if less else best.x)
 
 
-@inlined
+@compiled
 def _moved(
     motion: RigidMotion[float], teeth: Teeth, design: Design, cos: float, sin: float, kind: float
 ) -> tuple[float, float]:
@@ -244,7 +243,7 @@ def _moved(
     return rotated(cos, sin, x)
 
 
-@inlined
+@compiled
 def rim_change(place: Place, design: Design, s: float, reach: float) -> tuple[float, float, float]:
     """Where, seen from a `place` under a `design`, the deepest rim of zone `s` changes (rad, within `reach`), which is
     the deepest one before, and how steeply they cross, mm/rad."""
@@ -256,7 +255,7 @@ def rim_change(place: Place, design: Design, s: float, reach: float) -> tuple[fl
     return clipped(x if changes else -reach - reach, -reach, reach), (before if changes else -before), abs(rate)
 
 
-@inlined
+@compiled
 def lowest_of_branches(one: Zone, two: Zone, fs: float, phase: float, design: Design, look: Look) -> Least:
     """The least driving deviation (mm of arc) around a place, and how far from it (rad), of the branches of zones `one`
     and `two` there, under a `design`; `fs` is the FS amplitude, mm of arc, `phase` that of one of the FS phases, rad;
@@ -274,7 +273,7 @@ def lowest_of_branches(one: Zone, two: Zone, fs: float, phase: float, design: De
     return _lowest_of_stretch(after, fs, phase, design, ZERO, look, least)
 
 
-@inlined
+@compiled
 def _lowest_at_phase(part: Stretch, fs: float, phase: float, advance: float, shortest: float, best: Least) -> Least:
     """The lower of `best` and the least driving deviation on a stretch that is longer than the shortest that counts,
     for the one FS phase that is `phase` at the angle 0."""
@@ -288,7 +287,7 @@ def _lowest_at_phase(part: Stretch, fs: float, phase: float, advance: float, sho
     return Least(least.value if less else best.value, least.x + x if less else best.x)
 
 
-@inlined
+@compiled
 def lowest_of_turn(one: Zone, two: Zone, fs: float, phase: float, advance: float, low: float, high: float) -> Least:
     """The same as `lowest_of_branches` of zones `one` and `two` where the FS phase is known: `phase` (rad) at the
     place; `fs` is the FS amplitude, mm of arc, `advance` Z_CS/Z_FS; branches are followed from `low` to `high`, rad."""
@@ -303,7 +302,7 @@ def lowest_of_turn(one: Zone, two: Zone, fs: float, phase: float, advance: float
     return _lowest_at_phase(after, fs, phase, advance, ZERO, least)
 
 
-@inlined
+@compiled
 def _lowest(
     motion: RigidMotion[float], teeth: Teeth, design: Design, cos: float, sin: float, kind: float
 ) -> tuple[Least, float, float]:
@@ -322,7 +321,7 @@ def _lowest(
     return least, cos, sin
 
 
-@inlined
+@compiled
 def _chosen(first: bool, one: Branch, two: Branch) -> Branch:
     """The first of two branches, or else the second."""
     return Branch(

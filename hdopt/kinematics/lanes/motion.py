@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 from hdopt.arrays import Singles
 from hdopt.kinematics.closed_form import ErrorComponents, RigidMotion, RimConstants, TipGeometry
-from hdopt.kinematics.lanes.compiled import inlined, motion_at, rigid_motion, rim_depth, tooth_deviation
+from hdopt.kinematics.compiled_closed_form import compiled
+from hdopt.kinematics.lanes.compiled import motion_at, rigid_motion, rim_depth, tooth_deviation
 from hdopt.kinematics.lanes.single import HALF, ONE, TWO
 
 LANES = 128
@@ -72,7 +73,7 @@ class Branch(NamedTuple):
     offset_slope: float
 
 
-@inlined
+@compiled
 def motion_of(work: Singles, at: int, design: Design) -> RigidMotion[float]:
     """The rigid motion of the drive whose description starts at `at` in `work`, under a `design`."""
     components = ErrorComponents(
@@ -88,13 +89,13 @@ def motion_of(work: Singles, at: int, design: Design) -> RigidMotion[float]:
     return rigid_motion(design.tip, components)
 
 
-@inlined
+@compiled
 def teeth_of(work: Singles, at: int) -> Teeth:
     """The teeth of the drive whose description starts at `at` in `work`."""
     return Teeth(work[at + CS_COS], work[at + CS_SIN], work[at + FS], work[at + FS_PHASE])
 
 
-@inlined
+@compiled
 def place_at(motion: RigidMotion[float], cos: float, sin: float) -> Place:
     """The drive of `motion` at the input angle with cosine `cos` and sine `sin`."""
     e_a, e_l, t_a, t_l = motion_at(motion, cos, sin)
@@ -107,7 +108,7 @@ def place_at(motion: RigidMotion[float], cos: float, sin: float) -> Place:
     return Place(cos, sin, e_a, e_l, t_a, t_l, e_a1, e_l1, t_a1, t_l1)
 
 
-@inlined
+@compiled
 def branch_at(place: Place, motion: RigidMotion[float], teeth: Teeth, design: Design, s: float, k: float) -> Branch:
     """The branch of zone `s` and rim `k` (+1 or -1) at a `place` of the drive of `motion` and `teeth`, under a
     `design`.
@@ -129,7 +130,7 @@ def branch_at(place: Place, motion: RigidMotion[float], teeth: Teeth, design: De
     return Branch(value, slope, bend, offset, o1 - shift1 * rim.per_major)
 
 
-@inlined
+@compiled
 def rim_gap(place: Place, design: Design, s: float) -> tuple[float, float]:
     """Half of what the upper rim lies deeper than the lower one in zone `s` at a `place`, mm, and its
     slope, under a `design`.

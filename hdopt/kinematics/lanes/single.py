@@ -11,7 +11,7 @@ from typing import cast
 
 import numpy as np
 
-from hdopt.kinematics.lanes.compiled import inlined
+from hdopt.kinematics.compiled_closed_form import compiled
 
 
 def single(value: float) -> float:
@@ -43,14 +43,14 @@ SIXTH, TWELFTH, TWENTIETH, THIRTIETH = (single(1 / n) for n in (6, 12, 20, 30))
 T3, T5, T7, T9 = (single(c) for c in (1 / 3, 2 / 15, 17 / 315, 62 / 2835))
 
 
-@inlined
+@compiled
 def reduced(angle: float) -> float:
     """An `angle` (rad, double precision) in turns between -1/2 and 1/2, in single precision."""
     turns = angle * PER_TURN
     return narrowed(turns - np.floor(turns + 0.5))
 
 
-@inlined
+@compiled
 def sine_cosine(turns: float) -> tuple[float, float]:
     """Sine and cosine of `turns` between -1/2 and 1/2, to 1e-7."""
     half = np.floor(turns + turns + HALF)
@@ -62,14 +62,14 @@ def sine_cosine(turns: float) -> tuple[float, float]:
     return sign * sine, sign * cosine
 
 
-@inlined
+@compiled
 def tangent(x: float) -> float:
     """tan(`x`) by its series: to 1e-7 up to 0.3 rad, more than any tilt for which the closed form holds."""
     z = x * x
     return x + x * z * (T3 + z * (T5 + z * (T7 + z * T9)))
 
 
-@inlined
+@compiled
 def angle_of(sine: float, cosine: float) -> float:
     """The angle between -pi and pi, rad, of a `sine` and a `cosine` of any common scale, to 3e-7."""
     up, along = abs(sine), abs(cosine)
@@ -81,7 +81,7 @@ def angle_of(sine: float, cosine: float) -> float:
     return -angle if sine < ZERO else angle
 
 
-@inlined
+@compiled
 def rotated(cosine: float, sine: float, x: float) -> tuple[float, float]:
     """(`cosine`, `sine`) turned by the angle `x`, rad, |x| <= 1/2 (by series, to 2e-7)."""
     z = x * x
@@ -90,7 +90,7 @@ def rotated(cosine: float, sine: float, x: float) -> tuple[float, float]:
     return cosine * c - sine * s, sine * c + cosine * s
 
 
-@inlined
+@compiled
 def clipped(x: float, low: float, high: float) -> float:
     """`x` between `low` and `high`."""
     return min(high, max(low, x))

@@ -7,7 +7,7 @@ import numpy as np
 from hdopt.arrays import Singles
 from hdopt.kinematics.closed_form import RigidMotion
 from hdopt.kinematics.compiled_closed_form import compiled
-from hdopt.kinematics.lanes.compiled import inlined, rim_depth, tooth_deviation
+from hdopt.kinematics.lanes.compiled import rim_depth, tooth_deviation
 from hdopt.kinematics.lanes.minima import GROUP
 from hdopt.kinematics.lanes.motion import Design, Place, Teeth, motion_of, place_at, rim_gap, teeth_of
 from hdopt.kinematics.lanes.single import HALF, ONE, narrowed, rotated, sine_cosine
@@ -26,7 +26,7 @@ STEP = GROUP * ROWS
 ON_CIRCLE = 4
 
 
-@inlined
+@compiled
 def _put(edges: Singles, at: int, place: Place, design: Design, teeth: Teeth, s: float, k: float) -> None:
     """Put the branch of zone s and rim k at `at`."""
     depth, o, on_fs = rim_depth(design.rim, place.e_a, place.e_l, place.t_a, place.t_l, s, k)
@@ -35,7 +35,7 @@ def _put(edges: Singles, at: int, place: Place, design: Design, teeth: Teeth, s:
     edges[at + V], edges[at + OFF], edges[at + MET] = value, s * on_fs, s * PER_TURN * o
 
 
-@inlined
+@compiled
 def _turn_fs(edges: Singles, at: int, sine: float, cosine: float) -> None:
     """Put the FS teeth of a branch, of this sine and cosine part where o' is 0, at `at`."""
     cos, sin = rotated(cosine, sine, edges[at + OFF])

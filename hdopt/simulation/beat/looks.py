@@ -6,7 +6,6 @@ import numpy as np
 
 from hdopt.arrays import Index, Singles
 from hdopt.kinematics.compiled_closed_form import compiled
-from hdopt.kinematics.lanes.compiled import inlined
 from hdopt.kinematics.lanes.minima import GROUP, Zone, lowest_of_turn, rim_change
 from hdopt.kinematics.lanes.motion import LANES, Branch, Design, Place, Teeth, teeth_of
 from hdopt.kinematics.lanes.single import HALF, ONE, TINY, TURN, ZERO, clipped, narrowed, sine_cosine, single
@@ -43,7 +42,7 @@ LOOKS = 2
 """Times that a place is looked at."""
 
 
-@inlined
+@compiled
 def _mark(work: Singles, i: int, place: Place, design: Design, s: float, k: float, number: int) -> None:
     """Note where the branch of zone s and rim k, which is this number of the four, meets CS and FS, in turns."""
     o = offsets(place, design, s, k)[0]
@@ -53,7 +52,7 @@ def _mark(work: Singles, i: int, place: Place, design: Design, s: float, k: floa
     work[i + FS_AT + number * LANES] = turned
 
 
-@inlined
+@compiled
 def _look_up_turn(table: Singles, per_turn: int, zone: int, work: Singles, i: int) -> None:
     """Put what a zone meets of a `table` of all turns in the turn of lane i into its rows."""
     n, at, column = len(table), i + FIXED_MET + 3 * zone * LANES, 3 * zone
@@ -100,7 +99,7 @@ def _meet(work: Singles, count: int, design: Design, beat: Beat) -> None:
         _look_up_turn(table, per_turn, 1, work, i)
 
 
-@inlined
+@compiled
 def _branch(work: Singles, i: int, place: Place, design: Design, s: float, k: float, number: int) -> Branch:
     """The branch of zone s and rim k with its effects, which are those of this number of the four."""
     cs, fixed = i + CS_MET + 3 * number * LANES, i + FIXED_MET + 3 * (number // 2) * LANES
@@ -115,7 +114,7 @@ def _branch(work: Singles, i: int, place: Place, design: Design, s: float, k: fl
     )
 
 
-@inlined
+@compiled
 def _reaches(work: Singles, i: int, reach: float, per_turn: int) -> tuple[float, float]:
     """How far, rad, lane i may follow parabolas down and up: not past where the last turn ends and the first begins,
     since what fits no whole number of waves jumps there."""
@@ -124,7 +123,7 @@ def _reaches(work: Singles, i: int, reach: float, per_turn: int) -> tuple[float,
     return low, (clipped(-TURN * (angle + beside), ZERO, reach) if joins and angle < ZERO else reach)
 
 
-@inlined
+@compiled
 def _crest(
     at: Branch, teeth: Teeth, design: Design, s: float, phase: float, low: float, high: float
 ) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from hdopt.arrays import Singles
-from hdopt.kinematics.lanes.compiled import inlined
+from hdopt.kinematics.compiled_closed_form import compiled
 from hdopt.kinematics.lanes.minima import GROUP
 from hdopt.kinematics.lanes.single import HALF, HUGE, ONE, TINY, ZERO, clipped, unsigned
 from hdopt.simulation.beat.edges import COSINE, GAP, OFF, SINE, STEP
@@ -34,14 +34,14 @@ class End(NamedTuple):
     share: float
 
 
-@inlined
+@compiled
 def _line(edges: Singles, here: int, after: int, x: float) -> float:
     """What lies at a share x of the way from one place of the edges to another."""
     found: float = edges[here] + x * (edges[after] - edges[here])
     return found
 
 
-@inlined
+@compiled
 def _end(edges: Singles, g: int, one: int, two: int, x: float) -> End:
     """Branches `one` and `two` at a share x of cell g."""
     here = unsigned((g // GROUP) * STEP + g % GROUP)
@@ -59,7 +59,7 @@ def _end(edges: Singles, g: int, one: int, two: int, x: float) -> End:
     return End(mean, HALF * (us + ws), HALF * (uc + wc), half, HALF * (us - ws), HALF * (uc - wc), o_one, o_two, x)
 
 
-@inlined
+@compiled
 def _meet_fs(rows: Singles, start: int, end: End, kind: int, room: Singles, side: int) -> None:
     """Put into `room`, for a side of a piece, the row of a `kind` of the effects at an end of it: the mean (0) or half
     the difference (1) with those on the FS where its zones meet them. More streams than one at a time the compiler
@@ -78,7 +78,7 @@ def _meet_fs(rows: Singles, start: int, end: End, kind: int, room: Singles, side
             room[to + j] = value + two * (rows[b] + share * (rows[b + step] - rows[b]))
 
 
-@inlined
+@compiled
 def _loosen_fs(rows: Singles, start: int, off: float, room: Singles) -> None:
     """Put into `room` how far the effects go beyond their chords where o' is at most `off`, rad."""
     turns, squared = len(room) // (2 * KINDS), off * off
@@ -89,7 +89,7 @@ def _loosen_fs(rows: Singles, start: int, off: float, room: Singles) -> None:
             room[to + j] = rows[sag + j] + squared * rows[bend + j]
 
 
-@inlined
+@compiled
 def _at_ends(
     phases: Singles, rows: Singles, size: int, at: int, j: int, left: End, right: End
 ) -> tuple[float, float, float, float]:
@@ -106,7 +106,7 @@ def _at_ends(
     )
 
 
-@inlined
+@compiled
 def _lower(phases: Singles, rows: Singles, start: int, left: End, right: End, out: Singles) -> None:
     """Lower `out` (turns,) to the least of a piece in every turn, with the effects whose `rows` begin at `start`."""
     size, at = unsigned(len(out)), unsigned(start)
@@ -121,7 +121,7 @@ def _lower(phases: Singles, rows: Singles, start: int, left: End, right: End, ou
             out[j] = min(out[j], least - rows[slack + j])
 
 
-@inlined
+@compiled
 def _raise(phases: Singles, rows: Singles, start: int, left: End, right: End, out: Singles) -> None:
     """Lower `out` (turns,) to the negative of the greatest of the same."""
     size, at = unsigned(len(out)), unsigned(start)
@@ -133,13 +133,13 @@ def _raise(phases: Singles, rows: Singles, start: int, left: End, right: End, ou
             out[j] = min(out[j], -max(m0 + abs(d0), m1 + abs(d1)) - rows[slack + j])
 
 
-@inlined
+@compiled
 def _sharing(end: End, x: float) -> End:
     e = end
     return End(e.mean, e.mean_sine, e.mean_cosine, e.half, e.half_sine, e.half_cosine, e.one, e.two, x)
 
 
-@inlined
+@compiled
 def _bound_piece(
     edges: Singles,
     g: int,
@@ -170,7 +170,7 @@ def _bound_piece(
         _lower(bounds, bounds, start, left, right, out)
 
 
-@inlined
+@compiled
 def _change(edges: Singles, g: int, row: int) -> tuple[int, int, float]:
     """Which rim of a zone is deepest at the start of cell g (0 the upper one) and at its end, and where it changes, as
     a share of the cell; 1 where it does not."""
@@ -180,7 +180,7 @@ def _change(edges: Singles, g: int, row: int) -> tuple[int, int, float]:
     return before, then, (here / (here - after) if before != then else ONE)
 
 
-@inlined
+@compiled
 def bound_turns(edges: Singles, g: int, bounds: Singles, room: Singles, high: bool, out: Singles) -> bool:
     """Fill `out` (turns, padded) with the least driving deviation in cell `g` of every turn, mm of arc less what the
     effects' lines leave out, or (`high`) with that of its negative: with those `edges` of the drive and these `bounds`

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from hdopt.arrays import Index, Singles
 from hdopt.kinematics.compiled_closed_form import compiled
-from hdopt.kinematics.lanes.compiled import inlined
 from hdopt.kinematics.lanes.minima import GROUP, Look, Zone, lowest_of_branches, rim_change
 from hdopt.kinematics.lanes.motion import LANES, Branch, Design, Place, teeth_of
 from hdopt.kinematics.lanes.single import HUGE, ONE, TURN, narrowed
@@ -62,7 +61,7 @@ def _meet(work: Singles, count: int, design: Design, turn: Turn) -> None:
             look_up(turn.fixed, 3 * zone, work[i + ANGLE], work, i + FIXED_MET + 3 * zone * LANES)
 
 
-@inlined
+@compiled
 def _branch(work: Singles, i: int, place: Place, design: Design, s: float, k: float, number: int) -> Branch:
     """The branch of zone s and rim k with its effects, which are those of this number of the four."""
     cs, fixed = i + CS_MET + 3 * number * LANES, i + FIXED_MET + 3 * (number // 2) * LANES

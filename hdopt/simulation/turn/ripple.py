@@ -13,7 +13,6 @@ import numpy as np
 from hdopt.arrays import Index, Singles
 from hdopt.kinematics.compiled_closed_form import compiled
 from hdopt.kinematics.lanes.candidates import at_most
-from hdopt.kinematics.lanes.compiled import inlined
 from hdopt.kinematics.lanes.minima import GROUP
 from hdopt.kinematics.lanes.motion import DESCRIPTION, FS, LANES, Design, motion_of, place_at
 from hdopt.kinematics.lanes.single import HALF, HUGE, ONE, TURN, TWO, ZERO, narrowed
@@ -79,7 +78,7 @@ def _describe(work: Singles, near: Index, count: int, width: float) -> int:
     return padded
 
 
-@inlined
+@compiled
 def _on_cs(table: Singles, column: int, turns: float) -> float:
     """What a zone meets of the `table` at `turns` of the CS."""
     n = len(table)
@@ -91,7 +90,7 @@ def _on_cs(table: Singles, column: int, turns: float) -> float:
     return found
 
 
-@inlined
+@compiled
 def _of_rims(upper: float, lower: float, t: float, near: float, sign: float) -> float:
     """What the rim that drives meets; where either may, the lesser, or (`sign` -1) the greater."""
     driving = upper if t > ZERO else lower
@@ -100,7 +99,7 @@ def _of_rims(upper: float, lower: float, t: float, near: float, sign: float) -> 
     return other if abs(t) < near and further else driving
 
 
-@inlined
+@compiled
 def _meet_cs(work: Singles, count: int, design: Design, turn: Turn, e: int, sign: float) -> None:
     """Add what both zones meet of the CS at edge e of the parts."""
     cos, sin, angle = turn.fine.cos[e], turn.fine.sin[e], narrowed(e) / narrowed(len(turn.fine.below))
@@ -125,7 +124,7 @@ def _meet_cs(work: Singles, count: int, design: Design, turn: Turn, e: int, sign
             work[i + D_THEN] += HALF * (one - two)
 
 
-@inlined
+@compiled
 def _reach(work: Singles, count: int, design: Design, turn: Turn, e: int, sign: float) -> None:
     """Leave the edge in hand behind and take edge e of the parts, for the least (`sign` 1) or the greatest (-1)."""
     cos, sin, m_e, d_e = turn.fine.cos[e], turn.fine.sin[e], turn.fine.edges[e, 0], turn.fine.edges[e, 1]
@@ -143,7 +142,7 @@ def _reach(work: Singles, count: int, design: Design, turn: Turn, e: int, sign: 
         _meet_cs(work, count, design, turn, e, sign)
 
 
-@inlined
+@compiled
 def _bound_low(work: Singles, count: int, design: Design, turn: Turn, e: int) -> None:
     """Take edge e, and fill LOW with what the part before it cannot fall below."""
     _reach(work, count, design, turn, e, ONE)
@@ -154,13 +153,13 @@ def _bound_low(work: Singles, count: int, design: Design, turn: Turn, e: int) ->
             work[i + LOW] = least_of_cell(work, i, work[i + T_THEN], work[i + D_THEN], work[i + M_THEN]) - below
 
 
-@inlined
+@compiled
 def _apart(one: float, two: float, within: float) -> float:
     """How far what goes from `one` to `two` keeps from nought, less what lines leave out."""
     return max(ZERO, min(abs(one), abs(two)) - within) if one * two > ZERO else ZERO
 
 
-@inlined
+@compiled
 def _bound_high(work: Singles, count: int, design: Design, turn: Turn, e: int) -> None:
     """Take edge e, and fill HIGH with what the part before it cannot exceed, ZONE and RIM with what drives there, OFF
     and OFFSET with how far zones and rims lie apart."""

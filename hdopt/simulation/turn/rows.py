@@ -8,7 +8,6 @@ import numpy as np
 
 from hdopt.arrays import Index, Singles
 from hdopt.kinematics.compiled_closed_form import compiled
-from hdopt.kinematics.lanes.compiled import inlined
 from hdopt.kinematics.lanes.minima import GROUP
 from hdopt.kinematics.lanes.motion import (
     DESCRIPTION,
@@ -74,7 +73,7 @@ BOUNDS = NEAR + LIST
 """Bounds of all cells: a row of low ones and one of high ones each."""
 
 
-@inlined
+@compiled
 def offsets(place: Place, design: Design, s: float, k: float) -> tuple[float, float]:
     """o of zone `s` and rim `k` at a `place` under a `design`, rad, and its slope."""
     p, rim = place, design.rim
@@ -83,14 +82,14 @@ def offsets(place: Place, design: Design, s: float, k: float) -> tuple[float, fl
     return q * rim.per_flatness, q1 * rim.per_flatness
 
 
-@inlined
+@compiled
 def folded(turns: float) -> float:
     """`turns` between -1/2 and 1/2."""
     found: float = turns - np.floor(turns + HALF)
     return found
 
 
-@inlined
+@compiled
 def look_up(table: Singles, column: int, turns: float, work: Singles, at: int) -> None:
     """Put value, slope and curvature of a zone of `table` (n, 6), from `column` on, at `turns` into `work` at `at` and
     the two rows after."""
@@ -104,14 +103,14 @@ def look_up(table: Singles, column: int, turns: float, work: Singles, at: int) -
     work[at], work[at + LANES], work[at + 2 * LANES] = value + x * (slope + HALF * x * bend), slope + x * bend, bend
 
 
-@inlined
+@compiled
 def place_of(work: Singles, i: int, design: Design) -> Place:
     """What both zones pass at the place of lane `i` of `work`, under a `design`."""
     sin, cos = sine_cosine(work[i + ANGLE])
     return place_at(motion_of(work, i, design), cos, sin)
 
 
-@inlined
+@compiled
 def branch_of(work: Singles, i: int, place: Place, design: Design, s: float, k: float, cs: int, fixed: int) -> Branch:
     """The branch of zone `s` and rim `k` of lane `i` at its `place` under a `design`, with the effects that `work`
     holds at `cs` and at `fixed`; the CS is passed faster than the input turns by the offset's slope."""
@@ -126,7 +125,7 @@ def branch_of(work: Singles, i: int, place: Place, design: Design, s: float, k: 
     )
 
 
-@inlined
+@compiled
 def middle(cell: float, cells: int) -> float:
     """The middle of a `cell` of so many `cells`, in turns between -1/2 and 1/2."""
     return folded((cell + HALF) / narrowed(cells))

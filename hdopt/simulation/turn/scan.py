@@ -11,7 +11,6 @@ from __future__ import annotations
 from hdopt.arrays import Singles
 from hdopt.kinematics.compiled_closed_form import compiled
 from hdopt.kinematics.lanes.candidates import MARGIN_SHARE, at_most, first_order, second_order
-from hdopt.kinematics.lanes.compiled import inlined
 from hdopt.kinematics.lanes.motion import FS, LANES, Design, motion_of, teeth_of
 from hdopt.kinematics.lanes.single import HALF, HUGE, ONE, TINY, ZERO, clipped, narrowed
 from hdopt.simulation.turn.effects import Turn
@@ -59,7 +58,7 @@ def fill_parts(work: Singles, design: Design, turn: Turn) -> None:
         work[i + SWING] = turn.scan.half * swing + turn.scan.step
 
 
-@inlined
+@compiled
 def least_of_cell(work: Singles, i: int, t: float, d: float, m: float) -> float:
     """The least of the lower bound of lane `i` of `work` between the edge before and one with these `t`, `d` and `m`,
     mm of arc."""

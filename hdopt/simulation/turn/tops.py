@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from hdopt.arrays import Index, Singles
 from hdopt.kinematics.compiled_closed_form import compiled
-from hdopt.kinematics.lanes.compiled import inlined
 from hdopt.kinematics.lanes.maxima import Angle, Crest, crest_of, top_of
 from hdopt.kinematics.lanes.minima import GROUP
 from hdopt.kinematics.lanes.motion import LANES, Branch, Design, teeth_of
@@ -50,7 +49,7 @@ from hdopt.simulation.turn.rows import (
 )
 
 
-@inlined
+@compiled
 def _branch(work: Singles, i: int, design: Design) -> Branch:
     """The branch of the lane's zone and rim at its place, with its effects."""
     place = place_of(work, i, design)
@@ -110,7 +109,7 @@ def look_at_list(work: Singles, lanes: Index, count: int, design: Design, turn: 
         work[GREATEST + lanes[j]] = max(work[GREATEST + lanes[j]], work[LIST + VALUE + j])
 
 
-@inlined
+@compiled
 def _signs(work: Singles, i: int, turn: Turn, g: int) -> tuple[float, float, float, float]:
     """Zone and rim that drive at the middle of a cell, by their signs, and how far zones and rims lie apart there at
     least, mm of arc."""
