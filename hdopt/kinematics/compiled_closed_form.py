@@ -34,8 +34,15 @@ def compiled(function: Function) -> Function:
     """`function` for other compiled ones: LLVM puts it into each of its callers.
 
     It must: what stays a function of its own is compiled once for itself and once more with its caller, with other
-    rounding. The process that compiles takes the first, one that loads the caller from disk the second.
+    rounding. The process that compiles takes the first, one that loads the caller from disk the second. It may make no
+    arrays, and sort none (`allocating` may). Those it is given are its caller's, so that their users need not be
+    counted, which would cost some 20 cycles wherever an array is named.
     """
+    return cast("Function", njit(forceinline=True, _nrt=False, **OPTIONS)(function))
+
+
+def allocating(function: Function) -> Function:
+    """The same of a `function` that makes arrays."""
     return cast("Function", njit(forceinline=True, **OPTIONS)(function))
 
 

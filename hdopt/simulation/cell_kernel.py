@@ -17,7 +17,7 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.kinematics.closed_form import TipGeometry
-from hdopt.kinematics.compiled_closed_form import compiled, entry, inlined, motion_at, rim_depth
+from hdopt.kinematics.compiled_closed_form import allocating, compiled, entry, inlined, motion_at, rim_depth
 from hdopt.simulation.walk_kernel import EDGE, MOST_CUTS, WalkedDrive, drive_of, on_spline, on_splines, rims, rims_apart
 
 ROUNDS = 2
@@ -161,7 +161,7 @@ def _root(drive: WalkedDrive, low: float, high: float, s: float) -> float:
     return x
 
 
-@compiled
+@allocating
 def _changes(drive: WalkedDrive, grid: Array, cuts: Array) -> int:
     """Angles of an input turn (rad) at which the deeper rim of a zone changes, into `cuts`, rising; how many.
 
@@ -359,7 +359,7 @@ def _curvature(drive: WalkedDrive) -> float:
     return BENT * (drive.tan_alpha * along + teeth) + drive.tan_alpha * second
 
 
-@compiled
+@allocating
 def _least_at_changes(
     drive: WalkedDrive, cuts: Array, cells: int, slack: float, table: CellTable, circle: Circle, least: Array
 ) -> None:
@@ -385,7 +385,7 @@ def _least_at_changes(
                     least[side] = _least_of_piece(drive, piece, estimates[side], slack, sign, table, least[side])
 
 
-@compiled
+@allocating
 def _least_of_turns(
     drive: WalkedDrive, grid: Array, cuts: Array, table: CellTable, circle: Circle, least: Array
 ) -> None:
@@ -412,7 +412,7 @@ def _least_of_turns(
     _least_at_changes(drive, cuts, cells, slack, table, circle, least)
 
 
-@compiled
+@allocating
 def _circle(cells: int, turns: int, advance: float) -> Circle:
     angle, whole = np.arange(cells + 1) * (2 * math.pi / cells), np.arange(turns) * (2 * math.pi * advance)
     along = advance * angle

@@ -15,6 +15,7 @@ import numpy as np
 from hdopt.arrays import Array, Index
 from hdopt.kinematics.closed_form import RigidMotion, RimConstants, TipGeometry
 from hdopt.kinematics.compiled_closed_form import (
+    allocating,
     compiled,
     entry,
     inlined,
@@ -201,7 +202,7 @@ def _lowest_between(
     return (inner, place) if inner < least else (least, where)
 
 
-@compiled
+@allocating
 def _lowest_near(
     drive: WalkedDrive, cuts: Array, centre: float, half: float, sign: float, added: Added, steps: int
 ) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hdopt.arrays import Array, Bits, Index, Singles
-from hdopt.kinematics.compiled_closed_form import compiled, entry
+from hdopt.kinematics.compiled_closed_form import allocating, compiled, entry
 from hdopt.kinematics.kernel import WORK, block_of_lanes
 from hdopt.kinematics.lanes.motion import LANES, VALUE, Design
 from hdopt.tolerance.quantile_table import CELL_BITS, OCTAVES, SIDE
@@ -102,7 +102,7 @@ def _fill_errors(u: Array, column: int, columns: Columns, work: Array, errors: A
     return 0
 
 
-@compiled
+@allocating
 def _held_errors(columns: Columns) -> Array:
     """Errors (12 LANES,) that all lanes hold, before any input fills its row."""
     errors = np.empty(len(columns.held) * LANES)
@@ -111,7 +111,7 @@ def _held_errors(columns: Columns) -> Array:
     return errors
 
 
-@compiled
+@allocating
 def _first_block(shift: Bits, numbers: Bits) -> Bits:
     """The bits of the first LANES Sobol' points under the digital `shift` (d,) and direction `numbers` (d, 30):
     (d, LANES)."""

@@ -44,7 +44,7 @@ FAR, BENT = single(OFFSET), single(4.0)
 class Room(NamedTuple):
     """Room for a list of lanes (LANES,), a drive at all edges, two edges' effects, a cell's bounds in every turn, for
     what may be looked at of one drive: bounds, cells and turns; and lane, cell and turn of what is to be, of both
-    sides, (2, 3, n)."""
+    sides, (2, 3, n), and how many that are (2,)."""
 
     lanes: Index
     edges: Singles
@@ -54,6 +54,7 @@ class Room(NamedTuple):
     cells: Index
     at: Index
     queue: Index
+    waiting: Index
 
 
 @compiled
@@ -153,7 +154,8 @@ def _look(work: Singles, room: Room, design: Design, beat: Beat, side: int, wait
 @compiled
 def _find(work: Singles, room: Room, design: Design, beat: Beat) -> None:
     """Fill the least of the drives of `work`, and the negative of the greatest."""
-    bounds, cells, waiting = beat.bounds, len(beat.turn.scan.below), np.zeros(2, np.int64)
+    bounds, cells, waiting = beat.bounds, len(beat.turn.scan.below), room.waiting
+    waiting[0] = waiting[1] = 0
     for i in range(LANES):
         work[LEAST + i], work[GREATEST + i] = HUGE, HUGE
     # Sides and numbers of places are counted, not written out: each of them would be compiled for itself.
@@ -188,7 +190,7 @@ def beat_block(design: Design, matrix: Array, beat: Beat, out: Array) -> None:
     )
     queue = np.empty((2, 3, every + LANES), np.int64)
     lanes, of_cell = np.zeros(LANES, np.int64), np.empty(turns, np.float32)
-    room = Room(lanes, edges, effects, of_cell, values, np.empty(every, np.int64), at, queue)
+    room = Room(lanes, edges, effects, of_cell, values, np.empty(every, np.int64), at, queue, np.zeros(2, np.int64))
     errors = np.zeros(names * LANES)
     for start in range(0, n, LANES):
         count = min(LANES, n - start)
