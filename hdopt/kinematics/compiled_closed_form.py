@@ -18,6 +18,8 @@ Function = TypeVar("Function", bound=Callable[..., object])
 # depend on how the compiler vectorizes.
 # (Any: numba's options are of several kinds.)
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "afn"}}
+# Without counts of arrays' users; Numba's own types do not know of it.
+UNCOUNTED: dict[str, Any] = OPTIONS | {"_nrt": False}
 
 
 def inlined(function: Function) -> Function:
@@ -38,7 +40,7 @@ def compiled(function: Function) -> Function:
     arrays, and sort none (`allocating` may). Those it is given are its caller's, so that their users need not be
     counted, which would cost some 20 cycles wherever an array is named.
     """
-    return cast("Function", njit(forceinline=True, _nrt=False, **OPTIONS)(function))
+    return cast("Function", njit(forceinline=True, **UNCOUNTED)(function))
 
 
 def allocating(function: Function) -> Function:
