@@ -399,6 +399,20 @@ class WanderSettings:
 
 
 @dataclass(frozen=True)
+class WalkSettings:
+    """What tells noise with a long memory, which is rough at every scale, from what is smooth over neighbours."""
+
+    growth: float = threshold(
+        3.0,
+        "1",
+        "choice: of the variance of second differences over twice as many rows: 1 for white noise, up to 2 for a walk, "
+        "8 for a walk's sum, up to 16 for a curve",
+    )
+    reached: float = threshold(0.7, "1", "choice: share of the scatter that second differences must come to")
+    fewest_spans: int = threshold(10, "1", "choice: rows over the span of a difference, below which it is not measured")
+
+
+@dataclass(frozen=True)
 class StepSettings:
     """Sudden steps that no Gaussian noise makes."""
 
@@ -491,7 +505,9 @@ class VerdictSettings:
     )
     imitated: float = threshold(0.99, "1", "choice: share of an effect's power from which it is imitated wholly")
     noise_over_neighbours: float = threshold(
-        5.0, "1", "measured: coloured noise of the simulated bench reaches 2.9 times what neighbouring samples show"
+        5.0,
+        "1",
+        "choice: of what neighbouring samples show; above it noise must be a walk, which has reached 9.5 on the simulated bench",
     )
     left_over_passes: float = threshold(
         2.0,
@@ -554,6 +570,7 @@ class DiagnosisSettings:
     search: SearchSettings = SearchSettings()
     high_order: HighOrderSettings = HighOrderSettings()
     wander: WanderSettings = WanderSettings()
+    walk: WalkSettings = WalkSettings()
     steps: StepSettings = StepSettings()
     orientation: OrientationSettings = OrientationSettings()
     encoder_steps: EncoderStepSettings = EncoderStepSettings()

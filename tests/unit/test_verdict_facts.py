@@ -177,9 +177,9 @@ def test_a_scale_that_explains_as_well(behind, said):
     assert scale_is_as_good(evidence(candidate({"thermal_drift": 1.0}), beside, alone)) is said
 
 
-def told_and_more(gain=160.0, power=1.0, told=SCALE, of="hysteresis"):
+def told_and_more(gain=160.0, power=1.0, told=SCALE, of="hysteresis", worth=100.0):
     """A told explanation of gain 100, and a set that explains more beside it; each pays log(1000)/2 and 1 a term."""
-    alone = candidate({told: 1.0})
+    alone = candidate({told: 1.0}, worth)
     both = candidate({told: 1.0, of: power})
     alone.gain, both.gain = 100.0, gain
     problem = SimpleNamespace(weighed_rows=1000, settings=DEFAULT)
@@ -196,6 +196,7 @@ def told_and_more(gain=160.0, power=1.0, told=SCALE, of="hysteresis"):
         {"told": VARYING_CONTACT},  # its shape is not exact, something is always left
         {"of": SKEW},  # two that are told
         {"told": "thermal_drift"},  # a name, not told
+        {"worth": -2.0},  # told in words only: less likely than the drive alone
     ],
 )
 def test_what_adds_to_what_is_told_is_seen(changes):

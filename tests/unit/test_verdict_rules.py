@@ -61,6 +61,7 @@ FIRED = [
     ("generic basis wins", replace(CLEAN, generic_wins=True, generic_t=6.5), {"generic_t": 5.0}),
     ("too much for noise", replace(CLEAN, noise_over_neighbours=9.7), {"noise_over_neighbours": 2.9}),
     ("too much for noise", replace(CLEAN, noise_over_neighbours=9.7), {"turns_suffice": False}),
+    ("too much for noise", replace(CLEAN, noise_over_neighbours=9.7), {"walk": True}),
     ("not confirmed", replace(NAMED, unseen_gain=0.01), {"unseen_gain": 0.5}),
     ("not confirmed", replace(NAMED, unseen_gain=0.01), {"own_gain": 0.03}),
     ("not confirmed", replace(NAMED, unseen_gain=0.01), {"false_alarm_p": 0.02}),

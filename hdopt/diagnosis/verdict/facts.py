@@ -11,6 +11,7 @@ import numpy as np
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding
 from hdopt.diagnosis.inference.catalogue import TOLD
+from hdopt.diagnosis.inference.neighbour_noise import is_a_walk
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.settings import VerdictSettings
@@ -54,7 +55,8 @@ class Facts:
     perfect imitations among them; `scale_as_good`: so is a ratio or gain that is off, alone. `heldout_over_floor`:
     error on turns that no stage saw (cross-validated where none could be spared) over what a generic basis leaves;
     `found_again`: what is said was found without those turns too; `noise_over_neighbours`: cross-validated error over
-    the noise that neighbouring samples and the sensors' steps show; `left_over_passes`: what is left over what differs
+    the noise that neighbouring samples and the sensors' steps show; `walk`: what is left is as rough at every scale as
+    a walk, which noise may be; `left_over_passes`: what is left over what differs
     from pass to pass of one angle. `above_resolution`: some effect is larger than what sensors and model resolve.
     """
 
@@ -78,6 +80,7 @@ class Facts:
     heldout_over_floor: float = 1.0
     found_again: bool = True
     noise_over_neighbours: float = 1.0
+    walk: bool = False
     left_over_passes: float = 1.0
     above_resolution: bool = True
     beaten_by_generic: bool = False
@@ -179,6 +182,7 @@ def find(evidence: Evidence) -> Findings:
         heldout_over_floor=unseen_rms(evidence) / evidence.noise_floor,
         noise_over_neighbours=evidence.extended_held_out.rms
         / max(evidence.neighbours_arcmin, evidence.sensor_arcmin, TINY),
+        walk=is_a_walk(evidence.rows, best.fit.residual, evidence.settings.walk),
         left_over_passes=left_over_passes(evidence),
         above_resolution=above_resolution(evidence),
         beaten_by_generic=beaten_by_generic(evidence),

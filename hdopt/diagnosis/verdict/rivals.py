@@ -58,8 +58,8 @@ def scale_is_as_good(evidence: Evidence) -> bool:
 def beside_told(evidence: Evidence) -> tuple[Candidate | None, float]:
     """The set that adds most to the best of those that are told and never named, and by how much log evidence, each
     paying for its freedom and its search alone: a scale, a clock or a zero that is off has an exact shape, beside which
-    nothing is left. None and 0 where the `evidence` holds no such pair of sets, or none that adds, or what adds is
-    small beside the noise.
+    nothing is left. None and 0 where the `evidence` holds no such pair of sets, or nothing told that is there itself,
+    or none that adds, or what adds is small beside the noise.
     """
     candidates, scale = evidence.selection.candidates, penalty_scale(evidence.selection.base.problem)
     least = evidence.settings.verdict.unconfirmed_share * evidence.extended_held_out.variance
@@ -68,7 +68,7 @@ def beside_told(evidence: Evidence) -> tuple[Candidate | None, float]:
         return one.gain / 2 / evidence.inflation - penalty(one.fit.terms, 0.0, scale)
 
     told = next((one for one in candidates if one.effects and EXACT_TOLD.issuperset(one.effects)), None)
-    if told is None:
+    if told is None or told.log_bayes_factor <= 0:
         return None, 0.0
     more = (one for one in candidates if set(one.effects) > set(told.effects) and sum(effect_powers(one)) > least)
     best = max(more, key=evidence_of, default=told)

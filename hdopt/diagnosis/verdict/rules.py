@@ -117,10 +117,11 @@ def not_found_again(facts: Facts) -> bool:
 
 
 def too_much_for_noise(facts: Facts) -> bool:
-    """What is left is far above what neighbouring samples and the sensors' steps show: no sensor makes such noise.
-    `facts` are those of the recording.
+    """What is left is far above what neighbouring samples and the sensors' steps show, and no walk either: no sensor
+    makes such noise. `facts` are those of the recording.
     """
-    return facts.turns_suffice and facts.noise_over_neighbours > facts.settings.noise_over_neighbours
+    far = facts.noise_over_neighbours > facts.settings.noise_over_neighbours
+    return facts.turns_suffice and far and not facts.walk
 
 
 def not_confirmed(facts: Facts) -> bool:
