@@ -67,11 +67,12 @@ def preference(as_counted: Fit, turned: Fit) -> float:
 
 
 def is_decisive(preferred: Sequence[float], settings: OrientationSettings) -> bool:
-    """Whether the base decides by its preferences (`preferred`), alone and where asked beside smooth columns: the first
-    is large enough by the `settings`, and the other does not speak against it. Waves of the teeth, or lobes, that are
-    as large as the base's own bend it towards either way, and beside smooth columns, which do not hold them, too.
+    """Whether the base decides by its preferences (`preferred`), alone and where asked beside smooth columns: each is
+    large enough by the `settings`, and they agree. Waves of the teeth, lobes or an encoder's eccentricity that are as
+    large as the base's own bend it towards either way, and beside smooth columns, which do not hold them, too.
     """
-    return abs(preferred[0]) > settings.decisive and all(one * preferred[0] > 0 for one in preferred)
+    large = all(abs(one) > settings.decisive for one in preferred)
+    return large and all(one * preferred[0] > 0 for one in preferred)
 
 
 def as_counted(parameters: dict[str, Parameter], term: Term) -> dict[str, Parameter]:

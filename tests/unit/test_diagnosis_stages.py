@@ -290,11 +290,20 @@ def test_on_a_part_of_the_turns_an_open_orientation_is_not_searched_for(in_noise
 
 @pytest.mark.parametrize(
     ("preferred", "decides"),
-    [([0.5], True), ([-0.5], True), ([0.2], False), ([0.5, 0.1], True), ([0.5, -0.1], False), ([-0.28, 1.04], False)],
+    [
+        ([0.5], True),
+        ([-0.5], True),
+        ([0.2], False),
+        ([0.5, 0.4], True),
+        ([-0.376, -0.055], False),
+        ([0.5, -0.4], False),
+        ([-0.28, 1.04], False),
+    ],
 )
 def test_the_base_decides_where_nothing_speaks_against_it(preferred, decides):
     """Fault caught: both preferences added up, by which teeth that bend the base beside smooth columns chose the wrong
-    way at 1.04 - 0.28 = 0.76 (the last row; case 14 of seed 90210 of the simulated bench).
+    way at 1.04 - 0.28 = 0.76 (the last row; case 14 of seed 90210 of the simulated bench); and the first alone, beside
+    whatever the other says, by which an eccentric encoder and a resonance chose the wrong way (case 1 of run-007).
     """
     assert is_decisive(preferred, DEFAULT.orientation) is decides
 
