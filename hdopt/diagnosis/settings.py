@@ -507,7 +507,7 @@ class VerdictSettings:
     noise_over_neighbours: float = threshold(
         5.0,
         "1",
-        "choice: of what neighbouring samples show; above it noise must be a walk, which has reached 9.5 on the simulated bench",
+        "choice: of what neighbouring samples show; above it noise must be a walk (9.5 times on the simulated bench)",
     )
     left_over_passes: float = threshold(
         2.0,

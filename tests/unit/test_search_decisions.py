@@ -13,6 +13,7 @@ from hdopt.diagnosis.search import refinement, search_state, subset_search
 from hdopt.diagnosis.search.candidates import Candidate, RankedSubset
 from hdopt.diagnosis.search.search_state import SearchPlan, SearchState
 from hdopt.diagnosis.settings import DEFAULT
+from hdopt.effects.met import Spline, Waves
 
 SETTINGS = DEFAULT.search
 PROBLEM = SimpleNamespace(settings=DEFAULT, base="a base", rows=SimpleNamespace(highest_order=20.0), explanations=None)
@@ -27,6 +28,7 @@ class Effect:
     freedom: float = 2.0
     doubtful: bool = False
     trials: float = 1.0
+    met: object = None
 
 
 @dataclass(frozen=True)
@@ -328,6 +330,43 @@ def test_no_sine_is_fitted_beside_a_drive_within_its_tolerances(beside):
         after, asked, *_ = beside(state, "sine")
         assert after is state
         assert asked == []
+
+
+def waves(effect, *harmonics):
+    return Effect(effect, 2 * len(harmonics), met=Waves(Spline.FLEX, harmonics))
+
+
+def teeth_beside(monkeypatch, refitted, far):
+    """The state after a base, far or not, was looked at, and the streams of drives that waves were fitted from."""
+    pool = [waves("fs", *range(2, 9)), waves("fs", *range(2, 15)), waves("fs", 5), waves("cs", 3, 4), Effect("sine")]
+    streams = []
+
+    def joint_fit(start, terms, rng):
+        streams.append(rng)
+        refitted.append(tuple((term.effect, term.width) for term in terms))
+        return Told(50.0, tuple(terms))
+
+    monkeypatch.setattr(subset_search, "joint_fit", joint_fit)
+    monkeypatch.setattr(subset_search, "is_far", lambda fit: np.array([False, far]))
+    monkeypatch.setattr(search_state, "search_terms", lambda probe, skip: pool)
+    monkeypatch.setattr(subset_search, "explore", lambda state, centre, terms, afresh: state)
+    return subset_search.explore_base(state_of()), streams
+
+
+def test_the_widest_waves_of_each_spline_that_are_no_filler_are_fitted_where_the_base_is_bent(monkeypatch, refitted):
+    """Would catch waves of the teeth that bent the drive so far that others looked larger, the wrong way of counting
+    among them (case 32 of run-007)."""
+    state, streams = teeth_beside(monkeypatch, refitted, far=True)
+    assert sorted(refitted) == [(("cs", 4),), (("fs", 14),)]
+    assert len({id(stream) for stream in streams}) == 2
+    assert frozenset(("fs",)) in state.fits
+    # Every draw after it is as without it.
+    assert state.rng.bit_generator.seed_seq.n_children_spawned == 0
+
+
+def test_no_waves_are_fitted_from_new_drives_where_the_base_is_within_its_tolerances(monkeypatch, refitted):
+    assert teeth_beside(monkeypatch, refitted, far=False)[0].fits == {}
+    assert refitted == []
 
 
 @pytest.mark.parametrize(("lost", "left"), [(0.9, 1), (1.1, 2)])

@@ -30,6 +30,7 @@ from hdopt.diagnosis.search.refinement import (
     with_a_plain_term,
 )
 from hdopt.diagnosis.search.search_state import SearchPlan, SearchState
+from hdopt.effects.met import Waves
 from hdopt.effects.term import Term
 from hdopt.parallel.shared_memory import each
 
@@ -101,7 +102,27 @@ def explore_base(state: SearchState) -> SearchState:
     """Where nothing is known yet: the best sets about the base alone. `state` is where the work stands."""
     if state.fits:
         return state
-    return explore(state, state.base, state.terms_for(state.probe(state.base)), afresh=True)
+    pool = state.terms_for(state.probe(state.base))
+    return teeth_from_new_drives(explore(state, state.base, pool, afresh=True), pool)
+
+
+def teeth_from_new_drives(state: SearchState, pool: Sequence[Term]) -> SearchState:
+    """Waves of the teeth may bend the base alone far outside its tolerances; about that base others look larger than
+    they. So the widest waves of each spline in the `pool` that do not wholly bend to anything are fitted from new
+    drives. `state` is where the work stands; the draws are its own, so that a search in which nothing comes of it goes
+    on as without it.
+    """
+    if not is_far(state.base).any():
+        return state
+    penalties = state.base.problem.settings.penalty
+    stiff = [term for term in pool if isinstance(term.met, Waves) and flexibility(term, penalties) < 1]
+    widest = {term.effect: term for term in sorted(stiff, key=lambda term: term.width)}
+
+    def fitted(numbered: tuple[Term, np.random.Generator]) -> Fit:
+        term, own_rng = numbered
+        return joint_fit(state.base, [term], own_rng)
+
+    return state.taking(each(fitted, zip(widest.values(), copy.deepcopy(state.rng).spawn(len(widest)), strict=True)))
 
 
 def explore_clean_base(state: SearchState) -> SearchState:
