@@ -30,6 +30,7 @@ from hdopt.workflow.requirement import of_run
 from hdopt.workflow.run_folder import RunFolder, finish, run_folder
 from hdopt.workflow.run_verdict import section_of_run
 from hdopt.workflow.steps import STEPS, Context, Step, StepResult, find_step
+from hdopt.workflow.texts import with_texts
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -176,7 +177,7 @@ def _write(study: Study, found: Mapping[str, StepResult], run: RunFolder, seed: 
         _inputs(study),
     )
     # The page travels: what it says of files is their names, not the folder they were written to.
-    results = {"study": study.name, "steps": _without_folder(by_step, folder)}
+    results = {"study": study.name, "steps": with_texts(by_step, f"{folder}{os.sep}", "")}
     write_report(Report(study.title, description_of(study), sections, results), run.new)
     files = sorted(path for path in run.new.rglob("*") if path.is_file() and path.name != RESULTS_FILE)
     hashes = {str(path.relative_to(run.new)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
@@ -197,17 +198,6 @@ def _inputs(study: Study) -> Section:
     return inputs_section(study.data, text, study.name, defaults, comments.beside)
 
 
-def _without_folder(value: Any, folder: Path) -> Any:
-    """`value` of JSON, its texts without the path of the `folder` that they name files in."""
-    if isinstance(value, str):
-        return value.replace(f"{folder}{os.sep}", "")
-    if isinstance(value, Mapping):
-        return {key: _without_folder(item, folder) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_folder(item, folder) for item in value]
-    return value
-
-
 def files_of_run(folder: Path) -> tuple[str, ...]:
     """Names of the files that the run in `folder` wrote, as far as it says; () where there was none."""
     try:
@@ -219,18 +209,9 @@ def files_of_run(folder: Path) -> tuple[str, ...]:
 
 def _relocated(step: StepResult, old: Path, new: Path) -> StepResult:
     """A step's result with the names that its files will have."""
-
-    def moved(value: Any) -> Any:
-        if isinstance(value, str):
-            return value.replace(str(old), str(new))
-        if isinstance(value, Mapping):
-            return {key: moved(item) for key, item in value.items()}
-        if isinstance(value, list | tuple):
-            return [moved(item) for item in value]
-        return value
-
     files = tuple(new / file.relative_to(old) for file in step.files)
-    return replace(step, results=moved(step.results), says=tuple(moved(step.says)), files=files)
+    results, says = (with_texts(part, str(old), str(new)) for part in (step.results, step.says))
+    return replace(step, results=results, says=tuple(says), files=files)
 
 
 def steps_of(study: Study) -> tuple[bool, tuple[str, ...]]:

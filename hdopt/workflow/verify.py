@@ -19,6 +19,7 @@ from hdopt.study import load_study
 from hdopt.words import counted
 from hdopt.workflow.provenance import provenance
 from hdopt.workflow.run import Progress, run_study
+from hdopt.workflow.texts import with_texts
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,7 +88,8 @@ def verify_run(folder: str | Path, progress: Progress = iter) -> Verification:
         differing: list[str] = []
         for name in sorted({*known["files"], *new["provenance"]["files"]}):
             (same if _alike(folder / name, new_folder / name, known, new["provenance"]) else differing).append(name)
-        numbers = tuple(_differences(_moved(old["steps"], folder), _moved(new["steps"], new_folder)))
+        then, now = (with_texts(r["steps"], f"{place}{os.sep}", "") for r, place in ((old, folder), (new, new_folder)))
+        numbers = tuple(_differences(then, now))
     (differing if numbers else same).append(RESULTS_FILE)
     changes = tuple(_changes(known, provenance(study, seed)))
     return Verification(folder, tuple(same), tuple(differing), numbers, changes)
@@ -134,12 +136,6 @@ def _alike(old: Path, new: Path, then: Mapping[str, Any], now: Mapping[str, Any]
     if one != two and old.suffix in MOMENTS:
         one, two = (MOMENTS[old.suffix].sub(b"", content) for content in (one, two))
     return one == two
-
-
-def _moved(value: Any, folder: Path) -> Any:
-    """JSON without the place of its folder."""
-    place = json.dumps(f"{folder}{os.sep}")[1:-1]
-    return json.loads(json.dumps(value).replace(place, ""))
 
 
 def _differences(old: Any, new: Any, place: str = "") -> Iterator[tuple[str, Any, Any]]:
