@@ -62,29 +62,46 @@ class Item:
 class Requirement:
     """offset + linear . t + norm of (quadratic * t, rest) <= limit, over the tolerances t of shape (k,).
 
-    `linear` alone is the worst-case rule, `quadratic` with the rest of fixed parts the root-sum-square rule.
+    `linear` (k,) alone is the worst-case rule, `quadratic` (k,) with the rest of fixed parts the root-sum-square rule.
+    Of several rows, `linear` (m, k) with `offset` (m,), the largest must keep the limit.
     """
 
     limit: float
     linear: Array
     quadratic: Array
-    offset: float = 0.0
+    offset: Array | float = 0.0
     rest: float = 0.0
     rule: str = ""
 
+    def rows(self, tolerances: Array) -> Array:
+        """Left sides at the tolerances, (m,), or () where there is one row."""
+        return np.asarray(self.offset + self.linear @ tolerances + self._norm(tolerances))
+
+    def slopes(self, tolerances: Array) -> Array:
+        """Gradients of the `rows`, (m, k) or (k,)."""
+        norm = self._norm(tolerances)
+        return self.linear + (self.quadratic**2 * tolerances / norm if norm > 0 else 0.0)
+
     def value(self, tolerances: Array) -> float:
-        """Left side at the tolerances."""
-        norm = math.sqrt(float(np.square(self.quadratic * tolerances).sum()) + self.rest**2)
-        return self.offset + float(self.linear @ tolerances) + norm
+        """The largest left side at the tolerances."""
+        return float(np.max(self.rows(tolerances)))
 
     def slope(self, tolerances: Array) -> Array:
-        """Its gradient."""
-        parts = self.quadratic * tolerances
-        norm = math.sqrt(float(np.square(parts).sum()) + self.rest**2)
-        return self.linear + (self.quadratic * parts / norm if norm > 0 else 0.0)
+        """Its gradient, (k,)."""
+        largest: Array = np.atleast_2d(self.slopes(tolerances))[int(np.argmax(self.rows(tolerances)))]
+        return largest
+
+    def mean_row(self, weights: Array) -> Requirement:
+        """The one row that the rows make with `weights` (m,), or () for one, which add up to 1: what keeps all of them
+        keeps it."""
+        linear, offset = weights @ np.atleast_2d(self.linear), float(np.sum(weights * self.offset))
+        return replace(self, linear=linear, offset=offset)
 
     def with_limit(self, limit: float) -> Requirement:
-        return Requirement(limit, self.linear, self.quadratic, self.offset, self.rest, self.rule)
+        return replace(self, limit=limit)
+
+    def _norm(self, tolerances: Array) -> float:
+        return math.sqrt(float(np.square(self.quadratic * tolerances).sum()) + self.rest**2)
 
 
 def worst_case_rule(sensitivities: Sequence[float], limit: float, fixed: Sequence[float] = ()) -> Requirement:
@@ -263,10 +280,13 @@ def _solve_convex(items: Sequence[Item], requirement: Requirement) -> Solution:
             _solve(problem, cp.CLARABEL, equilibrate_enable=False, warm_start=False, max_iter=500)
     if problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
         raise HdoptError(f"the solver ended with {problem.status!r}; check the cost data and the bounds")
-    multiplier = float(meets.dual_value) * cost_unit / unit
+    prices = np.atleast_1d(meets.dual_value)
+    price = float(prices.sum())
+    multiplier = price * cost_unit / unit
     tolerances = np.clip(t.value, low, high) * scale
     tolerances = _pull_inside(items, requirement, tolerances)
-    bound = _lagrange_bound(items, requirement, multiplier, tolerances)
+    weights = prices / price if price > 0 else np.full(len(prices), 1 / len(prices))
+    bound = _lagrange_bound(items, requirement.mean_row(weights), multiplier, tolerances)
     return _finish(items, requirement, tolerances, lower_bound=bound, marginal_cost=multiplier, solver="Clarabel")
 
 
@@ -417,9 +437,9 @@ def _solve_choice(
         return (chosen, None) if requirement.value(chosen) <= requirement.limit * (1 + FEASIBLE) else None
     remaining = Requirement(
         requirement.limit,
-        requirement.linear[free],
+        requirement.linear[..., free],
         requirement.quadratic[free],
-        requirement.offset + float(requirement.linear @ chosen),
+        requirement.offset + requirement.linear @ chosen,
         math.hypot(requirement.rest, float(np.linalg.norm(requirement.quadratic * chosen))),
         requirement.rule,
     )
@@ -445,8 +465,8 @@ def _cost_tangent(item: Item, t: Expression, cost: Expression, at: float) -> Exp
 
 
 def _requirement_tangent(requirement: Requirement, scale: Array, unit: float, t: Expression, at: Array) -> Expression:
-    slope = requirement.slope(at * scale) * scale
-    return (requirement.value(at * scale) + slope @ (t - at)) / unit <= requirement.limit / unit
+    slopes = requirement.slopes(at * scale) * scale
+    return (requirement.rows(at * scale) + slopes @ (t - at)) / unit <= requirement.limit / unit
 
 
 def _piecewise_choice(lines: Piecewise, scale: float, t: Expression, cost: Expression) -> list[Expression]:

@@ -156,29 +156,33 @@ def allocate_by_yield(problem: AllocationProblem, seed: int = 1, verify_n: int =
 def allocate_by_worst_case(problem: AllocationProblem, seed: int = 1) -> Allocation:
     """Least cost of the `problem`'s tolerances while the largest response over their box keeps the limit.
 
-    It is the largest as far as the search of `find_worst_case` with `seed` finds it. Raises `Infeasible` where even the
-    tightest tolerances do not keep the limit, `Unbounded` where an input is.
+    It is the largest as far as the search of `find_worst_case` with `seed` finds it. At the least cost several corners
+    are as bad, and a model that knew one would make the others worse: all that were found stay in the model, a tangent
+    each (Kelley, J. SIAM 8, 1960). Raises `Infeasible` where even the tightest tolerances do not keep the limit,
+    `Unbounded` where an input is.
     """
     space, items = problem.space, problem.items
     columns = [space.index(item.name) for item in items]
     centres = np.array([space.tolerances[item.name].centre for item in items])
+    corners: list[Array] = []  # in their columns the items' shares of the tolerances that they were found at
 
-    def at_corner(corner: Array, found_at: Array, tolerances: Array) -> float:
-        place = corner.copy()
-        place[columns] = centres + (corner[columns] - centres) * tolerances / found_at
-        return float(evaluate(problem.response, place[None, :], space.names, "the worst corner")[0])
+    def at_corners(tolerances: Array) -> Array:
+        places = np.array(corners)
+        places[:, columns] = centres + places[:, columns] * tolerances
+        return evaluate(problem.response, places, space.names, "the worst corners")
 
     def model(tolerances: Array) -> Requirement:
         worst = find_worst_case(problem.response, problem.space_at(tolerances), seed, corners=2**15, generations=100)
         corner = np.array([worst.at[name] for name in space.names])
-        slopes = np.array(
+        corner[columns] = (corner[columns] - centres) / tolerances
+        corners.append(corner)
+        slopes = np.column_stack(
             [
-                (at_corner(corner, tolerances, tolerances + step) - at_corner(corner, tolerances, tolerances - step))
-                / (2 * step[i])
+                (at_corners(tolerances + step) - at_corners(tolerances - step)) / (2 * step[i])
                 for i, step in enumerate(np.diag(STEP * tolerances))
             ]
         )
-        return _tangent(problem, "worst case", worst.value, np.maximum(slopes, 0), tolerances)
+        return _tangent(problem, "worst case", at_corners(tolerances), np.maximum(slopes, 0), tolerances)
 
     def value(tolerances: Array) -> float:
         return find_worst_case(problem.response, problem.space_at(tolerances), seed).value
@@ -291,8 +295,8 @@ def _refuse_unreachable(problem: AllocationProblem, best: float) -> None:
         )
 
 
-def _tangent(problem: AllocationProblem, rule: str, value: float, slopes: Array, at: Array) -> Requirement:
-    return Requirement(problem.limit, slopes, np.zeros_like(slopes), value - float(slopes @ at), rule=rule)
+def _tangent(problem: AllocationProblem, rule: str, value: Array | float, slopes: Array, at: Array) -> Requirement:
+    return Requirement(problem.limit, slopes, np.zeros(slopes.shape[-1]), value - slopes @ at, rule=rule)
 
 
 def _quantile_constraint(

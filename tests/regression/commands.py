@@ -60,7 +60,6 @@ COMMANDS = (
     Command(("sobol", "chase-shaft-housing", "-n", "512")),
     *(Command(("allocate", "chase-shaft-housing", "--rule", r), SEARCHED) for r in ("worst_case", "rss")),
     Command(("allocate", "csf-25-80-tolerances", "--rule", "rss", *FAST_ALLOCATION), SEARCHED, slow=True),
-    Command(("allocate", "csf-25-80-tolerances", "--rule", "worst_case", *FAST_ALLOCATION), SEARCHED, slow=True),
     Command(
         ("search", "csf-25-80-design-trade", "--no-fronts", *SMALL_SEARCH),
         SEARCHED,

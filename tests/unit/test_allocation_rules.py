@@ -133,6 +133,25 @@ def test_least_cost_does_not_hang_on_the_present_tolerances(quick, rule, dearer)
     assert [one.modelled for one in found] == pytest.approx([0.4] * len(starts), rel=1e-3)
 
 
+@pytest.mark.parametrize("present", [(0.4, 0.4), (0.1, 1.0)])
+def test_the_worst_case_weighs_all_corners_that_are_as_bad(quick, present):
+    """By hand: of s a + b at one corner and a + s b at the opposite one, s = 0.2, the least cost of 0.1/a + 0.1/b under
+    0.4 is where both are 0.4, at a = b = 0.4/1.2. Would catch a model that knows one corner a time, turns to and fro
+    between them, and says in the end that nothing meets the limit.
+    """
+
+    class Opposite(Sum):
+        def __call__(self, inputs):
+            return np.maximum(inputs @ (0.2, 1.0), inputs @ (-1.0, -0.2))
+
+    one = problem(costs=(Reciprocal(0.0, 0.1), Reciprocal(0.0, 0.1)), present=present)
+    opposite = AllocationProblem(Opposite(), one.space, one.items, one.limit, one.required_yield, "mm")
+    found = allocate_by_worst_case(opposite, seed=3)
+    assert found.total_cost == pytest.approx(0.2 / (0.4 / 1.2), rel=1e-3)
+    assert found.tolerances == pytest.approx({"a": 0.4 / 1.2, "b": 0.4 / 1.2}, rel=0.01)
+    assert found.steps < rules.MAX_STEPS
+
+
 def test_the_price_of_a_root_sum_square_counts_directions(quick):
     class Turned(Sum):
         def __call__(self, inputs):
