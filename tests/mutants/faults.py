@@ -93,6 +93,8 @@ def main() -> int:
         and (options.afresh or not is_known(fault, found))
         and not (options.new and fault.key in found)
     ]
+    if gone := [fault for fault in pending if (ROOT / fault.file).read_text(encoding="utf-8").count(fault.old) != 1]:
+        raise SystemExit("the old text does not stand there once: " + ", ".join(f"{x.room}: {x.name}" for x in gone))
     stands = {(fault, by): digest_of(fault, (by,) if by else ()) for fault in pending for by in ("", *fault.tests)}
     for number, (fault, said, by) in enumerate(tried(pending, tree, folder), start=1):
         keep(fault, [said, stands[fault, by], by])

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from hdopt.allocation.convex import Infeasible, Item, cost_curve, rss_rule, solve, worst_case_rule
+from hdopt.allocation.convex import Infeasible, Item, Requirement, cost_curve, rss_rule, solve, worst_case_rule
 from hdopt.allocation.cost import Exponential, Grade, GradeTable, Piecewise, Power, Reciprocal
 from hdopt.errors import HdoptError
 from hdopt.workflow.allocate import allocate
@@ -65,6 +65,17 @@ def test_convex_lines_need_no_choice():
     grid = np.linspace(0.001, 0.0099, 8901)
     best = np.min(convex.cost(grid) + 0.01 / (0.01 - grid))
     assert found.total_cost == pytest.approx(best, rel=1e-5)
+
+
+def test_of_two_rows_each_has_its_own_price():
+    """By hand: 1/a + 1/b under a + b/5 <= 1 and b + 1/2 <= 1 is least at a = 0.9, b = 0.5, where the rows' prices are
+    1/a^2 and 1/b^2 - 1/(5 a^2), 1.23 and 3.75. Would catch a proven bound that weighs the rows alike.
+    """
+    rows = Requirement(1.0, np.array([[1.0, 0.2], [0.0, 1.0]]), np.zeros(2), np.array([0.0, 0.5]))
+    found = solve([Item("a", Reciprocal(0.0, 1.0), 1.0), Item("b", Reciprocal(0.0, 1.0), 1.0)], rows)
+    assert found.tolerances == pytest.approx({"a": 0.9, "b": 0.5}, rel=1e-6)
+    assert found.marginal_cost == pytest.approx(0.8 / 0.9**2 + 1 / 0.5**2, rel=1e-4)
+    assert found.lower_bound == pytest.approx(1 / 0.9 + 1 / 0.5, rel=1e-6)
 
 
 def test_scaling_of_units_does_not_change_the_answer():
