@@ -7,7 +7,7 @@ import re
 import uuid
 from typing import TYPE_CHECKING
 
-from hdopt.geometry.day import moment
+from hdopt.moment import moment
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing

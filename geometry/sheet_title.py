@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from hdopt.geometry.day import moment
 from hdopt.geometry.drawing import draw_first_angle
 from hdopt.geometry.materials import mass, material
 from hdopt.geometry.part import Part
 from hdopt.geometry.sheet import SMALL, Sheet
+from hdopt.moment import moment
 
 if TYPE_CHECKING:
     from hdopt.geometry.job import Job

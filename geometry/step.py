@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any  # Any: objects of OCP whose types it does not name
 
 from hdopt.errors import HdoptError
-from hdopt.geometry.day import moment
 from hdopt.geometry.part21_repair import repaired
+from hdopt.moment import moment
 
 if TYPE_CHECKING:
     import cadquery as cq

@@ -62,7 +62,9 @@ def _run(arguments: Sequence[str] | None) -> int:
     from hdopt.cli.app import cli
     from hdopt.errors import numbers_of
     from hdopt.files import watching_files
+    from hdopt.moment import moment
 
+    moment()  # Where the environment's is unusable, before any work.
     if not os.environ.get("HDOPT_TRACEBACK"):
         # Results are checked to be finite where they are made; NumPy's own lines would stand beside the one message.
         warnings.filterwarnings("ignore", category=RuntimeWarning)

@@ -10,10 +10,8 @@ from __future__ import annotations
 import base64
 import gzip
 import json
-import os
 import re
 from collections.abc import Collection, Iterator
-from datetime import UTC, datetime
 from functools import singledispatchmethod
 from importlib.metadata import version
 from importlib.resources import files
@@ -24,6 +22,7 @@ from markupsafe import Markup, escape
 
 from hdopt.errors import HdoptError
 from hdopt.files import make_folder, to_csv, to_json, write_text
+from hdopt.moment import moment
 from hdopt.report import (
     REPORT_FILE,
     RESULTS_FILE,
@@ -277,7 +276,6 @@ def _full_stop(title: str) -> str:
 
 
 def date_of_page() -> str:
-    """The date, or that of SOURCE_DATE_EPOCH where a reproducible page is wanted."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH")
-    moment = datetime.fromtimestamp(int(epoch), UTC) if epoch else datetime.now().astimezone()
-    return f"{moment.day} {moment:%B %Y}"
+    """The date, UTC as in the other files, or that of SOURCE_DATE_EPOCH where a reproducible page is wanted."""
+    now = moment()
+    return f"{now.day} {now:%B %Y}"

@@ -43,7 +43,7 @@ def provenance(study: Study | None = None, seed: int | None = None, command: str
         "system": f"{platform.system()} {platform.machine()}",
         "cores": os.cpu_count(),
     }
-    if work is not None and "SOURCE_DATE_EPOCH" not in os.environ:
+    if work is not None and not os.environ.get("SOURCE_DATE_EPOCH"):
         known["started"] = datetime.fromtimestamp(work.began, UTC).isoformat(timespec="seconds")
         known["wall_time_s"] = round(time.time() - work.began, 3)
     return known

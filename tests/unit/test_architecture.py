@@ -9,7 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 LAYERS = [
     {"arrays", "interruption", "toml_lines", "words"},
-    {"bench", "errors", "figures", "files", "keywords", "late", "parallel"},
+    {"bench", "errors", "figures", "files", "keywords", "late", "moment", "parallel"},
     {"drive"},
     {"effects", "recordings", "kinematics", "mechanics"},
     {"tolerance", "simulation"},
@@ -25,6 +25,7 @@ BESIDE = {
     ("parallel", "errors"): "the errors are the ground that every room stands on",
     ("figures", "errors"): "the errors are the ground that every room stands on",
     ("keywords", "errors"): "the errors are the ground that every room stands on",
+    ("moment", "errors"): "the errors are the ground that every room stands on",
     ("files", "errors"): "the errors are the ground that every room stands on",
     ("parallel", "files"): "finished parts are kept on disk, whole or not at all",
     ("geometry", "allocation"): "fits are made of the IT grades of ISO 286, which stand once",
@@ -44,6 +45,7 @@ TOP = {
     "interruption.py",
     "keywords.py",
     "late.py",
+    "moment.py",
     "toml_lines.py",
     "words.py",
 }
