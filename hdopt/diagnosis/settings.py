@@ -164,7 +164,7 @@ class NuisanceSettings:
     )
     slope_share: float = threshold(0.8, "1", "choice: share of all that varies that such a drift is")
     slope_axis: float = threshold(
-        0.3, "1", "choice: log of the power left from which the input angle is what is counted wrongly"
+        0.015, "1", "choice: log of the power left, alone and beside smooth columns, from which the input is off"
     )
 
 

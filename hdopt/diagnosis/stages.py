@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -58,8 +59,7 @@ def begin(
     of_input = taken.of_input(recordings[0].ratio)
     as_input = first_fit(of_input.take_out(recordings), base, rng, settings, nuisance, of_input)
     # Physics that is not the base's own stands in both: smooth columns beside them soak most of it up.
-    clean = [fit_clean_base(one.problem, rng) for one in (as_output, as_input)]
-    left = [beside_smooth(fit).objective for fit in clean if fit is not None]
+    left = [(one.base.objective, power_beside_smooth(one.problem, rng)) for one in (as_output, as_input)]
     return as_input if input_is_off(left[0], left[1], settings.nuisance) else as_output
 
 
@@ -205,6 +205,12 @@ def beside_smooth(clean: Fit) -> Fit:
     beside = replace(problem, nuisance=own)
     free = np.r_[clean.offsets, np.zeros(own.shape[1] - len(clean.offsets))]
     return refine(evaluate(beside, clean.errors, free, (), ()), problem.settings.fit.offset_iterations)
+
+
+def power_beside_smooth(problem: FitProblem, rng: np.random.Generator) -> float:
+    """What the base of `problem`, from drives drawn by `rng`, and smooth columns leave: a whitened sum of squares."""
+    clean = fit_clean_base(problem, rng)
+    return math.inf if clean is None else beside_smooth(clean).objective
 
 
 def smooth_model(

@@ -122,10 +122,11 @@ def test_a_slope_that_was_taken_out_leaves_the_angle_as_the_drive_turned():
     assert slope.input_gain == pytest.approx(1 / (1 - 80 * 0.02))
 
 
-def test_the_input_is_off_where_the_base_fits_clearly_better():
+def test_the_input_is_off_where_the_base_fits_clearly_better_alone_and_beside_smooth_columns():
     clear = np.exp(DEFAULT.nuisance.slope_axis)
-    assert input_is_off(1.1 * clear, 1.0, DEFAULT.nuisance)
-    assert not input_is_off(0.9 * clear, 1.0, DEFAULT.nuisance)
+    assert input_is_off((1.01 * clear, 1.01 * clear), (1.0, 1.0), DEFAULT.nuisance)
+    for as_recorded in ((0.99 * clear, 9.0), (9.0, 0.99 * clear), (9.0, 0.5)):
+        assert not input_is_off(as_recorded, (1.0, 1.0), DEFAULT.nuisance)
 
 
 def test_the_noise_of_neighbours_is_that_of_the_usual_recording():

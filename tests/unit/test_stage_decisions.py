@@ -383,28 +383,29 @@ def test_recordings_keep_their_zeros_among_each_other(monkeypatch):
     np.testing.assert_allclose(two.error_arcmin, [9.0, 10.0, 11.0])
 
 
-def test_whether_the_input_is_off_is_asked_beside_smooth_columns(monkeypatch):
-    """Fault caught: two bases bent by physics that is not theirs compared, which puts it on the wrong axis."""
+@pytest.mark.parametrize(
+    ("alone", "beside", "chosen"),
+    [((9.0, 1.0), (9.0, 1.0), "input"), ((9.0, 1.0), (1.0, 9.0), "output"), ((1.0, 9.0), (9.0, 1.0), "output")],
+)
+def test_whether_the_input_is_off_is_asked_of_the_base_alone_and_beside_smooth_columns(
+    monkeypatch, alone, beside, chosen
+):
+    """`alone` and `beside` smooth columns: what is left as output and as input. Faults caught: one of both asked, where
+    a base alone is bent by physics that is not its own, and one beside smooth columns by waves of the teeth."""
     taken = TakenSlope(0.01, 4.0)
     monkeypatch.setattr(stages, "common_slope", lambda recordings, settings: taken)
 
     def fitted(recordings, base, rng, settings, nuisance, slope):
-        return state_of(Told("output" if slope is taken else "input", 1.0 if slope is taken else 50.0, Problem(slope)))
+        return state_of(Told("output" if slope is taken else "input", alone[slope is not taken], Problem(slope)))
 
     def clean(problem, rng):
         return Told("output" if problem.noise is taken else "input", 1.0)
 
     monkeypatch.setattr(stages, "first_fit", fitted)
     monkeypatch.setattr(stages, "fit_clean_base", clean)
-    monkeypatch.setattr(
-        stages, "beside_smooth", lambda fit: replace(fit, objective={"output": 9.0, "input": 1.0}[fit.name])
-    )
+    monkeypatch.setattr(stages, "beside_smooth", lambda fit: replace(fit, objective=beside[fit.name == "input"]))
     angle = np.linspace(0.0, 9.0, 3)
-    assert stages.begin([Recording("", 80.0, angle, angle)], "a base", 1, DEFAULT).base.name == "input"
-    monkeypatch.setattr(
-        stages, "beside_smooth", lambda fit: replace(fit, objective={"output": 1.0, "input": 9.0}[fit.name])
-    )
-    assert stages.begin([Recording("", 80.0, angle, angle)], "a base", 1, DEFAULT).base.name == "output"
+    assert stages.begin([Recording("", 80.0, angle, angle)], "a base", 1, DEFAULT).base.name == chosen
 
 
 @pytest.fixture

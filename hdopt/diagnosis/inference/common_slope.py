@@ -79,8 +79,10 @@ def common_slope(recordings: Sequence[Recording], settings: NuisanceSettings) ->
     return TakenSlope(slope * ARCMIN, float(np.mean(recordings[0].input_angle)))
 
 
-def input_is_off(as_recorded: float, corrected: float, settings: NuisanceSettings) -> bool:
-    """Whether the base leaves clearly less power with the input angle `corrected` than `as_recorded` (whitened sums of
-    squares), by the `settings`.
+def input_is_off(as_recorded: Sequence[float], corrected: Sequence[float], settings: NuisanceSettings) -> bool:
+    """Whether the base leaves less power with the input angle `corrected` than `as_recorded`, by the `settings`.
+
+    Both are whitened sums of squares of fits made alike, of the base alone and beside smooth columns. All must say so:
+    waves of the teeth bend a base beside smooth columns to either reading, but not the base alone.
     """
-    return math.log(as_recorded / corrected) > settings.slope_axis
+    return all(math.log(one / other) > settings.slope_axis for one, other in zip(as_recorded, corrected, strict=True))
