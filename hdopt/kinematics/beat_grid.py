@@ -1,4 +1,4 @@
-"""What both zones do but for the FS teeth, at the grid angles of one turn and between them, and where rims change.
+"""Both zones but for the FS teeth, at the grid angles of one turn and between them, and where rims change.
 
 Between the angles where a deepest rim changes, each zone follows one branch. A cell is what lies between two
 neighbouring grid angles: a whole one where the rims stay the same. Where they change, the cell is cut there.
@@ -11,7 +11,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hdopt.arrays import Array
+from hdopt.arrays import Array, Singles
+from hdopt.kinematics.beat_bounds import (
+    CEILING,
+    CELLS,
+    CLEAR,
+    DEPTH,
+    FLOOR,
+    NODES,
+    ON_CS,
+    ON_FS,
+    SAFETY,
+    Circular,
+    Places,
+    Slack,
+    largest_of_branches,
+    on_turn,
+    rounding_of,
+)
 from hdopt.kinematics.beat_tables import (
     BEFORE,
     PER_RAD,
@@ -23,57 +40,61 @@ from hdopt.kinematics.beat_tables import (
     four,
     inlined,
     least_of,
-    whole_of,
 )
 from hdopt.kinematics.branches import TIE_MM
 from hdopt.kinematics.essential import ROOT_CELLS, ROOT_STEPS, SHORT
 from hdopt.kinematics.lanes.single import unsigned
 
-SAFETY = 1.25
-"""How many times the largest second difference of the parts a cell is allowed to bend, and the third to bow."""
-BETWEEN_PARABOLAS = 0.064 / 8
-"""Of a third difference over a cell, how far off a parabola through its ends and middle is at most, 1/(9 sqrt(3))."""
+BETWEEN_PARABOLAS = 0.064
+"""Of a third difference over half a cell, how far off a parabola through its ends and middle is at most,
+1/(9 sqrt(3))."""
 
 
-DEPTH, ON_CS, ON_FS = 0, 1, 2
-"""The first axis of `branches` of a `Walk`: depth (mm), offsets on CS and FS (rad)."""
-VALUE, ANGLE, RIM, GAP, FLOOR, CEILING, ROWS = 0, 2, 4, 6, 8, 9, 10
-"""Rows of a grid over one turn, two of most, one for each zone: its deviation without the FS teeth (mm), angle on the
-FS (rad), deeper rim (0 or 1), and what the upper rim lies deeper than the lower (mm); what the driving deviation cannot
-fall below in the cell after an angle, and what the zones but for the FS teeth do not rise above there, mm."""
+GAP, MARK, SIZE, ROWS = 0, 2, 3, 4
+"""Rows of a grid over one turn: what the upper rim of either zone lies deeper than the lower (mm), where that may
+change, and its size."""
 
 
 class Walk(NamedTuple):
     """What one drive's beat is walked with: `branches` on an even grid of m angles, wrapped around, (3, 2, 2, m + 4)
-    for depth (mm) and offsets (rad), zone and rim; the CS table over one turn, wrapped around (mm of arc); tan of the
-    pressure angle times the share of misalignment, Z_CS/Z_FS, the FS comb, how far a cell of the grid bends, and how
-    far off a parabola through its ends and middle is, mm."""
+    for depth (mm) and offsets (rad), zone and rim; the CS table; tan of the pressure angle times the share of
+    misalignment, Z_CS/Z_FS, the FS comb, how far a cell of the grid bends with the FS teeth, how far off a parabola
+    through its ends and middle is, mm, and what bounds are given."""
 
     branches: Array
-    cs_table: Array
+    circular: Circular
     tan_alpha: float
     advance: float
     comb: Comb
     margin: float
     beside: float
+    slack: Slack
 
 
 class Work(NamedTuple):
-    """Room for one drive: the `grid` (ROWS, m + 4), wrapped around; the `changes` of rims in places, in order, and a
-    turn later the first; the cells that these cut (`cuts`), their two places and both zones' rims; deviations of a
-    cell at all phases (`lanes`, (3, 2, P): end, zone, phase; and room to fold them)."""
+    """Room for one drive: `nodes` and `cells` of bounds, `places` for them; the `grid` (ROWS, m + 4) of gaps between
+    rims, wrapped around; the `changes` of rims in places, in order, and a turn later the first; deviations of a cell
+    at all phases (`lanes`, (3, 2, P): end, zone, phase; and room to fold them)."""
 
+    nodes: Singles
+    cells: Singles
+    places: Places
     grid: Array
     changes: Array
-    cuts: Array
-    lanes: Array
+    lanes: Singles
 
 
 @compiled
 def new_work(grid: int, phases: int) -> Work:
     """Room for the beat of drives on so many `grid` angles and FS `phases`."""
+    wrapped = grid + WRAPPED
     return Work(
-        np.empty((ROWS, grid + WRAPPED)), np.empty(4 * grid + 2), np.empty((5 * grid + 2, 4)), np.empty((3, 2, phases))
+        np.empty((NODES, wrapped), np.float32),
+        np.empty((CELLS, wrapped), np.float32),
+        np.empty(wrapped, np.int32),
+        np.empty((ROWS, wrapped)),
+        np.empty(4 * grid + 2),
+        np.empty((3, 2, phases), np.float32),
     )
 
 
@@ -83,31 +104,24 @@ def grid_angles(grid: int) -> Array:
 
 
 @compiled
-def bends(branches: Array, grid: Array) -> tuple[float, float]:
-    """Largest second and third difference of the depth of any of the wrapped `branches`, mm, over their grid; two rows
-    of `grid` are room for them."""
-    n = branches.shape[3] - 3
-    second, third = grid[FLOOR], grid[CEILING]
-    for branch in range(4):
-        row = branches[DEPTH, branch // 2, branch % 2]
-        for i in range(n):
-            near, far = row[i] - 2 * row[i + 1] + row[i + 2], row[i + 1] - 2 * row[i + 2] + row[i + 3]
-            one, two = -abs(near), -abs(far - near)
-            second[i] = one if branch == 0 or one < second[i] else second[i]
-            third[i] = two if branch == 0 or two < third[i] else third[i]
-    return -least_of(second, n), -least_of(third, n)
-
-
-@compiled
-def margins(
-    branches: Array, tan_alpha: float, on_cs: tuple[float, float], comb: Comb, work: Work
-) -> tuple[float, float]:
-    """`margin` and `beside` of `Walk`, mm, of wrapped `branches`, whose depth `tan_alpha` multiplies, where the CS
-    table has the second and third difference `on_cs` over a grid angle, mm, and the FS table is `comb`; `work` is
-    room."""
-    second, third = bends(branches, work.grid)
-    margin = (tan_alpha * second + on_cs[0] + comb.bend) / 8
-    return SAFETY * margin, SAFETY * BETWEEN_PARABOLAS * (tan_alpha * third + on_cs[1] + comb.bow)
+def walk_of(branches: Array, circular: Circular, tan_alpha: float, advance: float, comb: Comb, work: Work) -> Walk:
+    """`Walk` of wrapped `branches`, whose depth `tan_alpha` multiplies, with the teeth `circular` and `comb` and
+    Z_CS/Z_FS, `advance`; `work` is room."""
+    cells = work.cells
+    bend, deepest, turn = largest_of_branches(branches, cells[FLOOR], cells[CEILING], cells[CLEAR])
+    rounding = rounding_of(deepest, tan_alpha, circular, comb)
+    margin = SAFETY / 8 * (tan_alpha * bend + circular.bend + comb.bend) + rounding
+    # A third difference is that of two second ones, over half a step an eighth.
+    beside = 2 * rounding + SAFETY * BETWEEN_PARABOLAS * (tan_alpha * bend / 4 + circular.bow + comb.bow)
+    # Where offsets bend, the teeth are met off an even step. Gaps of rims bend twice as much as a depth; the hundredth
+    # is for rounding.
+    slack = Slack(
+        SAFETY / 8 * (tan_alpha * bend + circular.slope * turn),
+        1.01 * bend / 4 + TIE_MM,
+        rounding + comb.ripple + SAFETY / 8 * comb.slope * turn,
+        SAFETY / 8 * comb.bend,
+    )
+    return Walk(branches, circular, tan_alpha, advance, comb, margin, beside, slack)
 
 
 @inlined
@@ -119,81 +133,34 @@ def _branch_by_four(values: Array, of: int, zone: int, k: int, at: Four) -> floa
 
 
 @inlined
-def _on_turn(angle: float, places: int) -> float:
-    """An `angle`, rad, as a place from 0 to so many `places` a turn."""
-    turns = angle * PER_RAD
-    return float(turns - np.floor(turns)) * places
-
-
-@inlined
 def zone_at(walk: Walk, zone: int, k: int, place: float) -> tuple[float, float]:
     """Deviation of a `zone` of a `walk` without FS teeth (mm) and its angle on the FS (rad), with its rim `k`, at a
     `place` in cells from 0 to two turns."""
     branches = walk.branches
-    m, n_cs = branches.shape[3] - WRAPPED, len(walk.cs_table) - WRAPPED
+    m, n_cs = branches.shape[3] - WRAPPED, len(walk.circular.table) - WRAPPED
     at, theta = four(place if place < m else place - m), place * (2 * math.pi / m)
     s, away = 1.0 - 2.0 * zone, math.pi * zone
     on_cs = theta + s * _branch_by_four(branches, ON_CS, zone, k, at) + away
     angle = walk.advance * theta + s * _branch_by_four(branches, ON_FS, zone, k, at) + away
-    on_table = by_four(walk.cs_table, four(_on_turn(on_cs, n_cs)))
+    on_table = by_four(walk.circular.table, four(on_turn(on_cs * PER_RAD, n_cs)))
     return walk.tan_alpha * _branch_by_four(branches, DEPTH, zone, k, at) + on_table, angle
 
 
-@compiled
-def fill_grid(walk: Walk, grid: Array) -> None:
-    """Fill the first rows of the `grid` (ROWS, m + 4) of a `walk` with both zones' deeper rims."""
-    branches, table, tan_alpha, advance = walk.branches, walk.cs_table, walk.tan_alpha, walk.advance
-    m, n_cs = branches.shape[3] - WRAPPED, len(table) - WRAPPED
-    step = 2 * math.pi / m
-    for zone in range(2):
-        s, away = 1.0 - 2.0 * zone, math.pi * zone
-        for i in range(branches.shape[3]):
-            upper, lower = branches[DEPTH, zone, 0, i], branches[DEPTH, zone, 1, i]
-            first, theta = upper >= lower - TIE_MM, (i - BEFORE) * step
-            on_cs = branches[ON_CS, zone, 0, i] if first else branches[ON_CS, zone, 1, i]
-            on_fs = branches[ON_FS, zone, 0, i] if first else branches[ON_FS, zone, 1, i]
-            grid[GAP + zone, i] = upper - lower
-            grid[RIM + zone, i] = 0.0 if first else 1.0
-            grid[ANGLE + zone, i] = advance * theta + s * on_fs + away
-            # The place on the CS for now.
-            grid[VALUE + zone, i] = _on_turn(theta + s * on_cs + away, n_cs)
-    for zone in range(2):
-        for i in range(branches.shape[3]):
-            upper, lower = branches[DEPTH, zone, 0, i], branches[DEPTH, zone, 1, i]
-            depth = upper if upper >= lower - TIE_MM else lower
-            grid[VALUE + zone, i] = tan_alpha * depth + by_four(table, four(grid[VALUE + zone, i]))
-
-
-@compiled
-def fill_bounds(walk: Walk, grid: Array) -> None:
-    """Fill floor and ceiling of the `grid` of a `walk` for every cell, as if no rim changed in it.
-
-    The floor rises with the deviation of either zone: that of the lesser of both ends' bounds a cell's.
-    """
-    for i in range(grid.shape[1] - 1):
-        a, b, c, d = grid[VALUE, i], grid[VALUE, i + 1], grid[VALUE + 1, i], grid[VALUE + 1, i + 1]
-        turned = abs(grid[ANGLE + 1, i] - grid[ANGLE, i] - math.pi)
-        turned_b = abs(grid[ANGLE + 1, i + 1] - grid[ANGLE, i + 1] - math.pi)
-        turned = turned if turned > turned_b else turned_b
-        grid[FLOOR, i] = floor_of(walk.comb, a if a < b else b, c if c < d else d, turned) - walk.margin
-        a, c = a if a > b else b, c if c > d else d
-        grid[CEILING, i] = (a if a > c else c) + walk.margin + walk.comb.largest
+@inlined
+def node_at(walk: Walk, zone: int, k: int, i: int) -> tuple[float, float]:
+    """The same of a `zone` of a `walk` with its rim `k` at a grid angle, number `i` of the wrapped branches."""
+    branches = walk.branches
+    m, n_cs = branches.shape[3] - WRAPPED, len(walk.circular.table) - WRAPPED
+    theta, s, away = (i - BEFORE) * (2 * math.pi / m), 1.0 - 2.0 * zone, math.pi * zone
+    on_table = four(on_turn((theta + s * branches[ON_CS, zone, k, i] + away) * PER_RAD, n_cs))
+    value = walk.tan_alpha * branches[DEPTH, zone, k, i] + by_four(walk.circular.table, on_table)
+    return value, walk.advance * theta + s * branches[ON_FS, zone, k, i] + away
 
 
 @inlined
-def floor_of(comb: Comb, one: float, two: float, turned: float) -> float:
-    """What the driving deviation cannot fall below where the zones' other terms are `one` and `two`, mm of arc,
-    beside the teeth of `comb`; `turned` is how far from half a turn the two angles on the FS lie apart, rad."""
-    last = len(comb.floor) - 1
-    per_step, half_step = last / comb.reach, comb.reach / last / 2
-    place = abs(one - two) * per_step
-    k = whole_of(place if place < last - 1 else last - 1)
-    x = (place - k) * half_step
-    # Between two tabulated differences it cannot fall faster than half the difference; beyond the last, it rises so.
-    low, high = comb.floor[unsigned(k)] - x, comb.floor[unsigned(k) + unsigned(1)] - half_step + x
-    low = (one + two) / 2 + (low if low > high else high) - comb.slope * turned
-    high = (one if one > two else two) + comb.least
-    return low if low > high else high
+def deeper_rim(branches: Array, zone: int, i: int) -> int:
+    """The deeper rim of a `zone`, 0 or 1, at grid angle number `i` of the wrapped `branches`."""
+    return 0 if branches[DEPTH, zone, 0, i] >= branches[DEPTH, zone, 1, i] - TIE_MM else 1
 
 
 @inlined
@@ -233,16 +200,24 @@ def _root(grid: Array, zone: int, low: float, high: float) -> float:
 
 
 @compiled
+def fill_gaps(branches: Array, grid: Array) -> None:
+    """Fill the gaps between the rims of either zone of the `grid` from wrapped `branches`."""
+    for zone in range(2):
+        for i in range(branches.shape[3]):
+            grid[GAP + zone, i] = branches[DEPTH, zone, 0, i] - branches[DEPTH, zone, 1, i]
+
+
+@compiled
 def _mark_changes(grid: Array, zone: int) -> float:
-    """Mark in the ceilings of the `grid` with -1 where the gaps of a zone's rims change sign before the next angle, or
+    """Mark in the `grid` with -1 where the gaps of a zone's rims change sign before the next angle, or
     come near to it without; the largest of these gaps, mm."""
     n = grid.shape[1] - 2
     for i in range(1, n + 1):
         before, here, after = grid[GAP + zone, i - 1], grid[GAP + zone, i], grid[GAP + zone, i + 1]
         nearest = abs(here) <= abs(before) and abs(here) <= abs(after)
-        grid[CEILING, i] = -1.0 if nearest or (here >= 0.0) != (after >= 0.0) else 0.0
-        grid[FLOOR, i - 1] = -abs(here)
-    return -least_of(grid[FLOOR], n)
+        grid[MARK, i] = -1.0 if nearest or (here >= 0.0) != (after >= 0.0) else 0.0
+        grid[SIZE, i - 1] = -abs(here)
+    return -least_of(grid[SIZE], n)
 
 
 @compiled
@@ -251,7 +226,7 @@ def _rim_changes(grid: Array, zone: int, found: Array, count: int) -> int:
     marked; pairs within a cell too. How many are in it."""
     row = GAP + zone
     for j in range(grid.shape[1] - WRAPPED):
-        if grid[CEILING, j + BEFORE] == 0.0:
+        if grid[MARK, j + BEFORE] == 0.0:
             continue
         before, here, after = grid[row, j], grid[row, j + BEFORE], grid[row, j + BEFORE + 1]
         if (here >= 0.0) != (after >= 0.0):
@@ -269,8 +244,8 @@ def _rim_changes(grid: Array, zone: int, found: Array, count: int) -> int:
 
 @compiled
 def fill_changes(grid: Array, found: Array) -> int:
-    """Fill `found` with the places of one turn, in order, where a zone's deepest rim changes in the `grid`, whose
-    bounds are not known yet; where none does, with 0; how many they are. The first follows again a turn later."""
+    """Fill `found` with the places of one turn, in order, where a zone's deepest rim changes in the `grid`; where none
+    does, with 0; how many they are. The first follows again a turn later."""
     m, count = grid.shape[1] - WRAPPED, 0
     for zone in range(2):
         if _mark_changes(grid, zone) > TIE_MM:
@@ -289,10 +264,10 @@ def fill_changes(grid: Array, found: Array) -> int:
 
 
 @compiled
-def rims_between(grid: Array, low: float, high: float) -> tuple[bool, float, float]:
+def rims_between(grid: Array, low: float, high: float) -> tuple[bool, int, int]:
     """Whether two neighbouring changes of rims in the `grid`, at `low` and `high`, leave a stretch between, and the
     deepest rims of both zones on it, 0 or 1; it is none where they only tie."""
     middle, long = (low + high) / 2, high - low > SHORT
     one, two = _gap_at(grid, 0, middle), _gap_at(grid, 1, middle)
     real = high > low and (long or abs(one) > TIE_MM) and (long or abs(two) > TIE_MM)
-    return real, 0.0 if one >= -TIE_MM else 1.0, 0.0 if two >= -TIE_MM else 1.0
+    return real, 0 if one >= -TIE_MM else 1, 0 if two >= -TIE_MM else 1

@@ -12,31 +12,32 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from hdopt.arrays import Array
+from hdopt.arrays import Singles
+from hdopt.kinematics.beat_bounds import CEILING, CLEAR, CREST, DIP, FLOOR, fill_cells, fill_nodes, least_single
 from hdopt.kinematics.beat_grid import (
-    ANGLE,
-    CEILING,
-    FLOOR,
-    RIM,
-    VALUE,
     Walk,
     Work,
-    fill_bounds,
+    deeper_rim,
     fill_changes,
-    fill_grid,
-    floor_of,
+    fill_gaps,
+    node_at,
     rims_between,
     zone_at,
 )
-from hdopt.kinematics.beat_tables import BEFORE, WRAPPED, compiled, inlined, lanes_of, least_of, one_lane
+from hdopt.kinematics.beat_tables import BEFORE, WRAPPED, Comb, compiled, inlined, lanes_of, one_lane, widened
+from hdopt.kinematics.lanes.single import HUGE, ZERO, narrowed, single
 
+EPSILON = single(2.0**-23)
+FAR = single(1e6)
+"""mm: further than any deviation."""
 NARROWER = 0.125
 """Width of the second pair of parabolas as a share of the first."""
 
 
 class Cell(NamedTuple):
     """What lies between two places, `low` and `high`, on rim `one` of the first zone and `two` of the second; at both
-    places each zone's deviation without the FS teeth, mm, and angle on the FS, rad."""
+    places each zone's deviation without the FS teeth, mm, and angle on the FS, rad; and how far either zone may lie off
+    its chord, mm."""
 
     low: float
     high: float
@@ -50,6 +51,7 @@ class Cell(NamedTuple):
     on_two_low: float
     on_one_high: float
     on_two_high: float
+    margin: float
 
 
 class Three(NamedTuple):
@@ -178,7 +180,42 @@ def _least_of_lines(one_a: float, two_a: float, one_b: float, two_b: float) -> f
 
 
 @compiled
-def _least_in(walk: Walk, lanes: Array, cell: Cell, best: float) -> float:
+def _first_of(values: Singles, value: float) -> int:
+    """The place of the first of `values` that is `value`."""
+    place = len(values)
+    for p in range(len(values)):
+        at = p if values[p] == value else len(values)
+        place = at if at < place else place
+    return place
+
+
+@inlined
+def _below(values: Singles, limit: float) -> int:
+    """How many of `values` may be below a `limit`, which is rounded upward."""
+    count, at = 0, narrowed(limit) + narrowed(abs(limit)) * EPSILON
+    for p in range(len(values)):
+        count += 1 if values[p] < at else 0
+    return count
+
+
+@inlined
+def _differ(comb: Comb) -> bool:
+    """Whether phases differ at all: where the FS has no deviation, one says it for all."""
+    return comb.largest > comb.least
+
+
+@inlined
+def _follow_lane(walk: Walk, lanes: Singles, cell: Cell, p: int, best: float) -> float:
+    """The lesser of `best` and the least driving deviation in a cell at phase `p`, of which `lanes` hold the ends."""
+    one_a, two_a = widened(lanes[0, 0, p]), widened(lanes[0, 1, p])
+    one_b, two_b = widened(lanes[1, 0, p]), widened(lanes[1, 1, p])
+    if _least_of_lines(one_a, two_a, one_b, two_b) - cell.margin < best:
+        best = _follow_least(walk, cell, p, Three(one_a, 0.0, one_b), Three(two_a, 0.0, two_b), best)
+    return best
+
+
+@compiled
+def _least_in(walk: Walk, lanes: Singles, cell: Cell, best: float) -> float:
     """The lesser of `best` and the least driving deviation in a cell; `lanes` (3, 2, P) are room."""
     one_a, two_a, one_b, two_b = lanes[0, 0], lanes[0, 1], lanes[1, 0], lanes[1, 1]
     lanes_of(walk.comb, cell.one_low, cell.on_one_low, one_a)
@@ -188,139 +225,125 @@ def _least_in(walk: Walk, lanes: Array, cell: Cell, best: float) -> float:
     phases = len(one_a)
     values, floors = lanes[2, 0], lanes[2, 1]
     for p in range(phases):
-        a, b = one_a[p] if one_a[p] > two_a[p] else two_a[p], one_b[p] if one_b[p] > two_b[p] else two_b[p]
         one, two = one_a[p] if one_a[p] < one_b[p] else one_b[p], two_a[p] if two_a[p] < two_b[p] else two_b[p]
-        values[p], floors[p] = a if a < b else b, one if one > two else two
-    best = min(best, least_of(values, phases))
-    for p in range(phases):
-        values[p] = floors[p]
-    lowest = least_of(values, phases)
+        floor = one if one > two else two
+        values[p], floors[p] = floor, floor
+    lowest = least_single(values, phases)
+    if lowest - cell.margin >= best:
+        return best
     # The most promising phase first: what it finds rules others out.
-    for promising in (True, False):
-        if lowest - walk.margin >= best:
-            return best
+    promising = _first_of(floors, lowest)
+    best = _follow_lane(walk, lanes, cell, promising, best)
+    floors[promising] = HUGE
+    if _differ(walk.comb) and _below(floors, best + cell.margin) > 0:
         for p in range(phases):
-            if (floors[p] == lowest) == promising and floors[p] - walk.margin < best:
-                if _least_of_lines(one_a[p], two_a[p], one_b[p], two_b[p]) - walk.margin < best:
-                    one, two = Three(one_a[p], 0.0, one_b[p]), Three(two_a[p], 0.0, two_b[p])
-                    best = _follow_least(walk, cell, p, one, two, best)
+            if floors[p] - cell.margin < best:
+                best = _follow_lane(walk, lanes, cell, p, best)
     return best
 
 
+@inlined
+def _ends(low: Singles, high: Singles, p: int) -> Three:
+    """The values of phase `p` at the ends of a cell."""
+    return Three(widened(low[p]), 0.0, widened(high[p]))
+
+
 @compiled
-def _largest_in(walk: Walk, lanes: Array, cell: Cell, best: float) -> float:
+def _largest_in(walk: Walk, lanes: Singles, cell: Cell, best: float) -> float:
     """The larger of `best` and the largest deviation of either zone in a cell; `lanes` (3, 2, P) are room."""
-    low, high, values, phases = lanes[0, 0], lanes[0, 1], lanes[1, 0], lanes.shape[2]
-    for zone in range(2):
+    low, high, values, floors = lanes[0, 0], lanes[0, 1], lanes[1, 0], lanes[1, 1]
+    phases = len(low)
+    second = max(cell.two_low, cell.two_high) > max(cell.one_low, cell.one_high)
+    for turn in range(2):
+        zone = 1 - turn if second else turn
         a, b = (cell.one_low, cell.one_high) if zone == 0 else (cell.two_low, cell.two_high)
-        if max(a, b) + walk.margin + walk.comb.largest <= best:
+        if max(a, b) + cell.margin + walk.comb.largest <= best:
             continue
         lanes_of(walk.comb, a, cell.on_one_low if zone == 0 else cell.on_two_low, low)
         lanes_of(walk.comb, b, cell.on_one_high if zone == 0 else cell.on_two_high, high)
         for p in range(phases):
-            values[p] = -(low[p] if low[p] > high[p] else high[p])
-        largest = -least_of(values, phases)
-        best = max(best, largest)
-        for promising in (True, False):
-            if largest + walk.margin <= best:
-                break
+            floor = -(low[p] if low[p] > high[p] else high[p])
+            values[p], floors[p] = floor, floor
+        lowest = least_single(values, phases)
+        if cell.margin - lowest <= best:
+            continue
+        promising = _first_of(floors, lowest)
+        best = _follow_largest(walk, cell, promising, zone, _ends(low, high, promising), best)
+        floors[promising] = HUGE
+        if _differ(walk.comb) and _below(floors, cell.margin - best) > 0:
             for p in range(phases):
-                value = low[p] if low[p] > high[p] else high[p]
-                if (value == largest) == promising and value + walk.margin > best:
-                    best = _follow_largest(walk, cell, p, zone, Three(low[p], 0.0, high[p]), best)
+                if cell.margin - floors[p] > best:
+                    best = _follow_largest(walk, cell, p, zone, _ends(low, high, p), best)
     return best
 
 
 @inlined
-def _whole(grid: Array, j: int) -> Cell:
-    """The whole cell after angle `j` of the `grid`."""
-    i, k = j + BEFORE, j + BEFORE + 1
-    return Cell(
-        float(j),
-        j + 1.0,
-        int(grid[RIM, i]),
-        int(grid[RIM + 1, i]),
-        grid[VALUE, i],
-        grid[VALUE + 1, i],
-        grid[VALUE, k],
-        grid[VALUE + 1, k],
-        grid[ANGLE, i],
-        grid[ANGLE + 1, i],
-        grid[ANGLE, k],
-        grid[ANGLE + 1, k],
-    )
+def _whole(walk: Walk, i: int) -> Cell:
+    """The whole cell after angle number `i` of the wrapped branches, in which no rim changes."""
+    one, two = deeper_rim(walk.branches, 0, i), deeper_rim(walk.branches, 1, i)
+    one_low, on_one_low = node_at(walk, 0, one, i)
+    two_low, on_two_low = node_at(walk, 1, two, i)
+    one_high, on_one_high = node_at(walk, 0, one, i + 1)
+    two_high, on_two_high = node_at(walk, 1, two, i + 1)
+    values, angles = (one_low, two_low, one_high, two_high), (on_one_low, on_two_low, on_one_high, on_two_high)
+    rows, slack = walk.circular.rows, walk.slack
+    dip, crest = max(rows[DIP, 0, i], rows[DIP, 1, i]), max(rows[CREST, 0, i], rows[CREST, 1, i])
+    margin = slack.bulge + slack.fs_bulge + slack.rounding + max(dip, crest)
+    return Cell(i - float(BEFORE), i + 1.0 - BEFORE, one, two, *values, *angles, margin)
 
 
-@compiled
-def _cut(walk: Walk, cuts: Array, i: int) -> Cell:
-    """A cell that a change of a rim cuts, number `i` of the `cuts`."""
-    low, high, one, two = cuts[i, 0], cuts[i, 1], int(cuts[i, 2]), int(cuts[i, 3])
+@inlined
+def _cut(walk: Walk, low: float, high: float, one: int, two: int) -> Cell:
+    """A cell from `low` to `high` on the rims `one` and `two`, which a change of a rim may cut."""
     one_low, on_one_low = zone_at(walk, 0, one, low)
     two_low, on_two_low = zone_at(walk, 1, two, low)
     one_high, on_one_high = zone_at(walk, 0, one, high)
     two_high, on_two_high = zone_at(walk, 1, two, high)
-    return Cell(
-        low,
-        high,
-        one,
-        two,
-        one_low,
-        two_low,
-        one_high,
-        two_high,
-        on_one_low,
-        on_two_low,
-        on_one_high,
-        on_two_high,
-    )
-
-
-@inlined
-def _floor_in(walk: Walk, cell: Cell) -> float:
-    """What the driving deviation cannot fall below in a cell."""
-    turned = max(abs(cell.on_two_low - cell.on_one_low - math.pi), abs(cell.on_two_high - cell.on_one_high - math.pi))
-    one, two = min(cell.one_low, cell.one_high), min(cell.two_low, cell.two_high)
-    return floor_of(walk.comb, one, two, turned) - walk.margin
-
-
-@inlined
-def _ceiling_in(walk: Walk, cell: Cell) -> float:
-    """What neither zone rises above in a cell."""
-    ends = max(max(cell.one_low, cell.one_high), max(cell.two_low, cell.two_high))
-    return ends + walk.margin + walk.comb.largest
+    values, angles = (one_low, two_low, one_high, two_high), (on_one_low, on_two_low, on_one_high, on_two_high)
+    return Cell(low, high, one, two, *values, *angles, walk.margin)
 
 
 @compiled
-def _cut_cells(work: Work, count: int) -> int:
-    """Fill `cuts` of `work` with the cells that its `count` changes of rims cut, and take these out of the whole ones;
-    their number."""
-    grid, changes, cuts = work.grid, work.changes, work.cuts
-    m, found = grid.shape[1] - WRAPPED, 0
-    for i in range(count):
-        low, high = changes[i], changes[i + 1]
-        real, one, two = rims_between(grid, low, high)
+def _where_rims_change(
+    walk: Walk, work: Work, least: float, largest: float, lowest: int, highest: int
+) -> tuple[float, float]:
+    """The lesser of `least` and the greater of `largest` and what lies in the cells in which rims may change, or in
+    cells `lowest` and `highest` of them where these are not 0."""
+    cells, m = work.cells, work.cells.shape[1] - WRAPPED
+    fill_gaps(walk.branches, work.grid)
+    for stretch in range(fill_changes(work.grid, work.changes)):
+        low, high = work.changes[stretch], work.changes[stretch + 1]
+        real, one, two = rims_between(work.grid, low, high)
+        if not real:
+            continue
         for j in range(math.floor(low), math.ceil(high)):
-            on = (j if j < m else j - m) + BEFORE
-            whole = low <= j and j + 1 <= high and grid[RIM, on] == one and grid[RIM + 1, on] == two
-            if not (whole and grid[RIM, on + 1] == one and grid[RIM + 1, on + 1] == two):
-                grid[FLOOR, on], grid[CEILING, on] = math.inf, -math.inf
-                if real:
-                    cuts[found, 0], cuts[found, 1] = max(low, float(j)), min(high, j + 1.0)
-                    cuts[found, 2], cuts[found, 3] = one, two
-                    found += 1
-    return found
+            i = (j if j < m else j - m) + BEFORE
+            below, above = cells[FLOOR, i] < least, cells[CEILING, i] > largest
+            if cells[CLEAR, i] > ZERO or not (below or above) or (lowest > 0 and i != lowest and i != highest):
+                continue
+            cell = _cut(walk, max(low, float(j)), min(high, j + 1.0), one, two)
+            if below:
+                least = _least_in(walk, work.lanes, cell, least)
+            if above:
+                largest = _largest_in(walk, work.lanes, cell, largest)
+    return least, largest
 
 
 @compiled
-def _promising(grid: Array) -> tuple[int, int]:
-    """The whole cells with the least floor and the largest ceiling."""
-    m, lowest, highest = grid.shape[1] - WRAPPED, 0, 0
-    floor, ceiling = math.inf, -math.inf
-    for j in range(m):
-        if grid[FLOOR, j + BEFORE] < floor:
-            lowest, floor = j, grid[FLOOR, j + BEFORE]
-        if grid[CEILING, j + BEFORE] > ceiling:
-            highest, ceiling = j, grid[CEILING, j + BEFORE]
+def _promising(cells: Singles) -> tuple[int, int]:
+    """The numbers of the `cells` with the least floor and the largest ceiling of those in which no rim changes, or else
+    of all."""
+    end = cells.shape[1] - WRAPPED + BEFORE
+    lowest = highest = BEFORE
+    floor, ceiling = HUGE, -HUGE
+    for i in range(BEFORE, end):
+        barred = ZERO if cells[CLEAR, i] > ZERO else FAR
+        here = cells[FLOOR, i] + barred
+        if here < floor:
+            lowest, floor = i, here
+        here = cells[CEILING, i] - barred
+        if here > ceiling:
+            highest, ceiling = i, here
     return lowest, highest
 
 
@@ -330,24 +353,27 @@ def extremes_in_lanes(walk: Walk, work: Work) -> tuple[float, float]:
 
     Jia 2021, Eqs. (31), (32). `work` of `new_work` is room for it.
     """
-    grid, lanes = work.grid, work.lanes
-    fill_grid(walk, grid)
-    changes = fill_changes(grid, work.changes)
-    fill_bounds(walk, grid)
-    cut = _cut_cells(work, changes)
-    lowest, highest = _promising(grid)
-    cell = _whole(grid, lowest)
-    least, largest = _least_in(walk, lanes, cell, math.inf), -math.inf
-    largest = _largest_in(walk, lanes, _whole(grid, highest), largest)
-    for i in range(cut):
-        cell = _cut(walk, work.cuts, i)
-        if _floor_in(walk, cell) < least:
-            least = _least_in(walk, lanes, cell, least)
-        if _ceiling_in(walk, cell) > largest:
-            largest = _largest_in(walk, lanes, cell, largest)
-    for j in range(grid.shape[1] - WRAPPED):
-        if grid[FLOOR, j + BEFORE] < least and j != lowest:
-            least = _least_in(walk, lanes, _whole(grid, j), least)
-        if grid[CEILING, j + BEFORE] > largest and j != highest:
-            largest = _largest_in(walk, lanes, _whole(grid, j), largest)
+    cells, lanes = work.cells, work.lanes
+    fill_nodes(walk.branches, walk.tan_alpha, walk.circular, work.nodes)
+    fill_cells(walk.circular, walk.comb, walk.slack, work.nodes, cells, work.places)
+    lowest, highest = _promising(cells)
+    least, largest = math.inf, -math.inf
+    if cells[CLEAR, lowest] > ZERO:
+        least = _least_in(walk, lanes, _whole(walk, lowest), least)
+        largest = _largest_in(walk, lanes, _whole(walk, highest), largest)
+    else:
+        least, largest = _where_rims_change(walk, work, least, largest, lowest, highest)
+    may_change = False
+    for i in range(BEFORE, cells.shape[1] - WRAPPED + BEFORE):
+        below, above = cells[FLOOR, i] < least, cells[CEILING, i] > largest
+        if below or above:
+            if cells[CLEAR, i] > ZERO:
+                if below and i != lowest:
+                    least = _least_in(walk, lanes, _whole(walk, i), least)
+                if above and i != highest:
+                    largest = _largest_in(walk, lanes, _whole(walk, i), largest)
+            else:
+                may_change = True
+    if may_change:
+        least, largest = _where_rims_change(walk, work, least, largest, 0, 0)
     return least, largest

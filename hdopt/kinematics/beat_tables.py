@@ -14,8 +14,8 @@ from typing import NamedTuple, cast
 import numpy as np
 from numba import njit
 
-from hdopt.arrays import Array
-from hdopt.kinematics.lanes.single import unsigned
+from hdopt.arrays import Array, Singles
+from hdopt.kinematics.lanes.single import narrowed, unsigned
 
 # Least and largest do not depend on the order in which lanes are taken; sums keep theirs.
 compiled = njit(error_model="numpy", fastmath={"contract", "nsz", "nnan", "arcp"})
@@ -27,24 +27,29 @@ inlined = njit(error_model="numpy", fastmath={"contract", "nsz", "nnan", "arcp"}
 whole_of = cast("Callable[[float], int]", np.int32)
 """A number without its fraction, which the processor takes off lane by lane."""
 
+widened = cast("Callable[[float], float]", np.float64)
+"""A number in double precision, inside kernels."""
+
 PER_RAD = 1 / (2 * math.pi)
 """Turns in a radian."""
 BEFORE, WRAPPED = 1, 4
 """Places that a wrapped row repeats before its first, and in all: those that a cubic reads across its ends."""
 TINY = 1e-12
 """mm: what keeps the differences of a table of zeros apart."""
-FLOORS = 128
+FLOORS = 512
 """Differences of both zones, of either sign, for which the floor of the driving deviation is tabulated."""
 
 
 class Comb(NamedTuple):
-    """The FS table as `rows` (n/P + 4, 2 P): place i of the table stands in row i mod n/P + 1, column i // (n/P), the
-    columns twice and the rows wrapped around. Its least and largest value, its steepest slope (1/rad) and its largest
-    second and third difference over a grid angle; mm of arc. `floor` (K,) is the least over all places x of
-    max(F(x) + D/2, F(x + pi) - D/2), for differences D of both zones from 0 to `reach` mm, which are those for -D too:
-    below it the driving deviation cannot fall."""
+    """The FS `table` over one turn, wrapped around (n + 4,), and in single precision as `rows` (n/P + 4, 2 P): place i
+    of the table stands in row i mod n/P + 1, column i // (n/P), the columns twice and the rows wrapped around. Its
+    least and largest value, its steepest slope (1/rad), its largest second difference over a grid angle and third over
+    half a one, and how far cubics through its places are off lines between them; mm of arc. `floor` (K,) is the least
+    over all x, with lines between places, of max(F(x) + D/2, F(x + pi) - D/2), for differences D of both zones from 0
+    to `reach` mm, which are those for -D too: below it, less the `ripple`, the driving deviation cannot fall."""
 
-    rows: Array
+    table: Array
+    rows: Singles
     floor: Array
     reach: float
     least: float
@@ -52,6 +57,22 @@ class Comb(NamedTuple):
     slope: float
     bend: float
     bow: float
+    ripple: float
+
+
+class Teeth(NamedTuple):
+    """Room for a `Comb`: the wrapped `table`, its `rows`, and the `floor`."""
+
+    table: Array
+    rows: Singles
+    floor: Array
+
+
+@compiled
+def new_teeth(places: int, phases: int) -> Teeth:
+    """Room for the FS table of so many `places` that is met in so many `phases`."""
+    rows = np.empty((places // phases + WRAPPED, 2 * phases), np.float32)
+    return Teeth(np.empty(places + WRAPPED), rows, np.empty(FLOORS))
 
 
 class Four(NamedTuple):
@@ -137,24 +158,28 @@ def second_difference(table: Array, stride: int) -> float:
 
 @compiled
 def differences(table: Array, stride: int) -> tuple[float, float]:
-    """Largest second and third difference of a periodic `table` (n,) over so many of its places (`stride`), in its
-    unit."""
-    n = len(table)
-    longer, seconds, thirds = np.empty(n + 3 * stride), np.empty(n), np.empty(n)
+    """Largest second difference of a periodic `table` (n,) over so many of its places (`stride`), and its largest third
+    one over half as many, in its unit."""
+    n, half = len(table), (stride + 1) // 2
+    reach = max(2 * stride, 3 * half)
+    longer, seconds, thirds = np.empty(n + reach), np.empty(n), np.empty(n)
     for i in range(n):
         longer[i] = table[i]
-    for i in range(3 * stride):
+    for i in range(reach):
         longer[n + i] = longer[i]
-    b, c, d = longer[stride:], longer[2 * stride :], longer[3 * stride :]
+    b, c = longer[stride:], longer[2 * stride :]
     for i in range(n):
-        near, far = longer[i] - 2 * b[i] + c[i], b[i] - 2 * c[i] + d[i]
-        seconds[i], thirds[i] = -abs(near), -abs(far - near)
+        seconds[i] = -abs(longer[i] - 2 * b[i] + c[i])
+    b, c, d = longer[half:], longer[2 * half :], longer[3 * half :]
+    for i in range(n):
+        thirds[i] = -abs(longer[i] - d[i] + 3 * (c[i] - b[i]))
     return -least_of(seconds, n), -least_of(thirds, n)
 
 
 @compiled
-def _range_of(table: Array) -> tuple[float, float, float]:
-    """Least and largest value of a periodic `table` (n,), and its largest step from one place to the next."""
+def _range_of(table: Array) -> tuple[float, float, float, float]:
+    """Least and largest value of a periodic `table` (n,), its largest step from one place to the next, and how far
+    cubics through its places are off lines between them at most."""
     n = len(table)
     values, opposite, steps = np.empty(n), np.empty(n), np.empty(n)
     after = table[1:]
@@ -163,20 +188,31 @@ def _range_of(table: Array) -> tuple[float, float, float]:
     for i in range(n - 1):
         steps[i] = -abs(after[i] - table[i])
     steps[n - 1] = -abs(table[0] - table[n - 1])
-    return least_of(values, n), -least_of(opposite, n), -least_of(steps, n)
+    least, largest, step = least_of(values, n), -least_of(opposite, n), -least_of(steps, n)
+    # A cubic is off by x (1 - x) / 2 times a mean of two second differences.
+    after, last = table[2:], table[1:]
+    for i in range(n - 2):
+        steps[i] = -abs(table[i] - 2 * last[i] + after[i])
+    steps[n - 2] = -abs(table[n - 2] - 2 * table[n - 1] + table[0])
+    steps[n - 1] = -abs(table[n - 1] - 2 * table[0] + table[1])
+    return least, largest, step, -least_of(steps, n) / 8
 
 
 @compiled
 def _fill_floor(table: Array, reach: float, floor: Array) -> None:
     """Fill `floor` (K,) of `Comb` from a `table` of an even number of places: every one makes a V over D with its
-    lowest point where both zones are equal."""
-    half, last = len(table) // 2, len(floor) - 1
+    lowest point where both zones are equal. Up to half way to its neighbours either zone falls by half a step at
+    most."""
+    half, last, n = len(table) // 2, len(floor) - 1, len(table)
     step = reach / last
     for k in range(last + 1):
         floor[k] = math.inf
     for i in range(half):
         one, two = table[i], table[i + half]
-        apart, mean = abs(two - one), (one + two) / 2
+        before, after = one - table[i - 1 if i > 0 else n - 1], table[i + 1] - one
+        before_two, after_two = two - table[i + half - 1], table[i + half + 1 if i + 1 < half else 0] - two
+        falls = max(max(abs(before), abs(after)), max(abs(before_two), abs(after_two))) / 2
+        apart, mean = abs(two - one), (one + two) / 2 - falls
         k = unsigned(whole_of(apart / step))
         x = apart - k * step
         at_low, at_high = mean + x / 2, mean + (step - x) / 2
@@ -190,12 +226,14 @@ def _fill_floor(table: Array, reach: float, floor: Array) -> None:
 
 
 @compiled
-def fill_comb(table: Array, phases: int, stride: int, rows: Array, floor: Array) -> Comb:
-    """`Comb` of a periodic `table` (n,), n even and a multiple of `phases`, into `rows` (n/phases + 4, 2 phases) and
-    `floor` (K,); `stride` is a grid angle in places of the table."""
+def fill_comb(table: Array, phases: int, stride: int, work: Teeth) -> Comb:
+    """`Comb` of a periodic `table` (n,), n even and a multiple of `phases`, into the room of `work`; `stride` is a grid
+    angle in places of the table."""
+    wrapped, rows, floor = work
+    wrap(table, wrapped)
     n = len(table)
     apart = n // phases
-    least, largest, step = _range_of(table)
+    least, largest, step, ripple = _range_of(table)
     for row in range(apart):
         for column in range(phases):
             value = table[column * apart + row]
@@ -207,7 +245,7 @@ def fill_comb(table: Array, phases: int, stride: int, rows: Array, floor: Array)
     reach = 1.01 * (largest - least) + TINY
     _fill_floor(table, reach, floor)
     bend, bow = differences(table, stride)
-    return Comb(rows, floor, reach, least, largest, step * n * PER_RAD, bend, bow)
+    return Comb(wrapped, rows, floor, reach, least, largest, step * n * PER_RAD, bend, bow, ripple)
 
 
 @inlined
@@ -221,22 +259,24 @@ def _on_comb(comb: Comb, angle: float) -> tuple[int, Four]:
 
 
 @inlined
-def lanes_of(comb: Comb, value: float, angle: float, out: Array) -> None:
+def lanes_of(comb: Comb, value: float, angle: float, out: Singles) -> None:
     """Fill `out` (P,) with a zone's deviation at every FS phase, mm of arc: the FS term of `comb` at an `angle` (rad)
     beside the `value` of all else."""
     phases = comb.rows.shape[1] // 2
     column, at = _on_comb(comb, angle)
-    end = column + unsigned(phases)
+    end, beside = column + unsigned(phases), narrowed(value)
     row_a, row_b = comb.rows[at.first, column:end], comb.rows[at.first + unsigned(1), column:end]
     row_c, row_d = comb.rows[at.first + unsigned(2), column:end], comb.rows[at.first + unsigned(3), column:end]
+    w_a, w_b, w_c, w_d = narrowed(at.w_a), narrowed(at.w_b), narrowed(at.w_c), narrowed(at.w_d)
     for p in range(phases):
-        out[p] = value + (at.w_a * row_a[p] + at.w_b * row_b[p] + at.w_c * row_c[p] + at.w_d * row_d[p])
+        out[p] = beside + (w_a * row_a[p] + w_b * row_b[p] + w_c * row_c[p] + w_d * row_d[p])
 
 
 @inlined
 def one_lane(comb: Comb, angle: float, phase: int) -> float:
     """The FS term of `comb` at one `phase` of an `angle` (rad), mm of arc."""
+    phases, apart = comb.rows.shape[1] // 2, comb.rows.shape[0] - WRAPPED
     column, at = _on_comb(comb, angle)
-    i, on = at.first, column + unsigned(phase)
-    low = at.w_a * comb.rows[i, on] + at.w_b * comb.rows[i + unsigned(1), on]
-    return float(low + at.w_c * comb.rows[i + unsigned(2), on] + at.w_d * comb.rows[i + unsigned(3), on])
+    on = column + unsigned(phase)
+    on = on if on < unsigned(phases) else on - unsigned(phases)
+    return by_four(comb.table, Four(on * unsigned(apart) + at.first, at.w_a, at.w_b, at.w_c, at.w_d))

@@ -15,9 +15,10 @@ from numba import njit
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
-from hdopt.kinematics.beat_grid import DEPTH, ON_CS, ON_FS, Walk, grid_angles, margins, new_work
+from hdopt.kinematics.beat_bounds import CIRCULAR, DEPTH, ON_CS, ON_FS, fill_circular
+from hdopt.kinematics.beat_grid import grid_angles, new_work, walk_of
 from hdopt.kinematics.beat_lanes import extremes_in_lanes
-from hdopt.kinematics.beat_tables import FLOORS, WRAPPED, circle, differences, fill_comb, with_sine, wrap
+from hdopt.kinematics.beat_tables import WRAPPED, circle, differences, fill_comb, new_teeth, with_sine, wrap
 from hdopt.kinematics.exact import GRID_POINTS, LONGEST_STEP, NEWTON_STEPS, ZONE_HALF_WIDTH
 from hdopt.kinematics.load_sharing import PLACES_PER_TOOTH
 
@@ -247,15 +248,16 @@ def contour_extremes_block(constants: ContourConstants, cs: Array, fs: Array, ro
     stride_cs, stride_fs = (n_cs + m - 1) // m, (n_fs + m - 1) // m
     branches = np.empty((3, 2, 2, m + WRAPPED))
     work = new_work(m, phases)
-    comb_rows, floor = np.empty((n_fs // phases + WRAPPED, 2 * phases)), np.empty(FLOORS)
+    teeth = new_teeth(n_fs, phases)
     on_cs, on_fs, wrapped = np.empty(n_cs), np.empty(n_fs), np.empty(n_cs + WRAPPED)
+    rows_cs = np.empty((CIRCULAR, 2, m + WRAPPED), np.float32)
     for i in range(len(rows)):
         row, share = rows[i], constants.sine_share
         with_sine(cs[i if len(cs) > 1 else 0], share * row[8], row[9], constants.cs_circle, on_cs)
         with_sine(fs[i if len(fs) > 1 else 0], share * row[10], row[11], constants.fs_circle, on_fs)
         wrap(on_cs, wrapped)
-        comb = fill_comb(on_fs, phases, stride_fs, comb_rows, floor)
+        comb = fill_comb(on_fs, phases, stride_fs, teeth)
         _sample(constants, row, branches)
-        margin, beside = margins(branches, constants.tan_alpha, differences(on_cs, stride_cs), comb, work)
-        walk = Walk(branches, wrapped, constants.tan_alpha, constants.advance, comb, margin, beside)
+        circular = fill_circular(wrapped, differences(on_cs, stride_cs), rows_cs)
+        walk = walk_of(branches, circular, constants.tan_alpha, constants.advance, comb, work)
         out[i, 0], out[i, 1] = extremes_in_lanes(walk, work)

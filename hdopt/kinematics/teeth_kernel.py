@@ -14,9 +14,10 @@ from numba import njit
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
-from hdopt.kinematics.beat_grid import DEPTH, ON_CS, ON_FS, Walk, grid_angles, margins, new_work
+from hdopt.kinematics.beat_bounds import CIRCULAR, DEPTH, ON_CS, ON_FS, fill_circular
+from hdopt.kinematics.beat_grid import grid_angles, new_work, walk_of
 from hdopt.kinematics.beat_lanes import extremes_in_lanes
-from hdopt.kinematics.beat_tables import FLOORS, WRAPPED, circle, differences, fill_comb, with_sine, wrap
+from hdopt.kinematics.beat_tables import WRAPPED, circle, differences, fill_comb, new_teeth, with_sine, wrap
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
 from hdopt.kinematics.compiled_closed_form import motion_at, motion_of_row, rim_constants, rim_depth
 from hdopt.kinematics.load_sharing import PLACES_PER_TOOTH
@@ -99,23 +100,23 @@ def beat_extremes_block(constants: BeatConstants, cs: Array, fs: Array, rows: Ar
     stride_cs, stride_fs = (n_cs + m - 1) // m, (n_fs + m - 1) // m
     branches = np.empty((3, 2, 2, m + WRAPPED))
     work = new_work(m, phases)
-    comb_rows, floor = np.empty((n_fs // phases + WRAPPED, 2 * phases)), np.empty(FLOORS)
+    teeth = new_teeth(n_fs, phases)
     on_cs, on_fs, wrapped = np.empty(n_cs), np.empty(n_fs), np.empty(n_cs + WRAPPED)
     wrap(cs[0], wrapped)
-    cs_bends = differences(cs[0], stride_cs)
-    comb = fill_comb(fs[0], phases, stride_fs, comb_rows, floor)
+    rows_cs = np.empty((CIRCULAR, 2, m + WRAPPED), np.float32)
+    circular = fill_circular(wrapped, differences(cs[0], stride_cs), rows_cs)
+    comb = fill_comb(fs[0], phases, stride_fs, teeth)
     for i in range(len(rows)):
         row = rows[i]
         if len(cs) > 1 or row[8] > 0.0:
             own = cs[i if len(cs) > 1 else 0]
             with_sine(own, constants.sine_share * row[8], row[9], constants.cs_circle, on_cs)
             wrap(on_cs, wrapped)
-            cs_bends = differences(on_cs, stride_cs)
+            circular = fill_circular(wrapped, differences(on_cs, stride_cs), rows_cs)
         if len(fs) > 1 or row[10] > 0.0:
             own = fs[i if len(fs) > 1 else 0]
             with_sine(own, constants.sine_share * row[10], row[11], constants.fs_circle, on_fs)
-            comb = fill_comb(on_fs, phases, stride_fs, comb_rows, floor)
+            comb = fill_comb(on_fs, phases, stride_fs, teeth)
         _sample(constants, row, branches)
-        margin, beside = margins(branches, constants.tan_alpha, cs_bends, comb, work)
-        walk = Walk(branches, wrapped, constants.tan_alpha, constants.advance, comb, margin, beside)
+        walk = walk_of(branches, circular, constants.tan_alpha, constants.advance, comb, work)
         out[i, 0], out[i, 1] = extremes_in_lanes(walk, work)
