@@ -14,7 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdopt.arrays import Array, Singles
-from hdopt.kinematics.beat_tables import BEFORE, PER_RAD, WRAPPED, Comb, by_four, compiled, four, inlined, whole_of
+from hdopt.kinematics.beat_tables import (
+    BEFORE,
+    PER_RAD,
+    WRAPPED,
+    Comb,
+    allocating,
+    by_four,
+    compiled,
+    four,
+    inlined,
+    whole_of,
+)
 from hdopt.kinematics.branches import TIE_MM
 from hdopt.kinematics.lanes.single import HALF, HUGE, ONE, TINY, ZERO, narrowed, single, unsigned
 
@@ -76,37 +87,47 @@ def on_turn(turns: float, places: int) -> float:
 
 
 @compiled
-def _fill_steps(table: Array, zone: int, tops: Array, bottoms: Array) -> None:
-    """Fill `tops` and `bottoms` (m + 6,) with the largest and least second difference, over a step, of a wrapped
-    `table` (n + 4,) in each step of a `zone`: number i begins at grid angle i - 2. The tops are 0 at least, the bottoms
-    at most. Teeth that come into contact bend a table within a step, so that it is taken at all places."""
-    n, m = len(table) - WRAPPED, len(tops) - 6
-    most = n // m + 3
-    seconds = np.empty(n + most)
+def _fill_seconds(table: Array, step: float, seconds: Array) -> float:
+    """Fill `seconds` with the second differences over a `step` (in places, at least one) of a wrapped `table` (n + 4,)
+    at each of its places, and at the first again; the largest size of the table between places."""
+    n, scale, largest = len(table) - WRAPPED, step * step, 0.0
+    before, after = table[BEFORE:], table[BEFORE + 1 :]
     for i in range(n):
-        seconds[i] = (table[i] - 2 * table[i + BEFORE] + table[i + 2]) * (n / m) ** 2
-    for i in range(most):
+        size = abs(before[i])
+        largest = size if size > largest else largest
+        seconds[i] = (table[i] - 2 * before[i] + after[i]) * scale
+    for i in range(len(seconds) - n):
         seconds[n + i] = seconds[i]
+    return PAST_PLACES * largest
+
+
+@compiled
+def _fill_steps(seconds: Array, n: int, zone: int, tops: Array, bottoms: Array) -> None:
+    """Fill `tops` and `bottoms` (m + 6,) with the largest and least of `seconds` of a table of `n` places in each step
+    of a `zone`: number i begins at grid angle i - 2. The tops are 0 at least, the bottoms at most. Teeth that come into
+    contact bend a table within a step, so that it is taken at all places."""
+    step, most = n / (len(tops) - 6), len(seconds) - n
     for i in range(len(tops)):
         # A little early, as rounding may have it.
-        begin = whole_of(on_turn((i - 2) / m + zone / 2 + (1 - 1e-9), n)) % n
+        place = whole_of((i - 2) * step + zone * n / 2 + n - 1e-6)
+        begin = place - n if place >= n else place
+        begin = begin - n if begin >= n else begin
         top = bottom = 0.0
-        for second in seconds[begin : begin + most]:
+        for k in range(most):
+            second = seconds[unsigned(begin) + unsigned(k)]
             top, bottom = second if second > top else top, second if second < bottom else bottom
         tops[i], bottoms[i] = top, bottom
 
 
-@compiled
+@allocating
 def fill_circular(table: Array, bends: tuple[float, float], rows: Singles) -> Circular:
     """`Circular` of a wrapped `table` (n + 4,) with the second difference over a step and third over half a one,
     `bends`, into `rows`."""
     n, m = len(table) - WRAPPED, rows.shape[2] - WRAPPED
-    tops, bottoms = np.empty(m + 6), np.empty(m + 6)
-    extent = steepest = 0.0
-    for i in range(n):
-        extent = max(extent, PAST_PLACES * abs(table[i + BEFORE]))
+    tops, bottoms, seconds = np.empty(m + 6), np.empty(m + 6), np.empty(n + n // m + 3)
+    extent, steepest = _fill_seconds(table, n / m, seconds), 0.0
     for zone in range(2):
-        _fill_steps(table, zone, tops, bottoms)
+        _fill_steps(seconds, n, zone, tops, bottoms)
         before = here = 0.0
         for i in range(-2, m + WRAPPED):
             after = by_four(table, four(on_turn((i + 1 - BEFORE) / m + zone / 2, n)))

@@ -35,6 +35,7 @@ from hdopt.kinematics.beat_tables import (
     WRAPPED,
     Comb,
     Four,
+    allocating,
     by_four,
     compiled,
     four,
@@ -84,7 +85,7 @@ class Work(NamedTuple):
     lanes: Singles
 
 
-@compiled
+@allocating
 def new_work(grid: int, phases: int) -> Work:
     """Room for the beat of drives on so many `grid` angles and FS `phases`."""
     wrapped = grid + WRAPPED
@@ -103,7 +104,7 @@ def grid_angles(grid: int) -> Array:
     return np.stack([f(np.arange(-BEFORE, grid + WRAPPED - BEFORE) * (2 * math.pi / grid)) for f in (np.cos, np.sin)])
 
 
-@compiled
+@allocating
 def walk_of(branches: Array, circular: Circular, tan_alpha: float, advance: float, comb: Comb, work: Work) -> Walk:
     """`Walk` of wrapped `branches`, whose depth `tan_alpha` multiplies, with the teeth `circular` and `comb` and
     Z_CS/Z_FS, `advance`; `work` is room."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, TypeVar, cast  # Any: numba's options are of several kinds
 
 import numpy as np
 from numba import njit
@@ -17,12 +17,28 @@ from numba import njit
 from hdopt.arrays import Array, Singles
 from hdopt.kinematics.lanes.single import narrowed, unsigned
 
-# Least and largest do not depend on the order in which lanes are taken; sums keep theirs.
-compiled = njit(error_model="numpy", fastmath={"contract", "nsz", "nnan", "arcp"})
+Function = TypeVar("Function", bound=Callable[..., object])
 
-# The same compiled into its callers: a call counts the references to every array that it is given, which takes longer
-# than what these do.
-inlined = njit(error_model="numpy", fastmath={"contract", "nsz", "nnan", "arcp"}, forceinline=True)
+# Least and largest do not depend on the order in which lanes are taken; sums keep theirs.
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz", "nnan", "arcp"}}
+# Without counts of arrays' users, which take longer than what is done with them; Numba's own types do not know of it.
+_UNCOUNTED: dict[str, Any] = _OPTIONS | {"_nrt": False}
+
+
+def allocating(function: Function) -> Function:
+    """`function` compiled for kernels of the beat; it makes arrays, or gives such back as it was given."""
+    return cast("Function", njit(**_OPTIONS)(function))
+
+
+def compiled(function: Function) -> Function:
+    """`function` compiled for kernels of the beat; it does neither."""
+    return cast("Function", njit(**_UNCOUNTED)(function))
+
+
+def inlined(function: Function) -> Function:
+    """The same of a `function` that is compiled into each of its callers."""
+    return cast("Function", njit(forceinline=True, **_UNCOUNTED)(function))
+
 
 whole_of = cast("Callable[[float], int]", np.int32)
 """A number without its fraction, which the processor takes off lane by lane."""
@@ -36,7 +52,7 @@ BEFORE, WRAPPED = 1, 4
 """Places that a wrapped row repeats before its first, and in all: those that a cubic reads across its ends."""
 TINY = 1e-12
 """mm: what keeps the differences of a table of zeros apart."""
-FLOORS = 512
+FLOORS = 256
 """Differences of both zones, of either sign, for which the floor of the driving deviation is tabulated."""
 
 
@@ -68,7 +84,7 @@ class Teeth(NamedTuple):
     floor: Array
 
 
-@compiled
+@allocating
 def new_teeth(places: int, phases: int) -> Teeth:
     """Room for the FS table of so many `places` that is met in so many `phases`."""
     rows = np.empty((places // phases + WRAPPED, 2 * phases), np.float32)
@@ -150,13 +166,13 @@ def with_sine(table: Array, amplitude: float, phase: float, circle: Array, out: 
         out[i] = table[i] + (along * cos[i] + across * sin[i])
 
 
-@compiled
+@allocating
 def second_difference(table: Array, stride: int) -> float:
     """Largest second difference of a periodic `table` over so many of its places (`stride`), in its unit."""
     return differences(table, stride)[0]
 
 
-@compiled
+@allocating
 def differences(table: Array, stride: int) -> tuple[float, float]:
     """Largest second difference of a periodic `table` (n,) over so many of its places (`stride`), and its largest third
     one over half as many, in its unit."""
@@ -176,7 +192,7 @@ def differences(table: Array, stride: int) -> tuple[float, float]:
     return -least_of(seconds, n), -least_of(thirds, n)
 
 
-@compiled
+@allocating
 def _range_of(table: Array) -> tuple[float, float, float, float]:
     """Least and largest value of a periodic `table` (n,), its largest step from one place to the next, and how far
     cubics through its places are off lines between them at most."""
@@ -225,7 +241,7 @@ def _fill_floor(table: Array, reach: float, floor: Array) -> None:
         floor[k] = min(floor[k], floor[k + 1] + step / 2)
 
 
-@compiled
+@allocating
 def fill_comb(table: Array, phases: int, stride: int, work: Teeth) -> Comb:
     """`Comb` of a periodic `table` (n,), n even and a multiple of `phases`, into the room of `work`; `stride` is a grid
     angle in places of the table."""
