@@ -376,6 +376,7 @@ class HighOrderSettings:
     beside: float = threshold(
         0.01, "1", "choice: power over the high orders' from which their names are looked at anew"
     )
+    zone_rows: int = threshold(30000, "rows", "choice: effort; as recorded, of a first fit of a ripple in the zones")
 
 
 @dataclass(frozen=True)

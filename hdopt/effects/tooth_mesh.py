@@ -35,8 +35,11 @@ SIDEBANDS: tuple[Sides, ...] = (
 )
 FEW = SIDEBANDS[:3]
 """The variants of few lines."""
-ZONE_SIDEBANDS: tuple[Sides, ...] = ((0,), (0, -1, 1), (0, -1, 1, -2, 2))
-"""Inside the zones, whose change needs no sidebands of its own."""
+ZONE_SIDEBANDS: tuple[Sides, ...] = tuple(
+    (0, *(side for k in range(1, most + 1) for side in (-k, k))) for most in (0, 1, 2, 5, 11)
+)
+"""Inside the zones, whose change needs no sidebands of its own: those of teeth that differ in height, slowly round the
+rim. Each holds those of the one before, in their order."""
 ZONE = 100
 """Members ZONE z + k of the sines are the sideband k of the ripple inside zone z."""
 
@@ -67,7 +70,7 @@ INSIDE = Sines(
     "of arc, the same inside zone Z",
     prior=(0.0, 20.0),
     scale=UM,
-    shown="`zone_Z_amplitude_um`, `zone_Z_amplitude_plus_K_um`, ... with phases, Z 1 and 2, K 1 and 2",
+    shown="`zone_Z_amplitude_um`, `zone_Z_amplitude_plus_K_um`, ... with phases, Z 1 and 2, K 1 to 11",
 )
 
 

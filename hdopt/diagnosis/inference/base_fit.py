@@ -44,7 +44,7 @@ def fit_base(
     mask = np.zeros(len(problem.rows), bool)
     mask[::stride] = True
     thin = problem.only(mask)
-    thin_terms = [_thin(term, mask) for term in terms]
+    thin_terms = [thinned(term, mask) for term in terms]
     candidates: list[Fit] = []
     for index in range(starts):
         errors = rng.normal(size=PARAMETERS) * problem.prior
@@ -67,7 +67,8 @@ def fit_base(
     return min(finals, key=lambda fit: fit.objective)
 
 
-def _thin(term: Term, mask: Mask) -> Term:
+def thinned(term: Term, mask: Mask) -> Term:
+    """`term` on the rows of the `mask` alone."""
     return replace(
         term,
         columns=None if term.columns is None else term.columns[mask],

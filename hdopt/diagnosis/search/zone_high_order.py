@@ -3,7 +3,9 @@
 Where the ripple is as large as the difference between the two zones, the larger of the two switches with every tooth,
 and its mean rises: a slow bulge at each change of the driving zone that no sine beside the base explains. So a mesh
 ripple that was found is fitted once more on the rows as recorded, inside the larger-zone rule and with base and
-effects free beside it, and kept so if that explains the rows better.
+effects free beside it, and kept so if that explains the rows better. Teeth differ in height round the rim, so that the
+ripple has waves beside its own order: these come in step by step, each step from where the one before it ended, since
+a drive that was bent to the bulges does not find its way back at once.
 """
 
 from __future__ import annotations
@@ -11,20 +13,27 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.diagnosis.inference.fit import Fit, evaluate, refine, term_columns
+from hdopt.diagnosis.inference.base_fit import thinned
+from hdopt.diagnosis.inference.catalogue import is_outside
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine, term_columns
 from hdopt.diagnosis.inference.nuisance import Nuisances
-from hdopt.effects.term import Term
+from hdopt.effects.base import Explanation
+from hdopt.effects.term import Shape, Term
 from hdopt.recordings.rows import Rows
+
+Weighed: TypeAlias = tuple[Term, Array]
+"""A term with its coefficients."""
 
 
 @dataclass(frozen=True)
 class ZoneRipple:
-    """A mesh ripple inside the zones: `fit` with the mesh as its only term beside the base, and what it `adds` to the
-    error on the rows as recorded (n,), arcmin, its effect on the driving zone included.
+    """A mesh ripple inside the zones: `fit` with the effects of high orders beside the base, the mesh the last of them,
+    and what they add (`adds`) to the error on the rows as recorded (n,), arcmin, with what it does to the driving zone.
     """
 
     fit: Fit
@@ -32,39 +41,71 @@ class ZoneRipple:
 
 
 def fit_in_zones(rows: Rows, low: Fit, nuisances: Nuisances, ripple: Fit) -> ZoneRipple | None:
-    """The term of `ripple` inside the zones, or None where it acts beside them or the sum of sines explains as much.
+    """The one term of `ripple` that the zones may meet inside them, or None where it acts beside them or the sum of
+    sines explains as much. Effects found with it stay beside; a sine without physics, which stands for what it does to
+    the driving zone, goes.
 
     `rows` are the rows as recorded with their recorded error, `low` the base and effects fitted on averaged rows.
     `nuisances` are the columns that are always free.
     """
     base = low.problem.base
-    if base is None or len(ripple.terms) != 1:
+    physical = [one for one in _weighed(ripple.terms, ripple) if not is_outside(one[0].effect)]
+    forms = [(ripple.problem.explanations[term.effect], term.shape) for term, _ in physical]
+    met = [at for at, (effect, shape) in enumerate(forms) if effect.in_zones(shape)]
+    if base is None or len(met) != 1:
         return None
-    (found,) = ripple.terms
-    effect = ripple.problem.explanations[found.effect]
-    variants = effect.in_zones(found.shape)
-    if not variants:
-        return None
+    effect, shape = forms[met[0]]
+    beside = [one for at, one in enumerate(physical) if at != met[0]]
     problem = replace(low.problem, rows=rows, nuisance=nuisances.columns(rows), noise=ripple.problem.noise)
-    settings = problem.settings.fit
     base_value = base.evaluate_at(problem.rotation, low.errors)[0]
-    terms = [problem.explanations[t.effect].term(rows, t.shape, base_value) for t in low.terms]
-    bare = evaluate(problem, low.errors, low.offsets, terms, low.coefficients)
-    sines = [*low.coefficients, *ripple.coefficients]
-    best = refine(
-        evaluate(problem, low.errors, low.offsets, [*terms, *ripple.terms], sines),
-        settings.settled_iterations,
-        move_shapes=False,
-    )
-    weighed = problem.weighed_rows
-    best_score, inside = _score(best, weighed), None
-    for shape in variants:
-        term = effect.term(rows, shape)
-        start = evaluate(problem, low.errors, low.offsets, [*terms, term], [*low.coefficients, _seed(bare, term)])
-        fit = refine(start, settings.known_iterations, move_shapes=False)
-        if _score(fit, weighed) < best_score:
-            best_score, inside = _score(fit, weighed), fit
-    return None if inside is None else _alone(inside, terms)
+    known = _weighed([problem.explanations[t.effect].term(rows, t.shape, base_value) for t in low.terms], low)
+    sines = _at(problem, low, [*known, *_weighed(ripple.terms, ripple)])
+    sines = refine(sines, problem.settings.fit.settled_iterations, move_shapes=False)
+    best, inside = _score(sines), None
+    # Waves of the teeth may stand for what the ripple does to the driving zone: it is fitted without them, too.
+    others = [one for one in known if one[0].met is None]
+    for start in (known, others) if len(others) < len(known) else (known,):
+        fit = _step_by_step(problem, low, [*start, *beside], effect, effect.in_zones(shape))
+        if _score(fit) < best:
+            best, inside = _score(fit), _alone(fit, len(start))
+    return inside
+
+
+def _step_by_step(
+    problem: FitProblem, low: Fit, beside: Sequence[Weighed], effect: Explanation, shapes: Sequence[Shape]
+) -> Fit:
+    """The best fit of `effect` inside the zones at one of its `shapes`, with all `beside` it, from the drive of `low`,
+    on a part of the rows of `problem`, then on all. Each shape begins with the waves of the one before."""
+    settings = problem.settings
+    mask = np.zeros(len(problem.rows), bool)
+    mask[:: max(1, len(mask) // settings.high_order.zone_rows)] = True
+    thin = problem.only(mask)
+    fit = _at(thin, low, [(thinned(term, mask), own) for term, own in beside])
+    waves = None
+    found = []
+    for shape in shapes:
+        term = effect.term(thin.rows, shape)
+        waves = _seed(fit, term) if waves is None else widened(waves, term.width)
+        start = evaluate(
+            thin, fit.errors, fit.offsets, [*fit.terms[: len(beside)], term], [*fit.coefficients[: len(beside)], waves]
+        )
+        fit = refine(start, settings.base.full_iterations, move_shapes=False)
+        waves = fit.coefficients[-1]
+        found.append(fit)
+    best = min(found, key=_score)
+    terms = [*(term for term, _ in beside), effect.term(problem.rows, best.terms[-1].shape)]
+    whole = evaluate(problem, best.errors, best.offsets, terms, best.coefficients)
+    return refine(whole, settings.fit.known_iterations, move_shapes=False)
+
+
+def _weighed(terms: Sequence[Term], fit: Fit) -> list[Weighed]:
+    """`terms` with the coefficients that those of `fit` have."""
+    return list(zip(terms, fit.coefficients, strict=True))
+
+
+def _at(problem: FitProblem, low: Fit, weighed: Sequence[Weighed]) -> Fit:
+    """The drive and offsets of `low` on the rows of `problem`, with the terms `weighed` beside them."""
+    return evaluate(problem, low.errors, low.offsets, [one for one, _ in weighed], [own for _, own in weighed])
 
 
 def _seed(bare: Fit, term: Term) -> Array:
@@ -73,12 +114,21 @@ def _seed(bare: Fit, term: Term) -> Array:
     return np.asarray(np.linalg.lstsq(columns, bare.residual, rcond=None)[0], float)
 
 
-def _score(fit: Fit, rows: float) -> float:
+def widened(waves: Array, width: int) -> Array:
+    """Coefficients of both zones' `waves`, to a `width`: those that come in are none yet."""
+    half = len(waves) // 2
+    wide = np.zeros(width)
+    wide[:half], wide[width // 2 : width // 2 + half] = waves[:half], waves[half:]
+    return wide
+
+
+def _score(fit: Fit) -> float:
     """Schwarz's criterion, in noise variances."""
-    return fit.objective / fit.problem.noise.sigma**2 + sum(term.width for term in fit.terms) * math.log(rows)
+    weighed = fit.problem.weighed_rows
+    return fit.objective / fit.problem.noise.sigma**2 + sum(term.width for term in fit.terms) * math.log(weighed)
 
 
-def _alone(fit: Fit, others: Sequence[Term]) -> ZoneRipple:
-    without = evaluate(fit.problem, fit.errors, fit.offsets, fit.terms[: len(others)], fit.coefficients[: len(others)])
-    alone = replace(fit, terms=fit.terms[len(others) :], coefficients=fit.coefficients[len(others) :])
+def _alone(fit: Fit, others: int) -> ZoneRipple:
+    without = evaluate(fit.problem, fit.errors, fit.offsets, fit.terms[:others], fit.coefficients[:others])
+    alone = replace(fit, terms=fit.terms[others:], coefficients=fit.coefficients[others:])
     return ZoneRipple(alone, fit.prediction - without.prediction)
