@@ -86,6 +86,7 @@ class EncoderInterpolation(Effect):
     domain = "order"
     high_order = True
     leaves_nothing = True
+    has_parts = True
     separating = (
         "record at two thirds of the speed and twice the sampling rate: the ripple stays at the encoder's lines"
     )
@@ -114,6 +115,13 @@ class EncoderInterpolation(Effect):
         if conditions.span_turns < 2:
             return f"at least 2 input turns to count lines (there are {conditions.span_turns:.1f})"
         return None
+
+    def every_part_shows(self, term: Term, estimate: FitEstimate) -> bool:
+        """Whether the line itself is there beside its multiples: two cycles a line without the first are any other
+        line's, and of a low one any wave's.
+        """
+        power = estimate.values[0 : term.width : 2] ** 2 + estimate.values[1 : term.width : 2] ** 2
+        return bool(power[0] >= SHOWS * power.max())
 
     def search(self, probe: Probe) -> Sequence[Term]:
         found = [term for shaft in Shaft for term in self._of_shaft(probe, shaft)]

@@ -107,6 +107,17 @@ def test_an_eccentric_encoder_with_an_ellipse_shows_both(study):
     assert is_acceptable(with_effect(fit, "encoder_output_eccentricity", shape))
 
 
+def test_an_encoder_of_few_lines_shows_them(study):
+    """A wave of 7 a turn is no encoder's second one at 280 lines, whatever noise says of the first. Fault caught: a
+    wave that grows with time was named so, with lines of 0.0009 arcmin and an interval from 0.
+    """
+    shape = {"shaft": Shaft.OUTPUT, "lines": 280, "cycles": (1, 2)}
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(7 * t) + 0.008 * np.sin(3.5 * t))
+    assert not is_acceptable(with_effect(fit, "encoder_interpolation", shape))
+    fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(7 * t) + 0.02 * np.sin(3.5 * t))
+    assert is_acceptable(with_effect(fit, "encoder_interpolation", shape))
+
+
 @pytest.mark.parametrize(
     ("lines", "multiples", "output", "expected"),
     [
