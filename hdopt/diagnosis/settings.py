@@ -377,6 +377,13 @@ class HighOrderSettings:
         0.01, "1", "choice: power over the high orders' from which their names are looked at anew"
     )
     zone_rows: int = threshold(30000, "rows", "choice: effort; as recorded, of a first fit of a ripple in the zones")
+    height_waves: tuple[int, ...] = threshold(
+        (0, 1, 2, 5, 11),
+        "1",
+        "choice: waves of the teeth's heights round the rim in the steps before every tooth is free",
+    )
+    height_rounds: int = threshold(2, "1", "choice: steps with every tooth free, as skew and heights follow each other")
+    skew_iterations: int = threshold(6, "1", "choice: effort; least squares after each step, in which the skew moves")
 
 
 @dataclass(frozen=True)

@@ -391,8 +391,17 @@ def search_without_ripple(state: State) -> State:
     if state.ripple is not None and changed and max(sizes) > settings.high_order.beside * float(np.var(state.ripple)):
         # What was beside the ripple when it was named is not there any more.
         high, _ = find_ripple(state.recordings, state.selection, state.nuisances, state.ruled_out, rng)
-        state = replace(state, high=high)
+        state = state if stands(state.high, high) else replace(state, high=high)
     return state
+
+
+def stands(before: Selection | None, anew: Selection | None) -> bool:
+    """Whether what was found in the zones `before` explains the rows as recorded better than what was found `anew`
+    beside other effects: the zones make many minima, and the second look may have missed it.
+    """
+    if before is None or not any(term.in_zones for term in before.best.fit.terms):
+        return False
+    return anew is None or bool(np.var(before.best.fit.residual) < np.var(anew.best.fit.residual))
 
 
 def settle_shapes(state: State) -> State:

@@ -10,7 +10,7 @@ from typing import ClassVar
 from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects.conditions import Conditions
-from hdopt.effects.declared import Category, Declared, Quantity, Sines, needed
+from hdopt.effects.declared import Category, Declared, Numbers, Quantity, Sines, needed
 from hdopt.effects.estimate import FitEstimate, Parameter, counted
 from hdopt.effects.grid_search import Axis, search_on_grid
 from hdopt.effects.met import Met
@@ -90,6 +90,11 @@ class Explanation(ABC):
 
     def in_zones(self, shape: Shape) -> Sequence[Shape]:
         """Shapes of the same inside the meshing zones, to be tried in its place; none for most."""
+        return ()
+
+    def tooth_by_tooth(self, term: Term, coefficients: Array, ratio: float) -> Sequence[Shape]:
+        """Shapes of the same with a height of every tooth's own, all alike, from which a fit of them begins: those of
+        `term` in the zones with these `coefficients`, on a drive of this `ratio`. None for most."""
         return ()
 
     def response(self, conditions: Conditions, shape: Shape, coefficients: Array, motions: Array) -> Array:
@@ -320,9 +325,9 @@ class Effect(Explanation):
             )
         return None
 
-    def flat_declared(self) -> list[Quantity | Category]:
+    def flat_declared(self) -> list[Quantity | Numbers | Category]:
         """Its study keys one by one, sines as amplitudes and phases."""
-        flat: list[Quantity | Category] = []
+        flat: list[Quantity | Numbers | Category] = []
         for item in self.declared:
             flat += item.quantities() if isinstance(item, Sines) else [item]
         return flat

@@ -1,8 +1,8 @@
 """How an effect declares its numbers and categories: from this its study keys, its JSON and its docs derive.
 
-Three kinds: a `Quantity` (a number with a unit, or a whole number), a `Category` (one of an enumeration), and `Sines`
-(amplitude and phase of one or many sines). A `Quantity` with a `scale` is a coefficient of the effect's columns; one
-without is of its shape.
+Four kinds: a `Quantity` (a number with a unit, or a whole number), `Numbers` (a list of them), a `Category` (one of an
+enumeration), and `Sines` (amplitude and phase of one or many sines). A `Quantity` with a `scale` is a coefficient of
+the effect's columns; one without is of its shape.
 """
 
 from __future__ import annotations
@@ -59,6 +59,23 @@ class Quantity:
         if self.at_least is not None and self.at_most is not None:
             return f"{self.at_least:g} to {self.at_most:g}"
         return ", ".join(part for part in (low, high) if part)
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A list of numbers in `unit` under `key` in a study, as one for each tooth of a spline; None where left out."""
+
+    key: str
+    unit: str
+    meaning: str
+    symbol: str = ""
+    prior: tuple[float, float] | None = None
+    default: object = None
+
+    def given(self, keys: Mapping[str, object]) -> tuple[float, ...] | None:
+        """The numbers that a study's `keys` hold, None where they are left out."""
+        value = keys.get(self.key)
+        return tuple(float(one) for one in value) if isinstance(value, list | tuple) else None
 
 
 @dataclass(frozen=True)
@@ -128,7 +145,7 @@ class Sines:
             raise HdoptError(f"effects.{effect} has no amplitude; give at least one of {some} with its phase")
 
 
-Declared = Quantity | Category | Sines
+Declared = Quantity | Numbers | Category | Sines
 
 
 def one_sine(unit: str, meaning: str, prior: tuple[float, float], scale: float = 1.0) -> Sines:

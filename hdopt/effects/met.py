@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hdopt.arrays import Array
+from hdopt.arrays import Array, Index
 from hdopt.effects.sines import sine_columns, sine_sum
 
 
@@ -112,6 +112,43 @@ class Pulse:
             return value, -off / self.sigma**2 * value
         before, after = (gaussian(off + side * self.row / 2, self.sigma) for side in (-1, 1))
         return value, coefficients[0] * (after - before) / self.row
+
+
+@dataclass(frozen=True)
+class ToothForms:
+    """The form of each flank of a `spline` within its own pitch, h ((1 - cos p)/2 + s sin p) with p from 0 to 2 pi over
+    the tooth: nothing where a tooth ends, so that neighbours of different heights meet.
+
+    `heights` (teeth, q) mm of arc, of each tooth per coefficient; `skew`, s; `start`, where tooth 0 begins, in pitches
+    from the angle 0 of the spline.
+    """
+
+    spline: Spline
+    heights: Array
+    skew: float = 0.0
+    start: float = 0.0
+
+    @property
+    def width(self) -> int:
+        return int(self.heights.shape[1])
+
+    def columns(self, angle: Array, zone: ArrayLike) -> Array:
+        tooth, part = self._places(angle)
+        form = (1 - np.cos(part)) / 2 + self.skew * np.sin(part)
+        return np.asarray(self.heights[tooth] * form[:, None])
+
+    def added(self, angle: Array, zone: int, coefficients: Array) -> tuple[Array, Array]:
+        tooth, part = self._places(angle)
+        height = (self.heights @ coefficients)[tooth]
+        sine, cosine = np.sin(part), np.cos(part)
+        slope = len(self.heights) * (sine / 2 + self.skew * cosine)
+        return height * ((1 - cosine) / 2 + self.skew * sine), height * slope
+
+    def _places(self, angle: Array) -> tuple[Index, Array]:
+        """Number of the tooth that is met at `angle` (n,), and how far over it, 0 to 2 pi."""
+        place = angle * (len(self.heights) / (2 * math.pi)) - self.start
+        whole = np.floor(place)
+        return whole.astype(np.int64) % len(self.heights), 2 * math.pi * (place - whole)
 
 
 def gaussian(off: Array, sigma: float, row: float = 0.0) -> Array:

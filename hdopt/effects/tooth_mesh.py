@@ -6,19 +6,24 @@ where the depth of mesh varies over the turn (orders Z_CS +- 1, +- 2) and, farth
 each zone having a phase of its own: the short-wave part that Jia 2021, Sec. 2.2, leaves out. With two lobes and a tooth
 difference of 2, Z_CS = 2 (N + 1). Needs more than 2 Z_CS samples a turn. Units: arcmin at the output, or um of arc
 where it acts inside the zones, and also decides which one drives. Prior: 0 to 2 arcmin, 0 to 20 um.
+
+Where every tooth has a height of its own, no few sidebands hold it, and the heights' slow part moves the driving zone
+too: then the form of a flank within its pitch, h ((1 - cos p)/2 + s sin p), is met with the height h of each tooth.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects.base import Effect, Keys
 from hdopt.effects.conditions import Conditions
-from hdopt.effects.declared import UM, Sines, smallest_set
+from hdopt.effects.declared import UM, Numbers, Quantity, Sines, number, smallest_set
 from hdopt.effects.estimate import FitEstimate, Parameter
-from hdopt.effects.met import Spline, ZoneWaves
+from hdopt.effects.met import Spline, ToothForms, ZoneWaves
 from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Shape, Term
@@ -72,6 +77,20 @@ INSIDE = Sines(
     scale=UM,
     shown="`zone_Z_amplitude_um`, `zone_Z_amplitude_plus_K_um`, ... with phases, Z 1 and 2, K 1 to 11",
 )
+HEIGHTS = Numbers(
+    "form_heights_um", "um", "of arc, the form of each flank of the circular spline, Z_CS of them", "h", (-20.0, 20.0)
+)
+SKEW = Quantity(
+    "form_skew", "1", "part of the form that is a sine over the pitch", "s", (-1.0, 1.0), None, at_least=-1, at_most=1
+)
+START = Quantity(
+    "form_start", "1", "where the first of these teeth begins, in pitches", "q", (0.0, 1.0), None, at_least=0, at_most=1
+)
+SKEW_STEP = 0.02
+LARGEST_SKEW = 1.0
+"""Skew up to which the form is one of a flank: beyond it the sine is all of it."""
+MOST_SKEW = 0.5
+"""Skew up to which a fit of heights begins."""
 
 
 def mesh_order(ratio: float) -> float:
@@ -91,7 +110,7 @@ class ToothMesh(Effect):
     needs_strain_wave = True
     acts = "beside, or zones"
     separating = "sample more than twice per tooth, at two speeds: the mesh ripple stays at Z_CS cycles a turn"
-    declared = (BESIDE, INSIDE)
+    declared = (BESIDE, INSIDE, HEIGHTS, SKEW, START)
     examples = (
         {"amplitude_arcmin": 0.05, "phase_deg": 10.0},
         {
@@ -109,6 +128,11 @@ class ToothMesh(Effect):
             "zone_2_phase_deg": 20.0,
             "zone_2_amplitude_minus_1_um": 0.2,
             "zone_2_phase_minus_1_deg": 30.0,
+        },
+        {
+            "form_heights_um": [2.0 + 0.1 * (7 * tooth % 11) for tooth in range(162)],
+            "form_skew": 0.2,
+            "form_start": 0.25,
         },
     )
 
@@ -131,20 +155,48 @@ class ToothMesh(Effect):
     def in_zones(self, shape: Shape) -> Sequence[Shape]:
         return [{"sidebands": sides, "zones": True} for sides in ZONE_SIDEBANDS]
 
+    def tooth_by_tooth(self, term: Term, coefficients: Array, ratio: float) -> Sequence[Shape]:
+        """The wave of the mesh's order as a form of all teeth: of teeth that begin where the spline's angle says, and
+        of teeth without a skew."""
+        half = term.width // 2
+        sine, cosine = (coefficients[:2] + coefficients[half : half + 2]) / 2
+        teeth = int(mesh_order(ratio))
+        height = max(2 * float(np.hypot(sine, cosine)), 1e-9)
+        skew = float(np.clip(-sine / (2 * cosine) if cosine else 0.0, -MOST_SKEW, MOST_SKEW))
+        start = float(np.arctan2(-sine, -cosine) / (2 * np.pi)) % 1
+        return [
+            {"heights": (height,) * teeth, "skew": skew, "start": 0.0},
+            {"heights": (height,) * teeth, "skew": 0.0, "start": start},
+        ]
+
     def term(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
+        if "heights" in shape:
+            heights = np.array(shape["heights"])[:, None]
+            kept = {**shape, "skew": float(np.clip(shape["skew"], -LARGEST_SKEW, LARGEST_SKEW))}
+            met = ToothForms(Spline.CIRCULAR, heights, kept["skew"], kept["start"])
+            return Term(self.id, kept, met=met, steps={"skew": SKEW_STEP}, trials=len(ZONE_SIDEBANDS))
         orders = tuple(self.orders(shape, conditions.ratio))
         if "zones" in shape:
             return Term(self.id, dict(shape), met=ZoneWaves(Spline.CIRCULAR, orders), trials=len(ZONE_SIDEBANDS))
         return Term(self.id, dict(shape), columns=sine_columns(conditions.theta, orders), trials=len(SIDEBANDS))
 
     def orders(self, shape: Shape, ratio: float) -> list[float]:
-        return [mesh_order(ratio) + k for k in shape["sidebands"]]
+        return [mesh_order(ratio) + k for k in shape.get("sidebands", (0,))]
+
+    def highest_order(self, shape: Shape, ratio: float) -> float:
+        """Heights that change from tooth to tooth have waves up to half as many again as the mesh."""
+        return 1.5 * mesh_order(ratio) if "heights" in shape else super().highest_order(shape, ratio)
 
     def named_orders(self, shape: Shape, ratio: float) -> list[float]:
         return []
 
     def values(self, keys: Keys, gear: DriveGeometry) -> tuple[Shape, tuple[float, ...]]:
         beside, inside = BESIDE.given(self.id, keys), INSIDE.given(self.id, keys)
+        heights = HEIGHTS.given(keys)
+        if heights is not None:
+            return self._heights(heights, keys, gear, bool(beside or inside))
+        if others := [one.key for one in (SKEW, START) if number(keys, one.key) is not None]:
+            raise HdoptError(f"effects.{self.id} has {others[0]} without {HEIGHTS.key}; give the heights of all teeth")
         BESIDE.some(self.id, beside | inside)
         if not inside:
             sides = smallest_set(SIDEBANDS, beside)
@@ -157,12 +209,35 @@ class ToothMesh(Effect):
         sides = smallest_set(ZONE_SIDEBANDS, [member - ZONE * round(member / ZONE) for member in inside])
         return {"sidebands": sides, "zones": True}, INSIDE.coefficients(inside, _zone_members(sides))
 
+    def _heights(
+        self, heights: tuple[float, ...], keys: Keys, gear: DriveGeometry, sines: bool
+    ) -> tuple[Shape, tuple[float, ...]]:
+        teeth = int(mesh_order(gear.ratio))
+        if len(heights) != teeth:
+            raise HdoptError(
+                f"effects.{self.id}.{HEIGHTS.key} has {len(heights)} heights; give one for each of the {teeth} teeth "
+                "of the circular spline"
+            )
+        if sines:
+            raise HdoptError(f"effects.{self.id} has both sines and {HEIGHTS.key}; give one of them")
+        size = float(np.sqrt(np.mean(np.square(heights))))
+        if not size:
+            raise HdoptError(f"effects.{self.id}.{HEIGHTS.key} are all 0; give heights, or leave the effect out")
+        shape = {"heights": tuple(one / size for one in heights)}
+        numbers = {"skew": number(keys, SKEW.key) or 0.0, "start": number(keys, START.key) or 0.0}
+        return shape | numbers, (UM * size,)
+
     def keys(self, shape: Shape, coefficients: Sequence[float], gear: DriveGeometry) -> dict[str, object]:
+        if "heights" in shape:
+            heights = [one * coefficients[0] / UM for one in shape["heights"]]
+            return {HEIGHTS.key: heights, SKEW.key: shape["skew"], START.key: shape["start"]}
         if "zones" in shape:
             return dict(INSIDE.written(_zone_members(shape["sidebands"]), coefficients))
         return dict(BESIDE.written(shape["sidebands"], coefficients))
 
     def parameters(self, term: Term, estimate: FitEstimate) -> dict[str, Parameter]:
+        if "heights" in term.shape:
+            return {"form_height_um": estimate.parameter(0, "um", scale=1e3)}
         if "zones" in term.shape:
             second = term.width // 2
             return {
@@ -174,6 +249,10 @@ class ToothMesh(Effect):
         return {"amplitude_arcmin": estimate.amplitude(0, 1), "phase_deg": estimate.phase_deg(0, 1)}
 
     def sentence(self, shape: Shape, parameters: Mapping[str, Parameter], rms_arcmin: float) -> str:
-        return (
-            f"A ripple at the tooth-mesh order, {rms_arcmin:.2g} arcmin rms: tooth-to-tooth pitch or profile deviation."
+        said = (
+            f"A ripple at the tooth-mesh order, {rms_arcmin:.2g} arcmin rms: tooth-to-tooth pitch or profile deviation"
         )
+        if "heights" not in shape:
+            return f"{said}."
+        spread = float(np.std(shape["heights"])) * parameters["form_height_um"].value
+        return f"{said}, its height different from tooth to tooth by {spread:.2g} um of arc rms."

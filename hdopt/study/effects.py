@@ -13,7 +13,7 @@ from pydantic import Field, create_model
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects import EFFECTS
 from hdopt.effects.base import Effect
-from hdopt.effects.declared import REQUIRED, Category, Quantity
+from hdopt.effects.declared import REQUIRED, Category, Numbers, Quantity
 from hdopt.simulation import EffectValues, Operation
 from hdopt.simulation.operation import RPM
 from hdopt.study.base import NotNegative, Positive, Section
@@ -40,12 +40,14 @@ def section_of(effect: Effect) -> type[EffectSection]:
     return create_model(type(effect).__name__, __base__=named, __doc__=f"[effects.{effect.id}]", **fields)
 
 
-def _field(item: Quantity | Category) -> tuple[Any, Any]:
+def _field(item: Quantity | Numbers | Category) -> tuple[Any, Any]:
     """Type and default of one key."""
     default = ... if item.default is REQUIRED else item.default
     if isinstance(item, Category):
         kind: Any = Literal[tuple(str(choice) for choice in item.choices)]
         return kind, default if default is ... or default is None else str(default)
+    if isinstance(item, Numbers):
+        return list[float] | None, None
     kind = int if item.whole else float
     if default is None:
         kind = kind | None

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from hdopt.effects import EFFECTS
 from hdopt.effects.base import Effect
-from hdopt.effects.declared import REQUIRED, Category, Declared, Sines
+from hdopt.effects.declared import REQUIRED, Category, Declared, Numbers, Sines
 from hdopt.files import write_text
 
 START = "<!-- written by: python -m hdopt.workflow.effect_docs docs/conventions.md -->"
@@ -59,6 +59,8 @@ def _cells(item: Declared) -> str:
     prior = "" if item.prior is None else f"{item.prior[0]:g} to {item.prior[1]:g}"
     if isinstance(item, Sines):
         return f"{_keys_of(item)} | a, φ | {item.unit}, deg | 0 or more | {prior} | {item.meaning}"
+    if isinstance(item, Numbers):
+        return f"`{item.key}` | {item.symbol} | {item.unit} | a list of numbers | {prior} | {item.meaning}"
     whole = "whole number" if item.whole else ""
     said = ", ".join(part for part in (whole, item.range_said) if part) or "any number"
     unit = "" if item.unit == "1" else item.unit

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hdopt.effects import EFFECTS
-from hdopt.effects.declared import Category, Quantity
+from hdopt.effects.declared import Category, Numbers, Quantity
 from hdopt.effects.estimate import Parameter
 from hdopt.effects.prior import outside_prior, prior_ranges
 from hdopt.simulation import EffectValues
@@ -62,6 +62,9 @@ def test_an_effect_declares_what_its_examples_need(effect):
             item = declared[key]
             if isinstance(item, Category):
                 assert value in set(item.choices)
+                continue
+            if isinstance(item, Numbers):
+                assert item.prior[0] <= min(value) <= max(value) <= item.prior[1]
                 continue
             if item.prior is not None:
                 assert item.prior[0] <= abs(value) <= item.prior[1]

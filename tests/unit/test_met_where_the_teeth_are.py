@@ -16,7 +16,7 @@ from hdopt.diagnosis.inference.noise import Noise
 from hdopt.drive.errors import DriveErrors
 from hdopt.effects import EFFECTS
 from hdopt.effects.local_tooth_defect import Seat
-from hdopt.effects.met import Pulse, Spline
+from hdopt.effects.met import Pulse, Spline, ToothForms
 from hdopt.effects.sines import sine_columns, sine_sum
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.recordings.rows import Rows
@@ -65,6 +65,11 @@ def by_hand(name, keys, x, zone):
     if name == "local_tooth_defect":
         off = np.mod(x - math.radians(keys["angle_deg"]) + np.pi, 2 * np.pi) - np.pi
         return keys["height_um"] * np.exp(-0.5 * (off / math.radians(keys["width_deg"])) ** 2)
+    if "form_heights_um" in keys:
+        place = np.mod(x / (2 * np.pi) * 162 - keys["form_start"], 162)
+        part = 2 * np.pi * np.mod(place, 1)
+        form = (1 - np.cos(part)) / 2 + keys["form_skew"] * np.sin(part)
+        return np.array(keys["form_heights_um"])[np.floor(place).astype(int)] * form
     if name == "tooth_mesh":
         total = 0.0 * x
         pattern = rf"zone_{zone + 1}_amplitude(?:_(plus|minus)_(\d))?_um"
@@ -231,6 +236,23 @@ def test_sums_of_sines_are_their_columns_and_slopes():
         assert value == pytest.approx(sine_columns(phase, harmonics) @ c, abs=1e-11)
         ahead = (sine_columns(phase + h, harmonics) - sine_columns(phase - h, harmonics)) @ c / (2 * h)
         assert slope == pytest.approx(ahead, abs=1e-3)
+
+
+def test_a_form_of_single_teeth_is_by_hand_and_its_slope_is_the_difference():
+    """Five teeth from 0.25 pitches on. Faults caught: a tooth counted from the wrong place, the pitch as the turn, a
+    slope per part of a tooth, a skew in the height's place."""
+    heights, skew, start = np.array([1.0, -2.0, 3.0, 0.5, 4.0]), 0.3, 0.25
+    forms = ToothForms(Spline.CIRCULAR, heights[:, None], skew, start)
+    angle = np.linspace(-9, 9, 700)
+    value, slope = forms.added(angle, 1, np.array([2.0]))
+    for at, found in zip(angle, value, strict=True):
+        place = (math.degrees(at) / 72 - start) % 5
+        part = 2 * math.pi * (place % 1)
+        assert found == pytest.approx(2 * heights[int(place)] * ((1 - math.cos(part)) / 2 + skew * math.sin(part)))
+    assert value == pytest.approx(forms.columns(angle, 0)[:, 0] * 2)
+    h = 1e-6
+    ahead = (forms.added(angle + h, 0, np.array([2.0]))[0] - forms.added(angle - h, 0, np.array([2.0]))[0]) / (2 * h)
+    assert slope == pytest.approx(ahead, abs=1e-4)
 
 
 TWINS = {

@@ -64,7 +64,7 @@ def test_keys_and_effect_are_inverse(study_with, name, keys):
     again = dict(effect_keys(effect, study.drive.geometry))
     # A set of sines may be written with more of them than were given, at amplitude 0.
     for key, value in keys.items():
-        assert again[key] == (pytest.approx(value) if isinstance(value, float) else value)
+        assert again[key] == (pytest.approx(value) if isinstance(value, float | list) else value)
     assert all(again[key] == 0 for key in again.keys() - keys.keys() if key.endswith(("_um", "_arcmin")))
     assert study_with({name: again}).effects[0].coefficients == pytest.approx(effect.coefficients, abs=1e-15)
 
@@ -283,6 +283,13 @@ def test_command_reports_effects(study_with, tmp_path, capsys):
         ),
         ("[effects.cs_tooth_harmonics]\nphase_2_deg = 1\n", "phase_2_deg needs effects.cs_tooth_harmonics.amplitude_2"),
         ("[effects.tooth_mesh]\n", "has no amplitude; give at least one of amplitude_arcmin"),
+        ("[effects.tooth_mesh]\nform_heights_um = [1.0, 2.0]\n", "has 2 heights; give one for each of the 162 teeth"),
+        (f"[effects.tooth_mesh]\nform_heights_um = {[0.0] * 162}\n", "form_heights_um are all 0; give heights"),
+        ("[effects.tooth_mesh]\nform_skew = 0.1\n", "has form_skew without form_heights_um"),
+        (
+            f"[effects.tooth_mesh]\namplitude_arcmin = 1\nphase_deg = 0\nform_heights_um = {[1.0] * 162}\n",
+            "has both sines and form_heights_um; give one of them",
+        ),
         ("[effects.torsional_windup]\nstiffness_1_nm_per_rad = 0\n", "has a stiffness of 0; give one above 0"),
         (
             "[effects.torsional_windup]\nstiffness_1_nm_per_rad = 3e4\nknee_1_nm = 14\n",
@@ -385,7 +392,7 @@ def test_every_effect_is_written_back_and_read(study_with, tmp_path, name, keys)
     read = again.effects[0].shape
     assert read.keys() == effect.shape.keys()
     for name_of, value in effect.shape.items():
-        assert read[name_of] == (pytest.approx(value, rel=1e-7) if isinstance(value, float) else value)
+        assert read[name_of] == (pytest.approx(value, rel=1e-7) if isinstance(value, float | tuple) else value)
     assert again.effects[0].coefficients == pytest.approx(effect.coefficients, rel=1e-6, abs=1e-9)
     np.testing.assert_allclose(again.errors.to_matrix(), study.errors.to_matrix(), rtol=1e-7)
     assert again.operation == Operation("backward", 20.0, pytest.approx(math.pi, rel=1e-5), 0.0, 0.0)

@@ -294,6 +294,7 @@ def without_ripple(monkeypatch):
         monkeypatch.setattr(stages, "refine", lambda fit, iterations: fit)
         monkeypatch.setattr(stages, "measure_noise", measure)
         monkeypatch.setattr(stages, "select", select)
+        monkeypatch.setattr(stages, "stands", lambda before, anew: False)
         monkeypatch.setattr(stages, "find_ripple", find)
         monkeypatch.setattr(stages, "subtracted_terms", lambda base, power, terms: (power, terms))
         ripple = np.array([-2.0, 2.0])
@@ -319,6 +320,21 @@ def test_a_ripple_is_named_anew_where_what_stands_beside_it_is_another(without_r
     assert without_ripple(("hysteresis",), ("hysteresis",), 3.0).again == 0
     assert without_ripple(("hysteresis",), ("thermal_drift",), 0.3).again == 1
     assert without_ripple(("hysteresis",), ("thermal_drift",), 0.1).again == 0
+
+
+@pytest.mark.parametrize(
+    ("in_zones", "left", "stand"), [(True, 2.0, True), (True, 0.5, False), (False, 2.0, False), (True, None, True)]
+)
+def test_a_ripple_in_the_zones_stands_where_a_second_look_leaves_more(in_zones, left, stand):
+    """Fault caught: the worse of two minima kept because it came last."""
+
+    def found(size, zones):
+        fit = SimpleNamespace(terms=[SimpleNamespace(in_zones=zones)], residual=size * np.array([-1.0, 1.0]))
+        return SimpleNamespace(best=SimpleNamespace(fit=fit))
+
+    anew = None if left is None else found(left, False)
+    assert stages.stands(found(1.0, in_zones), anew) is stand
+    assert not stages.stands(None, anew)
 
 
 @pytest.fixture

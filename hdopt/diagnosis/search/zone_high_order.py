@@ -5,7 +5,7 @@ and its mean rises: a slow bulge at each change of the driving zone that no sine
 ripple that was found is fitted once more on the rows as recorded, inside the larger-zone rule and with base and
 effects free beside it, and kept so if that explains the rows better. Teeth differ in height round the rim, so that the
 ripple has waves beside its own order: these come in step by step, each step from where the one before it ended, since
-a drive that was bent to the bulges does not find its way back at once.
+a drive that was bent to the bulges does not find its way back at once. At last every tooth has a height of its own.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from hdopt.diagnosis.inference.base_fit import thinned
 from hdopt.diagnosis.inference.catalogue import is_outside
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine, term_columns
 from hdopt.diagnosis.inference.nuisance import Nuisances
+from hdopt.diagnosis.search.tooth_heights import fit_heights
 from hdopt.effects.base import Explanation
 from hdopt.effects.term import Shape, Term
 from hdopt.recordings.rows import Rows
@@ -92,10 +93,24 @@ def _step_by_step(
         fit = refine(start, settings.base.full_iterations, move_shapes=False)
         waves = fit.coefficients[-1]
         found.append(fit)
+    found += _tooth_by_tooth(thin, low, found, effect)
     best = min(found, key=_score)
     terms = [*(term for term, _ in beside), effect.term(problem.rows, best.terms[-1].shape)]
     whole = evaluate(problem, best.errors, best.offsets, terms, best.coefficients)
     return refine(whole, settings.fit.known_iterations, move_shapes=False)
+
+
+def _tooth_by_tooth(thin: FitProblem, low: Fit, found: Sequence[Fit], effect: Explanation) -> list[Fit]:
+    """Fits with a height of every tooth from the wave at the mesh's order of the first `found`: from the drive of the
+    best of them, and from that of `low`.
+    """
+    few, best = found[0], min(found, key=_score)
+    fits = []
+    for shape in effect.tooth_by_tooth(few.terms[-1], best.coefficients[-1], thin.rows.ratio):
+        for drive in (best, low):
+            start = evaluate(thin, drive.errors, drive.offsets, few.terms[:-1], best.coefficients[:-1])
+            fits.append(fit_heights(start, effect.term(thin.rows, shape)))
+    return fits
 
 
 def _weighed(terms: Sequence[Term], fit: Fit) -> list[Weighed]:
@@ -123,12 +138,14 @@ def widened(waves: Array, width: int) -> Array:
 
 
 def _score(fit: Fit) -> float:
-    """Schwarz's criterion, in noise variances."""
-    weighed = fit.problem.weighed_rows
-    return fit.objective / fit.problem.noise.sigma**2 + sum(term.width for term in fit.terms) * math.log(weighed)
+    """Schwarz's criterion, in noise variances; heights of single teeth count one by one."""
+    free = sum(term.width + max(len(term.shape.get("heights", ())) - 1, 0) for term in fit.terms)
+    return fit.objective / fit.problem.noise.sigma**2 + free * math.log(fit.problem.weighed_rows)
 
 
 def _alone(fit: Fit, others: int) -> ZoneRipple:
     without = evaluate(fit.problem, fit.errors, fit.offsets, fit.terms[:others], fit.coefficients[:others])
-    alone = replace(fit, terms=fit.terms[others:], coefficients=fit.coefficients[others:])
+    # What stands beside is no part of it, so that no shape of it can be moved and fitted again.
+    held = tuple(replace(term, steps={}) for term in fit.terms[others:])
+    alone = replace(fit, terms=held, coefficients=fit.coefficients[others:])
     return ZoneRipple(alone, fit.prediction - without.prediction)
