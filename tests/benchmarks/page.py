@@ -76,6 +76,9 @@ BEARING = EFFECTS["bearing_pass"]
 CAGE = EffectValues(BEARING.id, *BEARING.values(BEARING.examples[1], CSF_25_80))
 ENCODER, WAVES = (EFFECTS[name] for name in ("encoder_output_eccentricity", "fs_tooth_harmonics"))
 OUTPUT = EffectValues(ENCODER.id, *ENCODER.values(ENCODER.examples[0], CSF_25_80))
+DEFECT, OF_LINES = (EFFECTS[name] for name in ("local_tooth_defect", "encoder_interpolation"))
+DAMAGED = EffectValues(DEFECT.id, *DEFECT.values(DEFECT.examples[0], CSF_25_80))
+LINES = EffectValues(OF_LINES.id, *OF_LINES.values(OF_LINES.examples[1], CSF_25_80))
 ON_FS = EffectValues(WAVES.id, *WAVES.values(WAVES.examples[0], CSF_25_80))
 BENCHES = {
     "none": ([], DRIVES // 4),
@@ -85,6 +88,8 @@ BENCHES = {
     "a bearing's cage, no whole turn": ([CAGE], DRIVES // 16),
     "an output encoder off its centre": ([OUTPUT], DRIVES // 16),
     "waves of the FS teeth": ([ON_FS], DRIVES // 16),
+    "a damaged FS tooth": ([DAMAGED], DRIVES // 64),
+    "an output encoder of 4001 lines": ([LINES], DRIVES // 64),
 }
 """Effects, and of how many drives."""
 
@@ -277,14 +282,11 @@ a few, in one run: on another machine the seconds differ, the ratios less.
 ## One drive's converged peak-to-peak
 """
 ON_DRIVES = """
-Effects that differ from turn to turn take 8 to 15 us a drive and direction, not the 4 that are wanted: 33 to 50 of 192
-bounds of cells (96, the least and the greatest) do not hold over all turns at once, and each then takes 0.13 us for 80
-turns side by side, 0.07 of it the lines themselves; 5 to 10 places are looked at after that. Effects with hundreds of
-cells a turn (a damaged tooth of the FS, an output encoder of 4001 lines) take 100 us. A ripple
-at the teeth is bounded by its envelope first: of 192 cells 12 may hold an extreme, and only these are parted to the
-wave's own scale; it takes 43 base kernels, not the 10 that are wanted, since 50 places are looked at after that, each
-in a trough or crest within second order (5e-3 arcmin) of the best. Inside the zones it takes 510 (3,700 before): the
-two zones' envelopes are taken as if their waves always met, so that 54 of 192 cells are parted.
+Here a drive counts one direction. Wanted are 4 us where effects differ from turn to turn (from the bearing's cage down)
+and 10 base kernels for a ripple at the teeth. What misses them looks at more: waves of the FS and effects of hundreds
+of cells a turn (a damaged tooth, an encoder of 4001 lines) at cells that no bound over all turns holds, and a ripple at
+all of its troughs and crests within second order of the best. Inside the zones the envelopes of both zones are taken as
+if their waves always met, so that more cells are parted than hold an extreme.
 
 The walks are what a plain program does and what Jia 2021's figures come from; on a fixed grid they stay below the
 converged value. Multiply-adds are those in single precision that the machine makes at its peak in the same time: what a
