@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numba
 import numpy as np
 import pytest
 from cases import PROFILES, drive, random_errors
@@ -9,8 +10,14 @@ from effect_examples import EXAMPLES, NAMES
 
 from hdopt.drive.geometry import Structure
 from hdopt.effects import EFFECTS
+from hdopt.kinematics.compiled_closed_form import OPTIONS
+from hdopt.kinematics.kernel import describe, design_of
+from hdopt.kinematics.lanes.motion import FS, LANES
 from hdopt.simulation import EffectValues, Operation, batch
 from hdopt.simulation.batch import matrix_peak_to_peak_arcmin, stacked_peak_to_peak_arcmin, tabulate
+from hdopt.simulation.turn import ripple, rows
+from hdopt.simulation.turn.effects import turn_of
+from hdopt.simulation.turn.scan import fill_parts
 from hdopt.study import load_study
 
 DRIVE = load_study(drive="csf-25-80").drive
@@ -120,6 +127,50 @@ def test_what_ripples_is_bounded_by_its_envelope():
     # What is slow is nothing here, so that the envelope is all: half as much again would look at cells for nothing.
     assert (turn.scan.below >= -least).all() and (turn.scan.below < -1.1 * least).all()
     assert (turn.scan.above >= greatest).all() and (turn.scan.above < 1.1 * greatest).all()
+
+
+@numba.njit(**OPTIONS)
+def bounds_of_parts(errors, work, near, design, turn, low):
+    """Fill `low` (parts of a turn, LANES) with what no drive falls below in any part, mm of arc."""
+    describe(errors, work)
+    fill_parts(work, design, turn)
+    ripple._describe(work, near, LANES, turn.fine.width)
+    for e in range(len(turn.fine.below) + 1):
+        ripple._bound_low(work, LANES, design, turn, e)
+        if e:
+            low[e - 1] = work[rows.NEAR + rows.LOW : rows.NEAR + rows.LOW + LANES]
+
+
+@pytest.mark.parametrize("scale", [0.0, 1.0, 3.0])
+@pytest.mark.parametrize(("order", "shift"), [(160, 0.0), (160, 2.0), (100, np.pi)])
+def test_no_part_of_a_cell_falls_below_its_bound(scale, order, shift):
+    """To first order, in every part of every drive: not by what waves of the zones go below their chords either. The
+    margin, of second order, hides that from the answers that others compare."""
+    places, per_part, amplitude = 32 * order, 9, 1e-3
+    angle = 2 * np.pi * np.arange(places) / places
+    waves = amplitude * np.cos(order * angle + np.array([[0.3], [0.3 + shift]]))
+    turn = turn_of(waves, np.zeros((2, 0)), 1, GEAR.arcmin_per_mm)
+    parts = len(turn.fine.below)
+    work = np.zeros(rows.BOUNDS + 2 * LANES * len(turn.scan.below), np.float32)
+    low, errors = np.zeros((parts, LANES)), random_errors(LANES, seed=11, scale=scale).to_matrix().T.ravel()
+    bounds_of_parts(errors, work, np.arange(LANES), design_of(DRIVE), turn, low)
+
+    def row(at):
+        return work[at : at + LANES].astype(float)
+
+    within = 2 * np.pi / parts * (np.arange(parts)[:, None] + np.linspace(0, 1, per_part)).ravel()[:, None]
+    cos, sin = np.cos(within), np.sin(within)
+    one, two = (amplitude * np.cos(order * within + phase) for phase in (0.3, 0.3 + shift))
+    t = row(rows.T_COS) * cos + row(rows.T_SIN) * sin + row(rows.T_0)
+    d = row(rows.D_COS) * cos + row(rows.D_SIN) * sin + row(rows.D_0) + (one - two) / 2
+    driving = np.abs(t) + (one + two) / 2 + np.maximum(0, np.abs(d) - row(FS))
+    least = driving.reshape(parts, per_part, LANES).min(axis=1)
+    # The base's own chords leave w^2/8 of what it swings by, single precision a few units in the last of 0.1 mm.
+    swing = np.hypot(row(rows.T_COS), row(rows.T_SIN)) + np.hypot(row(rows.D_COS), row(rows.D_SIN))
+    assert (low <= least + (2 * np.pi / parts) ** 2 / 8 * swing + 1e-7).all()
+    # A bound that holds for nothing would look at all: it keeps within the chords' own depth.
+    depth = 2 * float(turn.fine.below.max() + turn.fine.above.max())
+    assert np.quantile(least - low, 0.99) < depth + 1e-7
 
 
 def test_k_e_evens_out_the_zones_and_not_what_is_beside():
