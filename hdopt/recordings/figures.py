@@ -208,7 +208,8 @@ def slips(cells: Cells, quantum_arcmin: float) -> list[tuple[float, float]]:
     """Places (rad) where the error of `cells` steps and stays, and by how much (arcmin): counts that slipped.
 
     A step counts above eight times the scatter about both sides' straight lines, and above twice the encoder's step
-    `quantum_arcmin`; steps of one encoder step or less cannot be told.
+    `quantum_arcmin`; steps of one encoder step or less cannot be told. One that lies within a cell shows on both of its
+    sides, and counts once, at the larger.
     """
     n = SLIP_CELLS
     found: list[tuple[float, float]] = []
@@ -220,7 +221,7 @@ def slips(cells: Cells, quantum_arcmin: float) -> list[tuple[float, float]]:
         jump = np.diff(error)
         usual = 1.4826 * float(np.median(np.abs(jump - np.median(jump)))) + 1e-12
         for k in np.flatnonzero(np.abs(jump) > max(10 * usual, 2 * quantum_arcmin, 0.05)):
-            if n <= k < len(error) - n:
+            if n <= k < len(error) - n and abs(jump[k - 1]) < abs(jump[k]) >= abs(jump[k + 1]):
                 before, after = error[k - n + 1 : k + 1], error[k + 1 : k + 1 + n]
                 if abs(float(np.median(after) - np.median(before))) > 0.6 * abs(jump[k]):
                     found.append((float(cells.angle[rows][k]), _height(error, int(k))))
