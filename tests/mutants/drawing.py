@@ -20,9 +20,18 @@ from tests.mutants.hand_made import ROOT, Fault, faults_of, rooms
 SEED = 2026
 ON_BITS = ("BitOr", "BitAnd", "BitXor", "LShift", "RShift", "Invert")
 """Left out: on floats these raise, so that whatever runs the line notices; nine in ten mutants would be of them."""
-OVER_EVERY = {"effects": ("unit/test_effects.py", "unit/test_effect_numbers.py")}
-"""Properties over all that is registered in a room: they are about each of its files, which they do not name."""
-MOST_TEST_FILES = 3
+OVER_EVERY = {
+    "effects": (
+        "unit/test_effects.py",
+        "unit/test_effect_numbers.py",
+        "unit/test_effect_edges.py",
+        "unit/test_toy_effect.py",
+    ),
+    "formats": ("unit/test_recording_formats.py",),
+    "settings": ("unit/test_threshold_sensitivity.py",),
+}
+"""By folder or module: properties over all that is registered there, which do not name each of its files."""
+MOST_TEST_FILES = 6
 """A mutant that survives costs the quick tests of so many files."""
 
 
@@ -94,18 +103,21 @@ def _program(text: str) -> str:
 
 @cache
 def tests_of(file: str) -> tuple[str, ...]:
-    """Test files (below `tests`) that should notice what is wrong in `file`, three at most.
+    """Test files (below `tests`) that should notice what is wrong in `file`, `MOST_TEST_FILES` at most.
 
-    First come the file of its name and those over all that its room registers, then those that the faults made by hand
-    in it name, most often named first, then unit and validation tests that import it; where there are none of these,
-    those that import what imports it.
+    First come the file of its name and those over all that its folder registers, then those that the faults made by
+    hand in it name, most often named first, then unit and validation tests that import it; where there are none of
+    these, those that import what imports it.
     """
     named = Counter(
         test.split("::")[0] for room in rooms() for one in faults_of(room) if one.file == file for test in one.tests
     )
     tests = [*ROOT.glob("tests/unit/test_*.py"), *ROOT.glob("tests/validation/test_*.py")]
     own = [name for name in (f"unit/test_{Path(file).stem}.py",) if (ROOT / "tests" / name).exists()]
-    over_every = [*own, *OVER_EVERY.get(Path(file).parent.name, ())]
+    over_every = [
+        *own,
+        *(test for name in (Path(file).parent.name, Path(file).stem) for test in OVER_EVERY.get(name, ())),
+    ]
     found = [*over_every, *(test for test, _ in named.most_common()), *_tests_importing(file, tests)]
     for other in [] if len(found) > len(over_every) else _importing(file, ROOT.glob("hdopt/*/*.py")):
         found += _tests_importing(str(other.relative_to(ROOT)), tests)

@@ -1,0 +1,382 @@
+"""What effects need, offer and refuse, at their bounds; and over all of them: that a search finds its own effect."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_effect_physics import GEAR, RATE, RATIO, TURN, moving
+from test_windup_curves import fit_of
+
+from hdopt.diagnosis.inference.fit import refine
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.effects import EFFECTS
+from hdopt.effects import hysteresis as friction
+from hdopt.effects._friction_torque import friction_columns
+from hdopt.effects._zone_harmonics import strongest_few
+from hdopt.effects.declared import REQUIRED, Numbers, Quantity, Sines
+from hdopt.effects.encoder_interpolation import beside_the_mesh
+from hdopt.effects.estimate import FitEstimate
+from hdopt.effects.grid_search import Axis
+from hdopt.effects.local_tooth_defect import WIDEST_DEG, WIDEST_OUTPUT_DEG, Seat
+from hdopt.effects.requirements import requirement
+from hdopt.effects.term import Term
+from hdopt.errors import HdoptError, MissingValue
+
+EACH = pytest.mark.parametrize("effect", EFFECTS.values(), ids=EFFECTS)
+RECORD = moving((14, 14, 14))
+
+
+def columns_of(effect, example):
+    """What an effect adds at the output at an `example`, arcmin; None of one that acts in the zones, that another
+    number of teeth has, or that this record, with 120 rows a turn, cannot show."""
+    defaults = {i.key: i.default for i in effect.flat_declared() if isinstance(i.default, (str, float, int))}
+    try:
+        shape, coefficients = effect.values({**defaults, **example}, GEAR)
+    except HdoptError:
+        return None
+    if effect.highest_order(shape, RATIO) > 0.4 * RATE:
+        return None
+    term = effect.predict(RECORD, shape, np.zeros(len(RECORD)))
+    return None if term.columns is None or effect.lacks(RECORD) else term.columns @ np.array(coefficients)
+
+
+OWN = [
+    pytest.param(effect, example, hidden, id=f"{effect.id}-{number}")
+    for effect in EFFECTS.values()
+    for number, example in enumerate(effect.examples)
+    if effect.id != "torsional_windup" and (hidden := columns_of(effect, example)) is not None
+]
+"""Effects that act at the output or the bench with each of their examples; the windup has a file of its own."""
+
+
+@pytest.mark.parametrize(("effect", "example", "hidden"), OWN)
+def test_a_search_offers_what_a_fit_makes_the_effect_of(effect, example, hidden):
+    """Of a record that holds an example and nothing else a fit from an offered term leaves a thousandth, and has the
+    example's own numbers. Would catch a grid in another unit or without its ends, and a variant that is not offered."""
+    offered = effect.search(FitProbe(refine(fit_of(RECORD, hidden), 2)))
+    fits = (refine(fit_of(RECORD, hidden, [term]), 10) for term in offered)
+    best = next((fit for fit in fits if np.std(fit.residual) < 1e-3 * np.std(hidden)), None)
+    assert best is not None
+    found = effect.keys(best.terms[0].shape, best.coefficients[0], GEAR)
+    # Lines of one shaft are lines of the other too, where these are whole: then their phase counts from its angle.
+    alike = all(found[k] == v for k, v in example.items() if isinstance(v, str) and k in found)
+    numbers = {k: v for k, v in example.items() if isinstance(v, float) and k in found and (alike or "phase" not in k)}
+    assert numbers
+    for key, value in numbers.items():
+        whole_turns = 360 * round((found[key] - value) / 360) if key.endswith("_deg") else 0.0
+        assert found[key] - whole_turns == pytest.approx(value, rel=0.01, abs=1e-3), key
+
+
+def test_the_search_was_asked_of_most_effects():
+    assert len({param.values[0].id for param in OWN}) >= 9
+
+
+# what an effect declares
+
+
+@EACH
+def test_no_sine_has_an_amplitude_below_zero(effect):
+    """A sign is a phase: an amplitude of -1 would be one beside another phase without a word."""
+    for one in effect.declared:
+        if isinstance(one, Sines):
+            amplitudes = [q for q in one.quantities() if q.unit == one.unit]
+            assert amplitudes and all(q.at_least == 0.0 and q.prior == one.prior for q in amplitudes)
+            assert one.prior is not None and 0.0 <= one.prior[0] < one.prior[1]
+
+
+@EACH
+def test_the_one_sine_of_an_effect_must_be_given(effect):
+    for one in effect.declared:
+        if isinstance(one, Sines) and len(one.members) == 1:
+            beside = [
+                other for other in effect.declared if isinstance(other, Quantity | Numbers | Sines) and other != one
+            ]
+            assert beside or all(q.default is REQUIRED for q in one.quantities())
+
+
+@EACH
+def test_the_highest_of_the_orders_decides_how_fine_a_grid_is(effect):
+    """Would catch the lowest taken for it: a wave would be walked over with too few angles."""
+    for example in effect.examples:
+        defaults = {i.key: i.default for i in effect.flat_declared() if isinstance(i.default, (str, float, int))}
+        try:
+            shape, _ = effect.values({**defaults, **example}, GEAR)
+        except HdoptError:  # other numbers of teeth
+            continue
+        orders = effect.orders(shape, RATIO)
+        assert effect.highest_order(shape, RATIO) >= max(orders, default=0.0)
+
+
+# what a record must hold
+
+
+def still(**changes):
+    c = moving()
+    return replace(c, direction=np.ones(len(c)), **changes)
+
+
+@pytest.mark.parametrize(
+    ("domain", "having", "lacking", "said"),
+    [
+        ("reversal", {}, still(), "a reversal"),
+        ("direction", {}, still(), "a reversal"),
+        ("torque", {}, moving(torque=None), "a torque column"),
+        ("torque", {}, moving(torque=np.zeros(18 * RATE)), "torque that varies"),
+        ("speed", {"speed": np.linspace(2, 3, 18 * RATE)}, moving(speed=None), "a time column"),
+        ("speed", {"speed": np.linspace(2, 3, 18 * RATE)}, moving(speed=np.full(18 * RATE, 2.0)), "speed that varies"),
+        ("temperature", {}, moving(temperature=None), "a temperature column"),
+        ("temperature", {}, moving(temperature=np.full(18 * RATE, 20.0)), "temperature that varies"),
+        ("time", {}, moving(time=None), "a time column"),
+        ("angle", {}, moving((1,), theta=np.linspace(0, 0.9 * TURN, RATE)), "a whole input turn"),
+    ],
+)
+def test_each_domain_needs_its_channel(domain, having, lacking, said):
+    assert requirement(domain, moving(**having)) is None
+    assert requirement(domain, lacking) == said
+
+
+@pytest.mark.parametrize(
+    ("domain", "channel", "least"), [("torque", "torque", 0.02), ("speed", "speed", 0.003)], ids=["torque", "speed"]
+)
+def test_a_channel_varies_from_a_share_of_its_largest_value(domain, channel, least):
+    """Half of the rows at 1 and half at 1 - 2 d have the standard deviation d: a little more, and a little less."""
+    for share, varies in ((1.15 * least, True), (0.85 * least, False)):
+        values = 10 * (1 - 2 * share * (np.arange(18 * RATE) % 2))
+        assert (requirement(domain, moving(**{channel: values})) is None) == varies
+
+
+@pytest.mark.parametrize(("span", "varies"), [(0.025, True), (0.015, False)])
+def test_a_bench_warms_from_a_fiftieth_of_a_kelvin(span, varies):
+    found = requirement("temperature", moving(temperature=20 + np.linspace(0, span, 18 * RATE)))
+    assert (found is None) == varies
+
+
+@pytest.mark.parametrize(
+    ("name", "turns"),
+    [("encoder_input_eccentricity", 1.0), ("output_coupling", 7.5), ("encoder_output_eccentricity", 10.0)],
+)
+def test_a_shafts_sine_needs_a_turn_of_its_shaft_or_the_least_part_of_it(name, turns):
+    """In turns of the input, at N = 50: of an output encoder a fifth of an output turn, of a coupling 0.15 of one."""
+    effect = EFFECTS[name]
+    for share, shown in ((1.1, True), (0.9, False)):
+        c = moving((25,), theta=np.linspace(0, share * turns * TURN, 25 * RATE))
+        assert (effect.lacks(c) is None) == shown
+
+
+# bounds of shapes and studies
+
+
+@pytest.mark.parametrize(
+    ("seat", "widest"), [(Seat.CIRCULAR_SPLINE, WIDEST_DEG), (Seat.OUTPUT, WIDEST_OUTPUT_DEG * RATIO)]
+)
+def test_a_pulse_that_is_too_wide_for_its_seat_is_refused(seat, widest):
+    height = {"height_um": 4.0} if seat.in_zones else {"height_arcmin": 0.2}
+    keys = {"on": seat.value, "angle_deg": 90.0, **height}
+    shape, _ = EFFECTS["local_tooth_defect"].values({**keys, "width_deg": 0.99 * widest}, GEAR)
+    assert shape["width_deg"] == 0.99 * widest
+    with pytest.raises(HdoptError, match=f"is at most {widest:g} deg"):
+        EFFECTS["local_tooth_defect"].values({**keys, "width_deg": 1.01 * widest}, GEAR)
+
+
+def test_a_pulse_is_weighed_by_how_often_its_place_was_met():
+    """Three whole turns with a pulse of 1 at 200 deg, and twenty strokes over the first quarter with one of 0.3 at 45:
+    in deviations of one meeting 1 x sqrt(3) = 1.7 and 0.3 x sqrt(23) = 1.4."""
+    whole, stroke = np.linspace(0, 3 * TURN, 3000, endpoint=False), np.linspace(0, TURN / 4, 250, endpoint=False)
+    theta = np.concatenate([whole, *[stroke] * 20])
+    residual = sum(
+        height * np.exp(-0.5 * ((np.mod(np.degrees(theta), 360) - at) / 3) ** 2)
+        for at, height in ((200, 1.0), (45, 0.3))
+    )
+    probe = SimpleNamespace(residual=residual, samples=SimpleNamespace(ratio=RATIO))
+    found = EFFECTS["local_tooth_defect"]._candidates(probe, theta, TURN, Seat.CIRCULAR_SPLINE_ONCE)
+    strongest = [centre for centre, width in found[1::2] if width < 6]
+    assert strongest and np.degrees(strongest) == pytest.approx([200.0] * len(strongest), abs=3.0)
+
+
+def test_lines_of_balls_need_their_number():
+    """The cage alone needs none; with the balls at the outer race it does."""
+    cage = {"ball_to_pitch_ratio": 0.2, "cage_arcmin": 0.1, "cage_phase_deg": 0.0}
+    effect = EFFECTS["bearing_pass"]
+    names = {item.key for item in effect.flat_declared()}
+    cage = {k: v for k, v in cage.items() if k in names}
+    assert len(cage) == 3
+    effect.values(cage, GEAR)
+    outer = next(name for name in names if "outer" in name and name.endswith("_arcmin"))
+    with pytest.raises(MissingValue, match="balls"):
+        effect.values({**cage, outer: 0.1, outer.replace("_arcmin", "_phase_deg"): 0.0}, GEAR)
+
+
+def test_waves_of_unequal_balls_stand_at_the_cages_place():
+    """Balls go round at half the sum of both rings' surface speeds, (1 + d/D)(1 + 1/N)/2 against the wave generator:
+    even waves meet both zones alike, odd ones once a turn more."""
+    place = 1.2 * (1 + 1 / RATIO) / 2
+    effect = EFFECTS["bearing_pass"]
+    shape = {"ball_to_pitch_ratio": 0.2, "balls": 0, "zones": (1, 2, 3)}
+    assert effect.orders(shape, RATIO) == pytest.approx([1 + place, 2 * place, 1 + 3 * place])
+
+
+def test_the_unknown_start_behind_friction_fades_over_its_torque():
+    c = moving(locked=True, theta=np.zeros(18 * RATE))
+    columns = friction_columns(c, 2.5, 8.0)
+    np.testing.assert_allclose(columns[:, 2], np.where(c.first, np.exp(-c.travel / 2.5), 0.0))
+
+
+def test_friction_of_a_locked_input_is_looked_for_in_shares_of_its_torque(monkeypatch):
+    """Each share for the friction and each for the knee, of 20 Nm."""
+    asked = []
+    monkeypatch.setattr(friction, "best_terms", lambda probe, terms, most=1: asked.extend(terms) or terms[:1])
+    c = moving(locked=True, theta=np.zeros(18 * RATE))
+    probe = FitProbe(fit_of(c, np.zeros(len(c))))
+    EFFECTS["hysteresis"].search(probe)
+    reached = float(np.max(np.abs(c.torque)))
+    wanted = {(round(f * reached, 9), round(k * reached, 9)) for f in friction.SHARES for k in friction.SHARES}
+    assert {(round(t.shape["friction_nm"], 9), round(t.shape["knee_nm"], 9)) for t in asked} == wanted
+
+
+def test_a_smooth_windup_is_not_offered_at_a_locked_input():
+    """The friction ahead of the spring is written for a curve of straight lines."""
+    c = moving(locked=True, theta=np.zeros(18 * RATE))
+    wound = 0.02 * np.sign(c.torque) * np.abs(c.torque) ** 0.7
+    offered = EFFECTS["torsional_windup"].search(FitProbe(fit_of(c, wound)))
+    assert offered and not any("hardening" in term.shape for term in offered)
+
+
+def test_few_harmonics_end_where_the_least_adds_nothing():
+    """Orthogonal waves that explain 100, 25 and 0.01: the third, less than 0.002 of all, is what a shape leaves."""
+    moment = np.array([10.0, 0.0, 5.0, 0.0, 0.1, 0.0])
+    assert strongest_few(np.eye(6), moment, (4, 7, 9), 3) == [(4,), (4, 7)]
+    moment[4] = 1.0  # 0.008 of all
+    assert strongest_few(np.eye(6), moment, (4, 7, 9), 3) == [(4,), (4, 7), (4, 7, 9)]
+
+
+def test_the_teeth_own_orders_about_the_mesh():
+    """102 for N = 50 and its sidebands, up to 12 off, each 3.5 fiftieths wide."""
+    orders = np.array([102.0, 102.06, 102.08, 110.0, 113.95, 114.05, 90.05, 89.95, 50.0])
+    assert beside_the_mesh(orders, RATIO).tolist() == [True, True, False, True, True, False, True, False, False]
+
+
+@pytest.mark.parametrize(("low", "high"), [(1.0, 100.0), (-1.0, 1.0)])
+def test_a_step_for_the_derivative_is_the_same_part_of_the_grids_distance_everywhere(low, high):
+    axis = Axis("x", low, high)
+    apart = np.diff(np.log(axis.grid) if axis.by_ratio else axis.grid)
+    for value, gap in zip(axis.grid[1:-1], apart[1:], strict=True):
+        share = axis.step(value) / (value if axis.by_ratio else 1.0) / gap
+        assert share == pytest.approx(axis.step(axis.grid[1]) / (axis.grid[1] if axis.by_ratio else 1.0) / apart[0])
+        assert 1e-4 < share < 0.2
+
+
+# estimates
+
+
+def test_an_amplitude_that_may_be_nothing_begins_at_nothing():
+    """Of sine and cosine known to 0.1 each, 0.15 in all is within 1.96 deviations of nothing, 0.25 is not: there the
+    ends are the amplitude and 1.96 deviations, by the circle about it."""
+    for size, low in ((0.15, 0.0), (0.25, 0.25 - 0.196)):
+        found = FitEstimate(size * np.array([0.6, 0.8]), 0.01 * np.eye(2)).amplitude(0, 1)
+        assert found.value == pytest.approx(size)
+        assert (found.low, found.high) == pytest.approx((low, size + 0.196), abs=1e-5)
+
+
+@pytest.mark.parametrize("phase", [20.0, 170.0, 180.0])
+def test_a_phase_whose_size_is_known_exactly_in_one_part_has_its_gradients_interval(phase):
+    """Amplitude 1, the sine known exactly and the cosine to 0.01: the phase moves by 0.01 cos(phase) rad, also across
+    half a turn."""
+    values = np.array([math.cos(math.radians(phase)), math.sin(math.radians(phase))])
+    found = FitEstimate(values, np.diag([0.0, 1e-4])).phase_deg(0, 1)
+    half = math.degrees(1.96 * 0.01 * abs(math.cos(math.radians(phase))))
+    assert found.value == pytest.approx(phase)
+    assert (found.low, found.high) == pytest.approx((phase - half, phase + half), abs=1e-6)
+
+
+@pytest.mark.parametrize("stretch", [0, 1, 2])
+def test_the_stiffness_of_a_stretch_is_the_inverse_of_its_compliance(stretch):
+    """A coefficient of 2 is 2e-5 rad/Nm, 50,000 Nm/rad; known to 1 % it is known to 1 %."""
+    values = np.array([4.0, 4.0, 4.0, 5.0, 12.0])
+    values[stretch] = 2.0
+    term = Term("torsional_windup", {"knee_1": 5.0, "knee_2": 12.0}, columns=np.ones((3, 3)))
+    estimate = FitEstimate(values, np.diag((0.01 * values) ** 2))
+    found = EFFECTS["torsional_windup"].parameters(replace(term, steps={"knee_1": 1.0, "knee_2": 1.0}), estimate)
+    stiff = found[f"stiffness_{stretch + 1}"]
+    assert stiff.value == pytest.approx(50_000)
+    assert stiff.high - stiff.value == pytest.approx(1.96 * 500, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["cs_tooth_harmonics", "fs_tooth_harmonics"])
+def test_each_wave_of_the_teeth_has_its_own_pair_in_um(name):
+    """Sine 3 and cosine 4 um are 5 um, 5 and 12 are 13; their phases the angles whose tangents are 4/3 and 12/5."""
+    effect = EFFECTS[name]
+    example = {"amplitude_2_um": 5.0, "phase_2_deg": 53.13, "amplitude_3_um": 13.0, "phase_3_deg": 67.38}
+    shape, coefficients = effect.values(example, GEAR)
+    assert np.array(coefficients) == pytest.approx(np.array([3.0, 4.0, 5.0, 12.0]) * 1e-3, rel=1e-4)
+    term = Term(name, dict(shape), columns=np.ones((3, 4)))
+    found = effect.parameters(term, FitEstimate(np.array(coefficients), 1e-12 * np.eye(4)))
+    assert {k: p.value for k, p in found.items()} == pytest.approx(example, rel=1e-4)
+
+
+SINES_OF_EACH = [
+    pytest.param(effect, one, member, id=f"{effect.id}-{one.members[member][0]}")
+    for effect in EFFECTS.values()
+    for one in effect.declared
+    if isinstance(one, Sines)
+    for member in one.members
+]
+
+
+@pytest.mark.parametrize(("effect", "sines", "member"), SINES_OF_EACH)
+def test_every_sine_that_may_be_said_goes_into_the_fit_and_back(effect, sines, member):
+    """Each alone beside the rest of an example: would catch a wave that no set of waves has, another wave's place, and
+    a phase or scale that is not its own."""
+    amplitude, phase = sines.members[member]
+    others = {key for one in effect.declared if isinstance(one, Sines) for pair in one.members.values() for key in pair}
+    example = next(e for e in effect.examples if any(k in e for pair in sines.members.values() for k in pair))
+    plain = {key: value for key, value in example.items() if key not in others}
+    defaults = {i.key: i.default for i in effect.flat_declared() if isinstance(i.default, (str, float, int))}
+    said = {**plain, amplitude: 0.7, phase: 25.0}
+    try:
+        shape, coefficients = effect.values({**defaults, "balls": 12, **said}, GEAR)
+    except HdoptError as refused:  # harmonics beyond the widest set that is looked for are of as many balls
+        assert effect.id == "bearing_pass" and "as many balls" in str(refused)
+        shape, coefficients = effect.values({**defaults, **said, "balls": member}, GEAR)
+    found = {k: v for k, v in effect.keys(shape, coefficients, GEAR).items() if k in others}
+    assert found[amplitude] == pytest.approx(0.7) and found[phase] == pytest.approx(25.0)
+    assert all(abs(v) < 1e-12 for k, v in found.items() if k != amplitude and "phase" not in k)
+
+
+@pytest.mark.parametrize(("share", "told"), [(1.9, False), (2.1, True)])
+def test_balls_are_counted_where_their_wave_is_twice_the_usual_one(share, told):
+    """The other waves are 4, 5 and 6 um, the usual one 5."""
+    effect = EFFECTS["bearing_pass"]
+    term = Term(effect.id, {"ball_to_pitch_ratio": 0.2, "balls": 12, "zones": (1, 2, 3)}, zones=np.zeros((2, 3, 8)))
+    values = np.array([0.004, 0.0, 0.005, 0.0, 0.006, 0.0, 0.005 * share, 0.0, 0.2])
+    found = effect.parameters(term, FitEstimate(values, 1e-12 * np.eye(9)))
+    assert ("balls" in found) == told
+    assert found["unequal_um"].value == pytest.approx(4.0)
+
+
+def test_stiff_resonances_begin_where_sixteen_waves_of_a_turn_are(monkeypatch):
+    """At 10 input turns a second 160 Hz, and 2000 Hz at most."""
+    effect = EFFECTS["resonance"]
+    monkeypatch.setattr(type(effect), "term", lambda self, conditions, shape, motion=None: shape["frequency_hz"])
+    probe = SimpleNamespace(samples=SimpleNamespace(known_speed=np.full(9, -10 * TURN)), motion=None)
+    found = effect.beyond_search(probe)
+    assert (found[0], found[-1]) == pytest.approx((160.0, 2000.0))
+
+
+@pytest.mark.parametrize("friction", [2.4, 7.7])
+def test_play_of_a_locked_input_is_crossed_at_the_torque_of_the_friction(friction):
+    c = moving(locked=True, theta=np.zeros(18 * RATE))
+    side = EFFECTS["lost_motion"].term(c, {"friction_nm": friction}).columns[:, 0]
+    assert np.array_equal(side, 0.5 * np.where(c.torque > friction * c.direction, 1.0, -1.0))
+
+
+def test_a_defect_of_the_output_is_looked_for_in_parts_of_its_widest():
+    """6 deg of the output at N = 50 are 300 of the input: 15 to 240 of them, beside those of a tooth in a zone."""
+    theta = np.linspace(0, 2 * RATIO * TURN, 5000)
+    probe = SimpleNamespace(residual=np.cos(theta / 9), samples=SimpleNamespace(ratio=RATIO))
+    effect = EFFECTS["local_tooth_defect"]
+    found = effect._candidates(probe, theta, TURN * RATIO, Seat.OUTPUT)
+    assert sorted({w for _, w in found}) == pytest.approx([1.2, 2.5, 5.0, 10.0, 15.0, 30.0, 60.0, 120.0, 240.0])
