@@ -14,10 +14,12 @@ from hypothesis import strategies as st
 from wave_generators import drive, scaled
 
 from hdopt.drive.geometry import Structure
+from hdopt.geometry import assembly_sheet as assembly_drawing
 from hdopt.geometry.assembly_sheet import uncrossed
 from hdopt.geometry.balloons import APART, RADIUS, places_around
 from hdopt.geometry.callouts import callouts_of
 from hdopt.geometry.digits import rounded
+from hdopt.geometry.drawing import Placed
 from hdopt.geometry.export import export_drive
 from hdopt.geometry.inspection import inspection_plan
 from hdopt.geometry.job import make_job
@@ -82,6 +84,19 @@ def cut_without_outline(sheet):
     cut = [mark.outer for mark in sheet.marks if isinstance(mark, Area) and mark.outer[:, 0].max() < 270]
     far = [ring[at] for ring in cut for at in (*ring.argmin(0), *ring.argmax(0))]
     return [tuple(point) for point in far if np.hypot(*(seen - point).T).min() > 0.2]
+
+
+def test_every_cut_face_has_its_own_outline(monkeypatch):
+    """Whatever lies behind it: each ring of a hatched face is a closed visible line, hole or outside."""
+    monkeypatch.setattr(assembly_drawing, "draw_view", lambda *_: None)
+    sheet = Sheet(WIDTH, HEIGHT, "section", "")
+    assembly_drawing.draw_section(sheet, Placed((90.0, 96.0), 1.0), list(job_of(*CASES[0]).made))
+    closed = [mark.points for mark in sheet.marks if isinstance(mark, Line) and mark.kind == "visible" and mark.closed]
+    areas = [mark for mark in sheet.marks if isinstance(mark, Area)]
+    assert len(areas) > 2
+    for area in areas:
+        for ring in (area.outer, *area.holes):
+            assert any(len(line) == len(ring) and np.allclose(line, ring) for line in closed)
 
 
 def crossed(sheet):
