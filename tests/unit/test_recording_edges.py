@@ -7,6 +7,7 @@ import pytest
 from hdopt.drive.geometry import ARCMIN
 from hdopt.errors import HdoptError
 from hdopt.recordings import figures
+from hdopt.recordings.checks import steps_arcmin
 from hdopt.recordings.clocks import on_one_clock
 from hdopt.recordings.columns import choose_columns
 from hdopt.recordings.decision import decide, verdict_line
@@ -137,7 +138,28 @@ def test_what_is_missing_among_the_columns_is_named():
         choose_columns(Table({"motor_angle_deg": Channel(angle), "other": Channel(angle)}), "file")
 
 
+def test_a_column_whose_name_ends_with_another_unit_is_no_angle():
+    """The motor's torque, temperature, clock and speed are not its angle, whatever stands before the unit."""
+    names = ["motor_deg", "load pos [deg]", "motor_torque_Nm", "motor temp (C)", "motor_time_s", "motor_speed_deg"]
+    angle = np.linspace(0, 50, 200)
+    found, _ = choose_columns(Table({name: Channel(angle) for name in names}), "file")
+    assert {channel: column.name for channel, column in found.items()} == {
+        "time": "motor_time_s",
+        "input": "motor_deg",
+        "output": "load pos [deg]",
+        "torque": "motor_torque_Nm",
+        "temperature": "motor temp (C)",
+    }
+
+
 # the step of an encoder
+
+
+@pytest.mark.parametrize(("step", "told"), [(0.015, 0.0), (0.03, 0.03)])
+def test_an_encoders_step_counts_from_a_fiftieth_of_an_arcmin(step, told):
+    """At the output; a finer one no drive can tell from a line."""
+    error = np.round(2.0 * np.sin(2.3 * THETA) / step) * step * ARCMIN
+    assert steps_arcmin(rows_of(error=error))["error"] == pytest.approx(told, rel=1e-3)
 
 
 @pytest.mark.parametrize(("off", "found"), [(0.017, 1.0), (0.025, 0.0)])
