@@ -12,56 +12,94 @@ from hdopt.late import late
 
 
 def sine_columns(phase: Array, harmonics: Sequence[float] | Array) -> Array:
-    """sin and cos of each of `harmonics` (k) times `phase` (n,), rad: shape (n, 2 k), each sine before its cosine."""
+    """sin and cos of each of `harmonics` (k) times `phase` (n,), rad: shape (n, 2 k), each sine before its cosine.
+    Every column lies in one piece, as filters and products read it.
+    """
     phase, multiples = np.ascontiguousarray(phase, float), np.asarray(harmonics, float)
+    run = _run_of(multiples, STEPS * len(multiples))
+    if run is None or len(multiples) == 1:
+        return _sines(phase, multiples).T
+    place = np.full(run[-1] - run[0], -1)
+    place[multiples.astype(np.int64) - run[0] - 1] = np.arange(len(multiples))
+    return _whole_sines(phase, place, run[0], len(multiples)).T
+
+
+STEPS = 4
+"""Whole multiples gone through for each that is wanted up to which the addition theorems are quicker than its sine."""
+FEW_STEPS = 16
+"""Multiples up to which they are quicker than a sine of each, and than another one to begin with."""
+FEWEST_IN_A_RUN = 3
+"""Multiples, none of them low, for which it pays to begin with another sine."""
+LANES = 32
+"""Angles worked on at a time, each in a lane of the processor's vectors: none waits for the others' sums."""
+
+
+def _run_of(multiples: Array, most: int) -> range | None:
+    """Whole numbers up to the highest of `multiples` (k,), from 0 or from one below the lowest, where all are whole and
+    at most so many steps (`most`) lead over them; else None.
+    """
     whole = multiples.astype(np.int64)
-    if len(whole) > 1 and np.all(whole == multiples) and 0 < whole.min() and whole.max() <= 4 * len(whole):
-        return _whole_sines(phase, whole)
-    return _sines(phase, multiples)
+    if not len(whole) or np.any(whole != multiples) or whole.min() <= 0:
+        return None
+    before = 0 if whole.min() <= FEW_STEPS or len(whole) < FEWEST_IN_A_RUN else int(whole.min()) - 1
+    steps = int(whole.max()) - before
+    return range(before, before + steps + 1) if steps <= most else None
 
 
 @late(calls=0)
 def _sines(phase: Array, harmonics: Array) -> Array:
-    columns = np.empty((len(phase), 2 * len(harmonics)))
-    for i in range(len(phase)):
-        for k in range(len(harmonics)):
-            columns[i, 2 * k] = math.sin(harmonics[k] * phase[i])
-            columns[i, 2 * k + 1] = math.cos(harmonics[k] * phase[i])
+    """The columns of `sine_columns` as rows, (2 k, n)."""
+    columns = np.empty((2 * len(harmonics), len(phase)))
+    for k in range(len(harmonics)):
+        for i in range(len(phase)):
+            columns[2 * k, i] = math.sin(harmonics[k] * phase[i])
+            columns[2 * k + 1, i] = math.cos(harmonics[k] * phase[i])
     return columns
 
 
 @late(calls=0)
-def _whole_sines(phase: Array, harmonics: Index) -> Array:
-    """The same for whole multiples, each from the one before by the sine's and cosine's addition theorems."""
-    columns = np.empty((len(phase), 2 * len(harmonics)))
-    place = np.full(harmonics.max() + 1, -1)
-    for k in range(len(harmonics)):
-        place[harmonics[k]] = k
-    for i in range(len(phase)):
-        sine, cosine = math.sin(phase[i]), math.cos(phase[i])
-        s, c = 0.0, 1.0
-        for h in range(1, len(place)):
-            s, c = s * cosine + c * sine, c * cosine - s * sine
-            if place[h] >= 0:
-                columns[i, 2 * place[h]] = s
-                columns[i, 2 * place[h] + 1] = c
+def _whole_sines(phase: Array, place: Index, before: int, count: int) -> Array:
+    """The same for `count` whole multiples, by the sine's and cosine's addition theorems from the multiple `before`
+    on: `place` (h,) says which of them each of the next h is, -1 for none.
+    """
+    rows = len(phase)
+    columns = np.empty((2 * count, rows))
+    sine, cosine, s, c = np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES)
+    for start in range(0, rows, LANES):
+        here = min(LANES, rows - start)
+        for i in range(here):
+            sine[i], cosine[i] = math.sin(phase[start + i]), math.cos(phase[start + i])
+        _begin(phase, start, here, before, s, c)
+        for at in place:
+            for i in range(LANES):
+                s[i], c[i] = s[i] * cosine[i] + c[i] * sine[i], c[i] * cosine[i] - s[i] * sine[i]
+            if at >= 0:
+                for i in range(here):
+                    columns[2 * at, start + i] = s[i]
+                    columns[2 * at + 1, start + i] = c[i]
     return columns
+
+
+@late(calls=0)
+def _begin(phase: Array, start: int, here: int, before: int, s: Array, c: Array) -> None:
+    """Sine and cosine of `before` times the `phase` (n,) of so many rows (`here`) from `start` on, into `s` and `c`."""
+    s[:], c[:] = 0.0, 1.0
+    if before:
+        for i in range(here):
+            s[i], c[i] = math.sin(before * phase[start + i]), math.cos(before * phase[start + i])
 
 
 def sine_sum(phase: Array, harmonics: Sequence[float] | Array, coefficients: Array) -> tuple[Array, Array]:
     """The columns of `sine_columns` at `phase` (n,) and `harmonics` (k,) times `coefficients` (2 k,), and the slope of
     their sum over the phase, (n,) each."""
     phase, multiples = np.ascontiguousarray(phase, float), np.asarray(harmonics, float)
-    whole = multiples.astype(np.int64)
-    if np.all(whole == multiples) and 0 < whole.min() and whole.max() <= max(4 * len(whole), FEW_STEPS):
-        by_order = np.zeros((2, whole.max() + 1))
-        by_order[0, whole], by_order[1, whole] = coefficients[0::2], coefficients[1::2]
-        return _whole_sum(phase, by_order)
-    return _sum(phase, multiples, np.ascontiguousarray(coefficients, float))
-
-
-FEW_STEPS = 16
-"""Multiples up to which the addition theorems are quicker than a sine of each."""
+    run = _run_of(multiples, max(STEPS * len(multiples), FEW_STEPS))
+    if run is None:
+        return _sum(phase, multiples, np.ascontiguousarray(coefficients, float))
+    by_order = np.zeros((2, len(run) - 1))
+    at = multiples.astype(np.int64) - run[0] - 1
+    by_order[0, at], by_order[1, at] = coefficients[0::2], coefficients[1::2]
+    return _whole_sum(phase, by_order, run[0])
 
 
 @late(calls=0)
@@ -76,29 +114,26 @@ def _sum(phase: Array, harmonics: Array, coefficients: Array) -> tuple[Array, Ar
     return value, slope
 
 
-LANES = 32
-"""Angles worked on at a time, each in a lane of the processor's vectors: none waits for the others' sums."""
-
-
 @late(calls=0)
-def _whole_sum(phase: Array, by_order: Array) -> tuple[Array, Array]:
-    """The same where `by_order` (2, h + 1) holds the coefficients of sine and cosine of every whole multiple."""
+def _whole_sum(phase: Array, by_order: Array, before: int) -> tuple[Array, Array]:
+    """The same where `by_order` (2, h) holds the coefficients of sine and cosine of the h multiples after `before`."""
     rows = len(phase)
     value, slope = np.empty(rows), np.empty(rows)
-    sine, cosine, s, c = np.zeros(LANES), np.zeros(LANES), np.empty(LANES), np.empty(LANES)
+    sine, cosine, s, c = np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES)
     total, rise = np.empty(LANES), np.empty(LANES)
     for start in range(0, rows, LANES):
         here = min(LANES, rows - start)
         for i in range(here):
             sine[i], cosine[i] = math.sin(phase[start + i]), math.cos(phase[start + i])
-        s[:], c[:], total[:], rise[:] = 0.0, 1.0, 0.0, 0.0
-        for h in range(1, by_order.shape[1]):
-            a, b = by_order[0, h], by_order[1, h]
+        _begin(phase, start, here, before, s, c)
+        total[:], rise[:] = 0.0, 0.0
+        for h in range(by_order.shape[1]):
+            a, b, order = by_order[0, h], by_order[1, h], before + 1 + h
             for i in range(LANES):
                 now, beside = c[i] * sine[i] + s[i] * cosine[i], c[i] * cosine[i] - s[i] * sine[i]
                 s[i], c[i] = now, beside
                 total[i] += a * now + b * beside
-                rise[i] += h * (a * beside - b * now)
+                rise[i] += order * (a * beside - b * now)
         for i in range(here):  # One by one: of slices, what they may raise takes seconds to compile.
             value[start + i], slope[start + i] = total[i], rise[i]
     return value, slope
