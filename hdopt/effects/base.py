@@ -42,6 +42,8 @@ class Explanation(ABC):
     """Whether its columns move the drive's output, as whatever acts in the zones does."""
     driven: ClassVar[bool] = False
     """Whether its columns follow the drive's own motion (`response`)."""
+    at_once: ClassVar[bool] = False
+    """Whether what is `driven` answers in each row to the motion of that row alone."""
 
     aside: ClassVar[bool] = False
     """Whether the search asks for it once, when all others are weighed, and not among them."""

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from hdopt.arrays import Array, Index
 from hdopt.effects.sines import sine_columns, sine_sum
+from hdopt.late import late
 
 
 class Spline(IntEnum):
@@ -133,22 +134,45 @@ class ToothForms:
         return int(self.heights.shape[1])
 
     def columns(self, angle: Array, zone: ArrayLike) -> Array:
-        tooth, part = self._places(angle)
-        form = (1 - np.cos(part)) / 2 + self.skew * np.sin(part)
+        tooth, form = self.places(angle)
         return np.asarray(self.heights[tooth] * form[:, None])
 
-    def added(self, angle: Array, zone: int, coefficients: Array) -> tuple[Array, Array]:
-        tooth, part = self._places(angle)
-        height = (self.heights @ coefficients)[tooth]
-        sine, cosine = np.sin(part), np.cos(part)
-        slope = len(self.heights) * (sine / 2 + self.skew * cosine)
-        return height * ((1 - cosine) / 2 + self.skew * sine), height * slope
+    def places(self, angle: Array) -> tuple[Index, Array]:
+        """Number of the tooth that is met at `angle` (n,) rad, and the form there of a tooth of height 1, (n,)."""
+        return _forms_at(np.ascontiguousarray(angle), len(self.heights), self.skew, self.start)
 
-    def _places(self, angle: Array) -> tuple[Index, Array]:
-        """Number of the tooth that is met at `angle` (n,), and how far over it, 0 to 2 pi."""
-        place = angle * (len(self.heights) / (2 * math.pi)) - self.start
-        whole = np.floor(place)
-        return whole.astype(np.int64) % len(self.heights), 2 * math.pi * (place - whole)
+    def added(self, angle: Array, zone: int, coefficients: Array) -> tuple[Array, Array]:
+        return _forms_sum(np.ascontiguousarray(angle), self.heights @ coefficients, self.skew, self.start)
+
+
+@late(calls=0)
+def _place(angle: float, teeth: int, start: float) -> tuple[int, float]:
+    """Number of the tooth that is met at an `angle` (rad), and how far over it, 0 to 2 pi."""
+    place = angle * (teeth / (2 * math.pi)) - start
+    whole = math.floor(place)
+    return int(whole) % teeth, 2 * math.pi * (place - whole)
+
+
+@late(calls=0)
+def _forms_at(angle: Array, teeth: int, skew: float, start: float) -> tuple[Index, Array]:
+    """`ToothForms.places` of so many `teeth`."""
+    tooth, form = np.empty(len(angle), np.int64), np.empty(len(angle))
+    for i in range(len(angle)):
+        tooth[i], part = _place(angle[i], teeth, start)
+        form[i] = (1 - math.cos(part)) / 2 + skew * math.sin(part)
+    return tooth, form
+
+
+@late(calls=0)
+def _forms_sum(angle: Array, heights: Array, skew: float, start: float) -> tuple[Array, Array]:
+    """`ToothForms.added` of teeth of these `heights` (teeth,)."""
+    value, slope = np.empty(len(angle)), np.empty(len(angle))
+    for i in range(len(angle)):
+        tooth, part = _place(angle[i], len(heights), start)
+        sine, cosine = math.sin(part), math.cos(part)
+        value[i] = heights[tooth] * ((1 - cosine) / 2 + skew * sine)
+        slope[i] = heights[tooth] * len(heights) * (sine / 2 + skew * cosine)
+    return value, slope
 
 
 def gaussian(off: Array, sigma: float, row: float = 0.0) -> Array:

@@ -7,8 +7,12 @@ import numpy as np
 import pytest
 from test_cross_validation import RATE, noisy, rows_of, without_base
 
+from hdopt.diagnosis.inference import fit as fits
+from hdopt.diagnosis.inference.catalogue import properties_of
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine, term_columns
-from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.inference.noise import Noise, weights_with_a_past
+from hdopt.diagnosis.inference.normal_equations import bordered
+from hdopt.effects.met import Spline, ToothForms
 from hdopt.effects.term import Term
 from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel
 from hdopt.study import load_study
@@ -59,6 +63,44 @@ def test_a_term_in_the_zones_shows_in_the_zone_that_drives(base):
     fit = SimpleNamespace(problem=SimpleNamespace(base=base), zone=np.array([0, 1, 1, 0, 1, 0]))
     shown = term_columns(term, fit)[:, 0] / base.arcmin_per_mm
     assert shown == pytest.approx([0, 11, 12, 3, 14, 5])
+
+
+SWINGS = {"frequency_hz": 20.0, "damping_ratio": 0.05}
+
+
+@pytest.mark.parametrize(
+    ("beside", "shape", "ar", "by_groups"),
+    [
+        ("_varying_contact", {"waves": 2.0}, (), True),
+        ("_varying_contact", {"waves": 2.0}, (0.5, 0.2), False),
+        ("resonance", SWINGS, (), False),
+    ],
+)
+def test_heights_of_teeth_have_the_products_of_their_columns(base, monkeypatch, beside, shape, ar, by_groups):
+    """The design written out and multiplied, against sums over the rows of each tooth: where a contact varies, and not
+    where noise or a swing reaches from row to row. Faults caught: heights as the drive has them and not as its output
+    shows them, no weights, a tooth's rows known apart where the filter mixes them."""
+    rng = np.random.default_rng(5)
+    rows = noisy(6)
+    rows = replace(rows, time=0.001 * np.arange(len(rows)), speed=np.full(len(rows), 10.0))
+    rows = replace(rows, weight=rng.uniform(0.5, 2.0, len(rows)))
+    problem = problem_of(rows, base, Noise(np.array(ar), SIGMA, weights_with_a_past(rows, len(ar))))
+    errors = 0.3 * problem.prior * rng.normal(size=PARAMETERS)
+    motion = base.evaluate_at(problem.rotation, errors)[0]
+    driven = properties_of(beside).term(rows, shape, motion)
+    teeth = Term("tooth_mesh", {}, met=ToothForms(Spline.CIRCULAR, rng.normal(size=(162, 7)), 0.2, 0.3))
+    coefficients = [0.1 * rng.normal(size=driven.width), 1e-3 * rng.normal(size=teeth.width)]
+    fit = evaluate(problem, errors, np.array([0.01]), [driven, teeth], coefficients)
+    grouped = []
+    monkeypatch.setattr(fits, "bordered", lambda *given: grouped.append(1) or bordered(*given))
+    gram, moment = fit.normal_equations()
+    white = problem.noise.whiten(fit.design())
+    scale = np.sqrt(np.diag(white.T @ white))
+    np.testing.assert_allclose(gram / np.outer(scale, scale), white.T @ white / np.outer(scale, scale), atol=1e-12)
+    expected = white.T @ problem.noise.whiten(fit.residual)
+    size = np.linalg.norm(problem.noise.whiten(fit.residual))
+    np.testing.assert_allclose(moment / scale / size, expected / scale / size, atol=1e-12)
+    assert bool(grouped) == by_groups
 
 
 def test_covariance_is_that_of_ordinary_least_squares():

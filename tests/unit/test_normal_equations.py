@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hdopt.diagnosis.inference.normal_equations import gains_of_subsets, solved
+from hdopt.diagnosis.inference.normal_equations import GroupedColumns, bordered, gains_of_subsets, solved
 from hdopt.diagnosis.numerical import SMALL_RIDGE
 
 
@@ -46,3 +46,16 @@ def test_a_column_twice_gains_as_much_as_once():
     gram, moment = np.ones((2, 2)), np.array([0.6, 0.6])
     found = gains_of_subsets(gram, moment, np.array([0, 1, 2]), np.array([[0, -1], [0, 1]]))
     assert found[1] == pytest.approx(found[0], rel=1e-6)
+
+
+def test_columns_by_groups_have_the_products_that_they_have_written_out():
+    """Seven groups of which one is met by no row, four columns, three others. Faults caught: the size once in the gram
+    or twice in the products, blocks on the wrong side of the diagonal, the residual as a column."""
+    rng = np.random.default_rng(6)
+    group = rng.choice([0, 1, 2, 3, 5, 6], size=50)
+    grouped = GroupedColumns(group, rng.normal(size=50), rng.normal(size=(7, 4)))
+    white, residual = rng.normal(size=(50, 3)), rng.normal(size=50)
+    columns = np.hstack([white, grouped.size[:, None] * grouped.basis[grouped.group]])
+    gram, moment = bordered(white, residual, grouped)
+    np.testing.assert_allclose(gram, columns.T @ columns, atol=1e-12)
+    np.testing.assert_allclose(moment, columns.T @ residual, atol=1e-12)

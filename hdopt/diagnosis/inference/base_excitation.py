@@ -21,6 +21,11 @@ def is_driven(term: Term) -> bool:
     return properties_of(term.effect).driven
 
 
+def has_memory(term: Term) -> bool:
+    """Whether a term's columns follow the motion that the drive had before."""
+    return is_driven(term) and not properties_of(term.effect).at_once
+
+
 def motion_of(base_value: Array, terms: Sequence[Term], coefficients: Sequence[Array]) -> Array:
     """The drive's motion before its spring, arcmin, (n,): `base_value`, which holds what acts in the zones, and what
     the other exciting terms add. `coefficients` holds those of each term.

@@ -15,16 +15,23 @@ from itertools import accumulate, pairwise
 import numpy as np
 
 from hdopt.arrays import Array, Index, Mask
-from hdopt.diagnosis.inference.base_excitation import driven_by, excites, is_driven, motion_of, transmitted
+from hdopt.diagnosis.inference.base_excitation import (
+    driven_by,
+    excites,
+    has_memory,
+    is_driven,
+    motion_of,
+    transmitted,
+)
 from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.newey_west import newey_west, reach_95
 from hdopt.diagnosis.inference.noise import Noise
-from hdopt.diagnosis.inference.normal_equations import solved
+from hdopt.diagnosis.inference.normal_equations import GroupedColumns, bordered, solved
 from hdopt.diagnosis.numerical import NORMAL_95, TINY
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
 from hdopt.effects.base import Explanation
 from hdopt.effects.estimate import FitEstimate
-from hdopt.effects.met import met_angles, sum_of
+from hdopt.effects.met import ToothForms, met_angles, sum_of
 from hdopt.effects.term import Shape, Term
 from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel
 from hdopt.recordings.rows import Rows
@@ -172,6 +179,30 @@ class Fit:
         seen = self.seen(side_by_side(exciting), keep)
         parts = iter(np.split(seen, np.cumsum([block.shape[1] for block in exciting])[:-1], axis=1))
         return [next(parts) if does else block for block, does in zip(blocks, excite, strict=True)]
+
+    def normal_equations(self, move_shapes: bool = True) -> tuple[Array, Array]:
+        """Inner products of the whitened columns of `design` with each other, (q, q), and with the whitened residual,
+        (q,). Heights of single teeth, of which each row meets one, are never written out as columns.
+        """
+        noise, heights = self.problem.noise, self._heights()
+        keep = None if heights is None else self.all_but(len(self.terms) - 1)
+        white, residual = noise.whiten(self.design(keep, move_shapes)), noise.whiten(self.residual)
+        if heights is not None:
+            return bordered(white, residual, heights)
+        return white.T @ white, white.T @ residual
+
+    def _heights(self) -> GroupedColumns | None:
+        """The whitened columns of the last term, where they are several heights of teeth, and neither the noise nor
+        what is driven by them reaches from row to row; else None.
+        """
+        base, noise, term = self.problem.base, self.problem.noise, self.terms[-1] if self.terms else None
+        if base is None or term is None or term.steps or not isinstance(term.met, ToothForms) or term.width == 1:
+            return None
+        if len(noise.ar) or any(has_memory(one) for one in self.terms):
+            return None
+        tooth, form = term.met.places(self.met_angle[term.met.spline])
+        size = base.arcmin_per_mm * self.seen(form[:, None])[:, 0]
+        return GroupedColumns(tooth, noise.whiten(size), term.met.heights)
 
     def prior_precision(self, width: int) -> Array:
         precision = np.zeros(width)
@@ -348,11 +379,8 @@ def _improved(fit: Fit, damping: float, move_shapes: bool) -> tuple[Fit | None, 
     """A better fit one damped step away, None where none was found, and the damping that it took."""
     problem, settings = fit.problem, fit.problem.settings.fit
     wb = problem.base_width
-    design = fit.design(move_shapes=move_shapes)
-    white = problem.noise.whiten(design)
-    precision = problem.noise.sigma**2 * fit.prior_precision(design.shape[1])
-    normal = white.T @ white
-    gradient = white.T @ problem.noise.whiten(fit.residual)
+    normal, gradient = fit.normal_equations(move_shapes)
+    precision = problem.noise.sigma**2 * fit.prior_precision(len(normal))
     gradient[:wb] -= precision[:wb] * fit.errors
     diagonal = slice(None, None, len(normal) + 1)
     normal.flat[diagonal] += precision

@@ -371,6 +371,7 @@ class VaryingContact(Alternative):
     aside = True
     has_parts = True
     driven = True
+    at_once = True
 
     def lacks(self, samples: Conditions) -> str | None:
         least = self.settings.least_turns

@@ -1,8 +1,11 @@
-"""Small symmetric systems, solved many thousand times: by Cholesky's factors, and for many subsets of one table."""
+"""Normal equations: inner products of columns of which each row meets one group alone, and small symmetric systems,
+solved many thousand times: by Cholesky's factors, and for many subsets of one table.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -23,6 +26,46 @@ def solved(matrix: Array, moment: Array) -> Array:
     """
     _, solution, failed = dposv(matrix, moment)
     return np.asarray(np.linalg.solve(matrix, moment) if failed else solution, np.float64)
+
+
+@dataclass(frozen=True)
+class GroupedColumns:
+    """Columns (n, q) of which row i is `size`[i] times row `group`[i] of `basis` (g, q): each row meets one group, so
+    that sums over the rows of each group hold all their inner products.
+    """
+
+    group: Index
+    size: Array
+    basis: Array
+
+    def gram(self) -> Array:
+        """Inner products of the columns with each other, (q, q)."""
+        power = np.bincount(self.group, self.size**2, len(self.basis))
+        return np.asarray(self.basis.T @ (power[:, None] * self.basis))
+
+    def products(self, columns: Array) -> Array:
+        """Inner products with other `columns` (n, k), (q, k)."""
+        rows = np.ascontiguousarray(columns.T)
+        return np.asarray(self.basis.T @ _sums_of_groups(rows, self.group, self.size, len(self.basis)).T)
+
+
+@njit(cache=True, nogil=True, fastmath=False)
+def _sums_of_groups(columns: Array, group: Index, size: Array, groups: int) -> Array:
+    """Sums over the rows of each group of `columns` (k, n) times `size` (n,), (k, `groups`)."""
+    sums = np.zeros((len(columns), groups))
+    for k in range(len(columns)):
+        for i in range(len(group)):
+            sums[k, group[i]] += size[i] * columns[k, i]
+    return sums
+
+
+def bordered(white: Array, residual: Array, grouped: GroupedColumns) -> tuple[Array, Array]:
+    """Inner products of the columns `white` (n, k) and, after them, of the `grouped` ones (n, q) with each other,
+    (k + q, k + q), and of all with the `residual` (n,), (k + q,).
+    """
+    across = grouped.products(white)
+    gram = np.block([[white.T @ white, across.T], [across, grouped.gram()]])
+    return gram, np.r_[white.T @ residual, grouped.products(residual[:, None])[:, 0]]
 
 
 def gains_of_subsets(gram: Array, moment: Array, ends: Index, subsets: Index) -> Array:
