@@ -10,6 +10,7 @@ a drive that was bent to the bulges does not find its way back at once. At last 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,6 +26,7 @@ from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.search.tooth_heights import fit_heights
 from hdopt.effects.base import Explanation
 from hdopt.effects.term import Shape, Term
+from hdopt.parallel.shared_memory import each
 from hdopt.recordings.rows import Rows
 
 Weighed: TypeAlias = tuple[Term, Array]
@@ -65,8 +67,10 @@ def fit_in_zones(rows: Rows, low: Fit, nuisances: Nuisances, ripple: Fit) -> Zon
     best, inside = _score(sines), None
     # Waves of the teeth may stand for what the ripple does to the driving zone: it is fitted without them, too.
     others = [one for one in known if one[0].met is None]
-    for start in (known, others) if len(others) < len(known) else (known,):
-        fit = _step_by_step(problem, low, [*start, *beside], effect, effect.in_zones(shape))
+    starts = (known, others) if len(others) < len(known) else (known,)
+    shapes = effect.in_zones(shape)
+    fits = each(lambda start: _step_by_step(problem, low, [*start, *beside], effect, shapes), starts)
+    for start, fit in zip(starts, fits, strict=True):
         if _score(fit) < best:
             best, inside = _score(fit), _alone(fit, len(start))
     return inside
@@ -105,12 +109,14 @@ def _tooth_by_tooth(thin: FitProblem, low: Fit, found: Sequence[Fit], effect: Ex
     best of them, and from that of `low`.
     """
     few, best = found[0], min(found, key=_score)
-    fits = []
-    for shape in effect.tooth_by_tooth(few.terms[-1], best.coefficients[-1], thin.rows.ratio):
-        for drive in (best, low):
-            start = evaluate(thin, drive.errors, drive.offsets, few.terms[:-1], best.coefficients[:-1])
-            fits.append(fit_heights(start, effect.term(thin.rows, shape)))
-    return fits
+    shapes = effect.tooth_by_tooth(few.terms[-1], best.coefficients[-1], thin.rows.ratio)
+
+    def fitted(begun: tuple[Shape, Fit]) -> Fit:
+        shape, drive = begun
+        start = evaluate(thin, drive.errors, drive.offsets, few.terms[:-1], best.coefficients[:-1])
+        return fit_heights(start, effect.term(thin.rows, shape))
+
+    return each(fitted, itertools.product(shapes, (best, low)))
 
 
 def _weighed(terms: Sequence[Term], fit: Fit) -> list[Weighed]:
