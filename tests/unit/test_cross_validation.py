@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from hdopt.diagnosis.inference.cross_validation import held_out, paired_t
+from hdopt.diagnosis.inference.cross_validation import held_out, paired_chance, paired_t
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.settings import DEFAULT
@@ -68,3 +68,11 @@ def test_paired_t_is_the_text_books():
     assert paired_t(worse, better) == pytest.approx(stats.ttest_rel(worse, better).statistic, rel=1e-12)
     assert paired_t(worse[:2], better[:2]) == 0.0
     assert paired_t(worse, worse) == 0.0
+
+
+def test_the_chance_is_students():
+    rng = np.random.default_rng(8)
+    worse, better = rng.normal(0.5, 1, 40), rng.normal(0, 1, 40)
+    expected = stats.ttest_rel(worse, better, alternative="greater").pvalue
+    assert paired_chance(worse, better) == pytest.approx(expected, rel=1e-12)
+    assert paired_chance(better, worse) == 1.0

@@ -1,5 +1,7 @@
 """The chance of a false alarm: a true one on pure noise, and by hand where the scores' distribution is known."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -178,3 +180,18 @@ def test_the_tail_is_gumbels():
     known = tail([-1.0, 1.0], 50.0, replace(SETTINGS, tail_safety=1.0))
     scale = np.sqrt(2) * np.sqrt(6) / np.pi
     assert known == pytest.approx(np.exp(-(50 + np.euler_gamma * scale) / scale), rel=1e-6)
+
+
+def test_the_tail_is_the_librarys():
+    scores = [0.3, 2.0, 1.1, 5.5, 3.1]
+    scale = np.std(scores, ddof=1) / stats.gumbel_r.std()
+    middle = np.mean(scores) - stats.gumbel_r.mean() * scale
+    for observed in (1.0, 6.0, 40.0):
+        expected = stats.gumbel_r.sf(observed, middle, SETTINGS.tail_safety * scale)
+        assert tail(scores, observed, SETTINGS) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_diagnosis_loads_no_library_of_distributions():
+    """Half a second of processor time, of the four that a short recording takes."""
+    said = "import sys, hdopt.diagnosis.pipeline; print('scipy.stats' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", said], capture_output=True, text=True, check=True).stdout == "False\n"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtr
 
 from hdopt.arrays import Array, Index
 from hdopt.diagnosis.inference.fit import Fit
@@ -94,4 +94,4 @@ def paired_chance(worse: Array, better: Array, settings: HeldOutSettings = DEFAU
     `worse` over `better`; 1 where there are too few turns. `settings` are the thresholds.
     """
     t = paired_t(worse, better, settings)
-    return 1.0 if t <= 0 else float(student_t.sf(t, len(worse) - 1))
+    return 1.0 if t <= 0 else float(stdtr(len(worse) - 1, -t))
