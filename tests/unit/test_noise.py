@@ -30,6 +30,18 @@ def test_the_filter_is_that_of_the_signal_library(columns):
     assert Noise(AR, 1.0, np.ones(200)).whiten(values[:, 0]) == pytest.approx(white[:, 0], abs=1e-12)
 
 
+@pytest.mark.parametrize("ar", [AR, AR[:0]])
+def test_blocks_are_whitened_beside_each_other(ar):
+    """Columns in rows, in columns and alone, each as it is whitened by itself, weights and all."""
+    rng = np.random.default_rng(1)
+    noise = Noise(ar, 1.0, rng.uniform(0.0, 2.0, 200))
+    blocks = [rng.normal(size=(200, 3)), np.asfortranarray(rng.normal(size=(200, 2))), rng.normal(size=(200, 1))]
+    white = noise.whitened(blocks)
+    alone = [signal.lfilter(np.r_[1.0, -ar], [1.0], column) * noise.root_weight for column in np.hstack(blocks).T]
+    np.testing.assert_allclose(white, np.column_stack(alone), atol=1e-12)
+    assert white.flags.f_contiguous
+
+
 def test_weights_stop_at_a_gap():
     rows = in_pieces(noisy(2), 12)
     weighed = weights_with_a_past(rows, 3) > 0

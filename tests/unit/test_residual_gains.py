@@ -17,7 +17,7 @@ def probe_of(design, precision, residual, weights=None):
     noise = SimpleNamespace(sigma=SIGMA, whiten=lambda rows: (weights * np.asarray(rows).T).T)
     problem = SimpleNamespace(settings=DEFAULT, rows=SimpleNamespace(highest_order=9.0), noise=noise)
     fit = SimpleNamespace(terms=(), problem=problem, motion=None, residual=residual)
-    fit.design = lambda keep: design
+    fit.white_design = lambda keep: fit.problem.noise.whiten(design)
     fit.prior_precision = lambda width: precision
     return FitProbe(fit)
 

@@ -162,6 +162,14 @@ class Fit:
         """Columns: base errors, offsets, then for each term of `keep` (all by default) its coefficients and, with
         `move_shapes`, its free shape parameters; (n, q).
         """
+        return side_by_side(self._blocks(keep, move_shapes))
+
+    def white_design(self, keep: Sequence[int] | None = None, move_shapes: bool = True) -> Array:
+        """The columns of `design` whitened, (n, q), without a copy of them beside each other."""
+        return self.problem.noise.whitened(self._blocks(keep, move_shapes))
+
+    def _blocks(self, keep: Sequence[int] | None, move_shapes: bool) -> list[Array]:
+        """The columns of `design`, block by block."""
         blocks, excite = [self.base_jacobian, self.problem.nuisance], [True, False]
         for i in range(len(self.terms)) if keep is None else keep:
             term = self.terms[i]
@@ -171,7 +179,7 @@ class Fit:
             excite += [excites(term)] * (len(blocks) - len(excite))
         if any(is_driven(term) for term in self.terms):
             blocks = self._all_seen(blocks, excite, keep)
-        return side_by_side(blocks)
+        return blocks
 
     def _all_seen(self, blocks: list[Array], excite: list[bool], keep: Sequence[int] | None) -> list[Array]:
         """`blocks` of columns as the output shows them: those that `excite` what swings behind it, all at once."""
@@ -186,7 +194,7 @@ class Fit:
         """
         noise, heights = self.problem.noise, self._heights()
         keep = None if heights is None else self.all_but(len(self.terms) - 1)
-        white, residual = noise.whiten(self.design(keep, move_shapes)), noise.whiten(self.residual)
+        white, residual = self.white_design(keep, move_shapes), noise.whiten(self.residual)
         if heights is not None:
             return bordered(white, residual, heights)
         return white.T @ white, white.T @ residual
@@ -214,7 +222,7 @@ class Fit:
     def _curvature(self) -> tuple[Array, Array, float, Array]:
         """Whitened design (n, q) and residual (n,), the variance of the latter, arcmin^2, and the covariance (q, q)
         that the curvature of the objective gives."""
-        design = self.problem.noise.whiten(self.design())
+        design = self.white_design()
         residual = self.problem.noise.whiten(self.residual)
         freedom = max(len(residual) - design.shape[1], 1)
         sigma2 = max(float(residual @ residual) / freedom, self.problem.settings.fit.variance_floor)

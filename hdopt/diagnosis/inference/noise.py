@@ -7,7 +7,9 @@ in the residual must stay visible.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
 
 import numpy as np
 from numba import njit
@@ -45,11 +47,20 @@ class Noise:
 
     def whiten(self, values: Array) -> Array:
         """`values` (n,) or (n, q), filtered and weighted along the first axis."""
-        if not len(self.ar):
-            return values * (self.root_weight if values.ndim == 1 else self.root_weight[:, None])
-        table = np.asfortranarray(values.reshape(len(values), -1))
-        white: Array = _filtered(table.T, self.ar, self.root_weight).T.reshape(values.shape, order="A")
-        return white
+        return self.whitened([values[:, None]])[:, 0] if values.ndim == 1 else self.whitened([values])
+
+    def whitened(self, blocks: Sequence[Array]) -> Array:
+        """`blocks` of columns, each (n, k), filtered and weighted, beside each other, (n, q); every column lies in one
+        piece, as products read it.
+        """
+        ends = list(accumulate((block.shape[1] for block in blocks), initial=0))
+        rows = np.empty((ends[-1], len(self.root_weight)))
+        for block, (start, end) in zip(blocks, pairwise(ends), strict=True):
+            if len(self.ar):
+                _filter(np.ascontiguousarray(block.T), self.ar, self.root_weight, rows[start:end])
+            else:
+                np.multiply(block.T, self.root_weight, out=rows[start:end])
+        return rows.T
 
 
 GROUP = 4
@@ -59,16 +70,15 @@ ROUNDING = 1e-9
 
 
 @njit(cache=True, nogil=True, fastmath=False)
-def _filtered(columns: Array, ar: Array, root_weight: Array) -> Array:
+def _filter(columns: Array, ar: Array, root_weight: Array, result: Array) -> None:
     """(x_t - sum a_k x_{t-k}) times the weight of row t, for each of the `columns` (q, n), rows of which lie side by
-    side."""
+    side, into `result` (q, n)."""
     count, rows = columns.shape
     # Lags are taken in groups, by shifted views in place of shifted indices: several rows are worked on at once.
     groups = -(-len(ar) // GROUP)
     weights = np.zeros(GROUP * groups)
     weights[: len(ar)] = ar
     lags = min(GROUP * groups, rows)
-    result = np.empty((count, rows))
     for q in range(count):
         column, white = columns[q], result[q]
         for t in range(lags):
@@ -88,7 +98,6 @@ def _filtered(columns: Array, ar: Array, root_weight: Array) -> Array:
             for t in range(rows - lags):
                 left = now[t] - a * first[t] - b * second[t] - c * third[t] - d * fourth[t]
                 later[t] = left * weight[t] if g == groups - 1 else left
-    return result
 
 
 def without_lines(ar: Array, largest_pole: float = DEFAULT.noise.largest_oscillating_pole) -> Array:

@@ -38,10 +38,9 @@ class FitProbe:
             if i not in self.keep:
                 own = fit.contribution(i)[:, None]
                 self.residual = self.residual + (fit.seen(own, self.keep) if excites(term) else own)[:, 0]
-        design = fit.design(self.keep)
-        white = self.noise.whiten(design)
+        white = fit.white_design(self.keep)
         # The prior on the base keeps directions the data leave open from swallowing an effect.
-        prior = np.sqrt(fit.prior_precision(design.shape[1])) * self.noise.sigma
+        prior = np.sqrt(fit.prior_precision(white.shape[1])) * self.noise.sigma
         augmented = np.vstack([white, np.diag(prior)])
         scale = np.sqrt((augmented**2).sum(0))
         basis, size, _ = np.linalg.svd(augmented / np.where(scale > 0, scale, 1), full_matrices=False)
