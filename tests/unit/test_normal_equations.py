@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from hdopt.diagnosis.inference.normal_equations import GroupedColumns, bordered, gains_of_subsets, solved
+from hdopt.diagnosis.inference.normal_equations import (
+    GroupedColumns,
+    bordered,
+    gains_of_subsets,
+    solved,
+    sums_of_groups,
+)
 from hdopt.diagnosis.numerical import SMALL_RIDGE
 
 
@@ -59,3 +65,12 @@ def test_columns_by_groups_have_the_products_that_they_have_written_out():
     gram, moment = bordered(white, residual, grouped)
     np.testing.assert_allclose(gram, columns.T @ columns, atol=1e-12)
     np.testing.assert_allclose(moment, columns.T @ residual, atol=1e-12)
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_sums_of_groups_are_those_row_by_row(order):
+    rng = np.random.default_rng(7)
+    columns, group, size = rng.normal(size=(60, 5)), rng.choice([0, 1, 3], size=60), rng.normal(size=60)
+    expected = np.zeros((5, 5))
+    np.add.at(expected, group, columns * size[:, None])
+    assert np.array_equal(sums_of_groups(np.array(columns, order=order), group, size, 5), expected)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdopt.diagnosis.inference.generic_basis import generic_columns
+from hdopt.diagnosis.inference.normal_equations import sums_of_groups
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import RIDGE, TINY
 
@@ -40,8 +41,7 @@ def locate(probe: FitProbe, rng: np.random.Generator) -> list[Location]:
         norm = np.sqrt(np.maximum((white**2).sum(0), TINY))
         white = white / norm
         gram = white.T @ white + RIDGE * np.eye(white.shape[1])
-        scores = np.zeros((signs.shape[1], white.shape[1]))
-        np.add.at(scores, block, white * probe.white_residual[:, None])
+        scores = sums_of_groups(white, block, probe.white_residual, signs.shape[1])
         total = scores.sum(0)
         solution = np.linalg.solve(gram, total)
         flipped = signs @ scores

@@ -26,7 +26,7 @@ from hdopt.diagnosis.inference.base_excitation import (
 from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.newey_west import newey_west, reach_95
 from hdopt.diagnosis.inference.noise import Noise
-from hdopt.diagnosis.inference.normal_equations import GroupedColumns, bordered, solved
+from hdopt.diagnosis.inference.normal_equations import GroupedColumns, bordered, solved, sums_of_groups
 from hdopt.diagnosis.numerical import NORMAL_95, TINY
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
 from hdopt.effects.base import Explanation
@@ -252,8 +252,7 @@ class Fit:
         settings = self.problem.settings.fit
         design, residual, sigma2, inverse = self._curvature
         block = self.problem.rows.block
-        scores = np.zeros((block[-1] + 1, design.shape[1]))
-        np.add.at(scores, block, design * residual[:, None] / sigma2)
+        scores = sums_of_groups(design, block, residual / sigma2, block[-1] + 1)
         # Wander outlasts a turn: neighbouring turns' scores count too, with falling weight.
         lags = min(settings.lags_turns, len(scores) // settings.turns_a_lag)
         sandwich = inverse @ newey_west(scores, lags) @ inverse

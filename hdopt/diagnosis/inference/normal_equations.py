@@ -45,13 +45,20 @@ class GroupedColumns:
 
     def products(self, columns: Array) -> Array:
         """Inner products with other `columns` (n, k), (q, k)."""
-        rows = np.ascontiguousarray(columns.T)
-        return np.asarray(self.basis.T @ _sums_of_groups(rows, self.group, self.size, len(self.basis)).T)
+        return np.asarray(self.basis.T @ sums_of_groups(columns, self.group, self.size, len(self.basis)))
+
+
+def sums_of_groups(columns: Array, group: Index, size: Array, groups: int) -> Array:
+    """Sums of `columns` (n, k) times `size` (n,) over the rows of each `group` (n,), of so many (`groups`):
+    (groups, k). What `numpy.add.at` gives, in a third of the time.
+    """
+    sums: Array = _sums_of_groups(np.ascontiguousarray(columns.T), group, size, groups).T
+    return sums
 
 
 @njit(cache=True, nogil=True, fastmath=False)
 def _sums_of_groups(columns: Array, group: Index, size: Array, groups: int) -> Array:
-    """Sums over the rows of each group of `columns` (k, n) times `size` (n,), (k, `groups`)."""
+    """The same of `columns` (k, n), (k, groups)."""
     sums = np.zeros((len(columns), groups))
     for k in range(len(columns)):
         for i in range(len(group)):

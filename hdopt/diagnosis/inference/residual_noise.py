@@ -12,6 +12,7 @@ from hdopt.diagnosis.inference.change_points import find_steps, step_columns
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.generic_basis import generic_columns
 from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.inference.normal_equations import sums_of_groups
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import LEAST_SQUARES_RANK, TINY
 
@@ -45,7 +46,6 @@ def roughness(noise: Noise, whitened: Array, columns: Array, block: Index) -> fl
     """Power of the scores of smooth whitened `columns` (n, q) on the `whitened` residual (n,), summed over each turn
     (`block`, (n,)), against what white noise of the same size would give: the median over the columns.
     """
-    scores = np.zeros((block[-1] + 1, columns.shape[1]))
-    np.add.at(scores, block, columns * whitened[:, None])
+    scores = sums_of_groups(columns, block, whitened, block[-1] + 1)
     expected = noise.sigma**2 * (columns**2).sum(0)
     return float(np.median((scores**2).sum(0) / np.maximum(expected, TINY)))
