@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdopt.arrays import Array, Index, Mask
+from hdopt.effects.sines import sine_columns
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
@@ -58,6 +59,18 @@ class Conditions:
     @cached_property
     def remembered(self) -> dict[Hashable, Term]:
         """Terms made for these rows at shapes that every search looks at."""
+        return {}
+
+    def waves_of_input(self, most: int) -> Array:
+        """sin and cos of one to so many waves an input turn (`most`), (n, 2 most), made once: what follows the motion
+        asks for them at every step of a fit.
+        """
+        if most not in self._waves_of_input:
+            self._waves_of_input[most] = sine_columns(self.theta, range(1, most + 1))
+        return self._waves_of_input[most]
+
+    @cached_property
+    def _waves_of_input(self) -> dict[int, Array]:
         return {}
 
     @cached_property

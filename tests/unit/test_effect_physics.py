@@ -296,6 +296,19 @@ def test_sines_by_addition_are_sines():
             assert found[:, 2 * k + 1] == pytest.approx(np.cos(h * phase), abs=5e-12)
 
 
+def test_waves_of_the_input_are_made_once_and_for_these_rows():
+    """Faults caught: made anew at each step of a fit, the first number asked for taken for all, those of other rows."""
+    c = moving()
+    for most in (1, 3):
+        waves = c.waves_of_input(most)
+        angles = np.outer(c.theta, range(1, most + 1))
+        assert waves[:, 0::2] == pytest.approx(np.sin(angles), abs=1e-12)
+        assert waves[:, 1::2] == pytest.approx(np.cos(angles), abs=1e-12)
+        assert c.waves_of_input(most) is waves
+    shifted = replace(c, theta=c.theta + 0.5)
+    assert shifted.waves_of_input(1)[:, 0] == pytest.approx(np.sin(c.theta + 0.5), abs=1e-12)
+
+
 def test_the_flexsplines_teeth_advance_by_one_more_in_n():
     c = moving()
     angles = met_angles(c.theta, 1 + 1 / RATIO, np.zeros((2, 2, 1)))

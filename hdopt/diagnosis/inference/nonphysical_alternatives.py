@@ -396,7 +396,7 @@ class VaryingContact(Alternative):
         return motions * (self._waves(conditions, shape) @ coefficients)[:, None]
 
     def _waves(self, samples: Conditions, shape: Shape) -> Array:
-        return sine_columns(samples.theta, [float(k) for k in range(1, int(shape["waves"]) + 1)])
+        return samples.waves_of_input(int(shape["waves"]))
 
 
 ALTERNATIVES: tuple[type[Alternative], ...] = (
