@@ -27,7 +27,7 @@ OVER_EVERY = {
         "unit/test_effect_edges.py",
         "unit/test_toy_effect.py",
     ),
-    "formats": ("unit/test_recording_formats.py",),
+    "formats": ("unit/test_recording_formats.py", "unit/test_recording_numbers.py"),
     "settings": ("unit/test_threshold_sensitivity.py",),
 }
 """By folder or module: properties over all that is registered there, which do not name each of its files."""

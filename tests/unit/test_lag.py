@@ -97,3 +97,13 @@ def test_flanks_interfere_whatever_play_the_cross_slide_adds():
     found = Lag(np.array([5.0, 5.0]), np.array([-1.0, 1.0]))
     assert found.interference == 0.5
     assert found.to_dict()["min"] == 4.0
+
+
+def test_a_lag_is_told_by_its_mean_and_both_ends():
+    """Of the sum and of each part; a quarter of the angles interferes."""
+    found = Lag(np.array([0.1, 0.2, 0.3, 0.2]), np.array([0.5, -0.1, 0.7, 0.1]))
+    told = found.to_dict()
+    assert (told["mean"], told["min"], told["max"]) == pytest.approx((0.5, 0.1, 1.0))
+    assert tuple(told["parts"]["cross_slide"].values()) == pytest.approx((0.2, 0.1, 0.3))
+    assert tuple(told["parts"]["backlash"].values()) == pytest.approx((0.3, -0.1, 0.7))
+    assert told["interference_share"] == 0.25

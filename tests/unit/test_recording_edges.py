@@ -77,6 +77,14 @@ def test_wrapped_turns_are_counted_up_to_three_tenths_of_one_a_sample(turns_a_sa
             unwrap_angles(checks)
 
 
+def test_a_step_of_half_a_turn_is_no_wrap():
+    """It says nothing of the way: the angle stays as it was read."""
+    angle = np.resize([0.0, TURN / 2], 60)
+    checks = Checks({"input": angle}, RATIO, "record")
+    unwrap_angles(checks)
+    assert np.array_equal(checks.channels["input"], np.resize([0.0, TURN / 2], 60)) and checks.warnings == []
+
+
 @pytest.mark.parametrize("begin", [0.0, 2.0], ids=["upward", "downward"])
 def test_an_angle_that_also_steps_within_its_range_is_no_counter_that_runs_over(begin):
     """Half the range at once, from 1 turn to 3 or from 3 to 1, is no move between samples: how often it ran over is not
