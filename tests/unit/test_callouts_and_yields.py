@@ -8,8 +8,10 @@ from scipy import stats
 
 from hdopt.allocation.convex import Item, solve, worst_case_rule
 from hdopt.allocation.cost import Reciprocal
+from hdopt.allocation.grades import JIS_PITCH_MICRONS
 from hdopt.errors import HdoptError
 from hdopt.tolerance.contributors import CALLOUTS, VECTORS, Contributor
+from hdopt.tolerance.distributions import Normal
 from hdopt.tolerance.empirical import SortedValues
 from hdopt.tolerance.sampling import PlainMonteCarlo, ScrambledSobol
 from hdopt.tolerance.stack import yield_estimate
@@ -130,3 +132,19 @@ def test_a_histogram_has_its_bins_and_every_value(bins):
     assert len(edges) == bins + 1 and len(counts) == bins and counts.sum() == 500
     assert (edges[0], edges[-1]) == (values[0], values[-1])
     assert np.diff(edges) == pytest.approx(np.ptp(values) / bins)
+
+
+@pytest.mark.parametrize(("low", "high"), [(2.0, 2.5), (3.0, 3.1), (4.0, 9.0), (-2.5, -2.0), (-1.0, 0.5)])
+def test_a_truncated_normal_is_scipys_on_either_side(low, high):
+    """Between bounds that both take mass away, above the mean, below it and about it."""
+    u = np.array([0.001, 0.1, 0.5, 0.9, 0.999])
+    found = Normal(mean=0.3, std=0.2, lower=0.3 + 0.2 * low, upper=0.3 + 0.2 * high).quantile(u)
+    assert found == pytest.approx(stats.truncnorm.ppf(u, low, high, 0.3, 0.2), rel=1e-9)
+
+
+def test_fine_pitch_classes_are_a_root_of_two_apart_up_to_the_sixth_and_then_two():
+    """JIS B 1702-1976: both numbers of a class, rounded to preferred numbers, to 4 %."""
+    numbers = np.array(JIS_PITCH_MICRONS)
+    steps = numbers[1:] / numbers[:-1]
+    assert steps[:6] == pytest.approx(np.full((6, 2), np.sqrt(2)), rel=0.04)
+    assert steps[6:] == pytest.approx(np.full((2, 2), 2.0), rel=0.01)
