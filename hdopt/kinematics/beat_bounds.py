@@ -27,6 +27,7 @@ from hdopt.kinematics.beat_tables import (
     whole_of,
 )
 from hdopt.kinematics.branches import TIE_MM
+from hdopt.kinematics.closed_form import RigidMotion, RimConstants
 from hdopt.kinematics.lanes.single import HALF, HUGE, ONE, TINY, ZERO, narrowed, single, unsigned
 
 SAFETY = 1.25
@@ -67,6 +68,15 @@ class Circular(NamedTuple):
     bow: float
     extent: float
     slope: float
+
+
+class Bends(NamedTuple):
+    """How far the depth of a drive's branches bends: its largest second difference over a step of the grid, mm; its
+    largest size, mm; and the largest second difference of the offsets on the CS, rad."""
+
+    depth: float
+    deepest: float
+    turn: float
 
 
 class Slack(NamedTuple):
@@ -158,10 +168,9 @@ def least_single(values: Singles, n: int) -> float:
 
 
 @inlined
-def largest_of_branches(branches: Array, bends: Singles, sizes: Singles, turns: Singles) -> tuple[float, float, float]:
-    """Largest second difference over a step and largest size of the depth of any of the wrapped `branches`, mm, and
-    the largest second difference of the offsets on the CS, rad, from which those on the FS differ by some hundredths;
-    `bends`, `sizes` and `turns` (m + 4,) are room."""
+def largest_of_branches(branches: Array, bends: Singles, sizes: Singles, turns: Singles) -> Bends:
+    """`Bends` of wrapped `branches`, whose offsets on the FS bend otherwise by some hundredths; `bends`, `sizes` and
+    `turns` (m + 4,) are room."""
     n = branches.shape[3] - 2
     for i in range(n):
         bend = size = turn = 0.0
@@ -173,7 +182,33 @@ def largest_of_branches(branches: Array, bends: Singles, sizes: Singles, turns: 
             bend, size = bends_by if bends_by > bend else bend, abs(here) if abs(here) > size else size
             turn = turns_by if turns_by > turn else turn
         bends[i], sizes[i], turns[i] = -narrowed(bend), -narrowed(size), -narrowed(turn)
-    return -least_single(bends, n), -least_single(sizes, n), -least_single(turns, n)
+    return Bends(-least_single(bends, n), -least_single(sizes, n), -least_single(turns, n))
+
+
+@inlined
+def _swing(cos: float, sin: float, level: float) -> tuple[float, float]:
+    """How far a wave with these parts swings, and how large it is at most around its `level`."""
+    swing = math.sqrt(cos * cos + sin * sin)
+    return swing, swing + abs(level)
+
+
+@inlined
+def bends_of_motion(motion: RigidMotion[float], rim: RimConstants, m: int) -> Bends:
+    """What `Bends` of the branches of a drive's `motion` are at most on `m` angles, whose wave generator has the
+    constants `rim`: of a wave, slope and bend are what it swings, of a product what the product rule says."""
+    e, e_most = _swing(motion.ea_cos, motion.ea_sin, motion.ea_0)
+    t, t_most = _swing(motion.ta_cos, motion.ta_sin, motion.ta_0)
+    f, f_most = _swing(motion.el_cos, motion.el_sin, motion.el_0)
+    u, u_most = _swing(motion.tl_cos, motion.tl_sin, motion.tl_0)
+    w, w_most = _swing(motion.twist_cos, motion.twist_sin, motion.twist_0)
+    # q of the closed form: a shift, the twist's part of it, and what two tilts make.
+    most = f_most + u_most + e_most * w_most + rim.tilt_gain * t_most * u_most
+    slope = f + u + (e * w_most + e_most * w) + rim.tilt_gain * (t * u_most + t_most * u)
+    bend = slope + 2 * (e * w + rim.tilt_gain * t * u)
+    depth = e + t + 2 * rim.bow * (t * t + t_most * t) + rim.per_flatness * (slope * slope + most * bend)
+    deepest = e_most + t_most + rim.bow * t_most * t_most + rim.half_per_flatness * most * most
+    step = 2 * math.pi / m
+    return Bends(step * step * depth, deepest, step * step * rim.per_flatness * bend)
 
 
 @inlined
@@ -234,11 +269,17 @@ def fill_nodes(branches: Array, tan_alpha: float, circular: Circular, nodes: Sin
 
 
 @inlined
+def _cells_of(nodes: Singles) -> int:
+    """How many cells follow each other from the first of the `nodes` (NODES, m + 4): one turn of them is enough."""
+    return int(nodes.shape[1] - WRAPPED + BEFORE)
+
+
+@inlined
 def _fill_clear(touch: float, nodes: Singles, cells: Singles) -> None:
     """Fill how far the `cells` are from letting a rim change: where both ends have gaps of one sign larger than
     `touch`, none does."""
     touching = narrowed(touch)
-    for i in range(nodes.shape[1] - 1):
+    for i in range(_cells_of(nodes)):
         a, b, c, d = nodes[GAP, i], nodes[GAP, i + 1], nodes[GAP + 1, i], nodes[GAP + 1, i + 1]
         low, high = a if a < b else b, a if a > b else b
         one = low if low > -high else -high
@@ -269,12 +310,12 @@ def _fill_ceilings(circular: Circular, bulge: float, above: float, nodes: Single
     for zone in range(2):
         one, two, gap = nodes[HIGH + 2 * zone], nodes[HIGH + 2 * zone + 1], nodes[GAP + zone]
         crest, clear, out, room = circular.rows[CREST, zone], cells[CLEAR], cells[CEILING], cells[ROOM]
-        for i in range(nodes.shape[1] - 1):
+        for i in range(_cells_of(nodes)):
             a, b, c, d, ok = one[i], two[i], one[i + 1], two[i + 1], clear[i]
             low = _deeper(ok, gap[i], a, b, a if a > b else b)
             high = _deeper(ok, gap[i + 1], c, d, c if c > d else d)
             room[i] = (low if low > high else high) + _beyond(low, high, crest[i] + more) + largest
-        for i in range(nodes.shape[1] - 1):
+        for i in range(_cells_of(nodes)):
             before = out[i] if zone == 1 else -HUGE
             out[i] = room[i] if room[i] > before else before
 
@@ -286,7 +327,7 @@ def _fill_least(circular: Circular, bulge: float, nodes: Singles, cells: Singles
     for zone in range(2):
         one, two, gap = nodes[LOW + 2 * zone], nodes[LOW + 2 * zone + 1], nodes[GAP + zone]
         dip, clear, out = circular.rows[DIP, zone], cells[CLEAR], cells[LEAST + zone]
-        for i in range(nodes.shape[1] - 1):
+        for i in range(_cells_of(nodes)):
             a, b, c, d, ok = one[i], two[i], one[i + 1], two[i + 1], clear[i]
             low = _deeper(ok, gap[i], a, b, a if a < b else b)
             high = _deeper(ok, gap[i + 1], c, d, c if c < d else d)
@@ -297,7 +338,7 @@ def _fill_least(circular: Circular, bulge: float, nodes: Singles, cells: Singles
 def _fill_floors(comb: Comb, rounding: float, nodes: Singles, cells: Singles, places: Places) -> None:
     """Fill what the driving deviation cannot fall below in the `cells`, whose least of either zone is known; `places`
     are room."""
-    last, n = len(comb.floor) - 1, nodes.shape[1] - 1
+    last, n = len(comb.floor) - 1, _cells_of(nodes)
     per_step, half_step = narrowed(last / comb.reach), narrowed(comb.reach / last / 2)
     # Turning both places by half of what they are off moves each by half of it.
     half_slope, least, spare = narrowed(comb.slope / 2), narrowed(comb.least), narrowed(rounding)

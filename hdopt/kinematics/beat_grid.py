@@ -22,6 +22,7 @@ from hdopt.kinematics.beat_bounds import (
     ON_CS,
     ON_FS,
     SAFETY,
+    Bends,
     Circular,
     Places,
     Slack,
@@ -33,6 +34,7 @@ from hdopt.kinematics.beat_tables import (
     BEFORE,
     PER_RAD,
     WRAPPED,
+    Bits,
     Comb,
     Four,
     allocating,
@@ -41,6 +43,7 @@ from hdopt.kinematics.beat_tables import (
     four,
     inlined,
     least_of,
+    rising,
 )
 from hdopt.kinematics.branches import TIE_MM
 from hdopt.kinematics.essential import ROOT_CELLS, ROOT_STEPS, SHORT
@@ -75,10 +78,12 @@ class Walk(NamedTuple):
 class Work(NamedTuple):
     """Room for one drive: `nodes` and `cells` of bounds, `places` for them; the `grid` (ROWS, m + 4) of gaps between
     rims, wrapped around; the `changes` of rims in places, in order, and a turn later the first; deviations of a cell
-    at all phases (`lanes`, (3, 2, P): end, zone, phase; and room to fold them)."""
+    at all phases (`lanes`, (3, 2, P): end, zone, phase; and what they are least); the `bits` of cells and of lanes."""
 
     nodes: Singles
     cells: Singles
+    cell_bits: Bits
+    lane_bits: Bits
     places: Places
     grid: Array
     changes: Array
@@ -89,13 +94,16 @@ class Work(NamedTuple):
 def new_work(grid: int, phases: int) -> Work:
     """Room for the beat of drives on so many `grid` angles and FS `phases`."""
     wrapped = grid + WRAPPED
+    cells, lanes = np.empty((CELLS, wrapped), np.float32), np.empty((3, 2, phases), np.float32)
     return Work(
         np.empty((NODES, wrapped), np.float32),
-        np.empty((CELLS, wrapped), np.float32),
+        cells,
+        cells.view(np.int32),
+        lanes.view(np.int32),
         np.empty(wrapped, np.int32),
         np.empty((ROWS, wrapped)),
         np.empty(4 * grid + 2),
-        np.empty((3, 2, phases), np.float32),
+        lanes,
     )
 
 
@@ -109,8 +117,16 @@ def walk_of(branches: Array, circular: Circular, tan_alpha: float, advance: floa
     """`Walk` of wrapped `branches`, whose depth `tan_alpha` multiplies, with the teeth `circular` and `comb` and
     Z_CS/Z_FS, `advance`; `work` is room."""
     cells = work.cells
-    bend, deepest, turn = largest_of_branches(branches, cells[FLOOR], cells[CEILING], cells[CLEAR])
-    rounding = rounding_of(deepest, tan_alpha, circular, comb)
+    bends = largest_of_branches(branches, cells[FLOOR], cells[CEILING], cells[CLEAR])
+    return walk_bent(branches, bends, circular, tan_alpha, advance, comb)
+
+
+@allocating
+def walk_bent(branches: Array, bends: Bends, circular: Circular, tan_alpha: float, advance: float, comb: Comb) -> Walk:
+    """The same of wrapped `branches` that bend as `bends` say, with `tan_alpha`, the teeth `circular` and `comb`, and
+    `advance`."""
+    bend, turn = bends.depth, bends.turn
+    rounding = rounding_of(bends.deepest, tan_alpha, circular, comb)
     margin = SAFETY / 8 * (tan_alpha * bend + circular.bend + comb.bend) + rounding
     # A third difference is that of two second ones, over half a step an eighth.
     beside = 2 * rounding + SAFETY * BETWEEN_PARABOLAS * (tan_alpha * bend / 4 + circular.bow + comb.bow)
@@ -145,6 +161,26 @@ def zone_at(walk: Walk, zone: int, k: int, place: float) -> tuple[float, float]:
     angle = walk.advance * theta + s * _branch_by_four(branches, ON_FS, zone, k, at) + away
     on_table = by_four(walk.circular.table, four(on_turn(on_cs * PER_RAD, n_cs)))
     return walk.tan_alpha * _branch_by_four(branches, DEPTH, zone, k, at) + on_table, angle
+
+
+@inlined
+def zone_along(walk: Walk, zone: int, k: int, place: float) -> tuple[float, float, float, float]:
+    """Deviation of a `zone` of a `walk` with its rim `k` at a `place` (mm) and its angle on the FS (rad) as `zone_at`
+    gives them, and then the slopes of both over the place, per cell."""
+    branches = walk.branches
+    m, n_cs = branches.shape[3] - WRAPPED, len(walk.circular.table) - WRAPPED
+    inside, step = place if place < m else place - m, 2 * math.pi / m
+    at, up, theta = four(inside), rising(inside), place * step
+    s, away = 1.0 - 2.0 * zone, math.pi * zone
+    on_cs = theta + s * _branch_by_four(branches, ON_CS, zone, k, at) + away
+    angle = walk.advance * theta + s * _branch_by_four(branches, ON_FS, zone, k, at) + away
+    on_table = on_turn(on_cs * PER_RAD, n_cs)
+    on_cs_teeth = by_four(walk.circular.table, four(on_table))
+    rises = by_four(walk.circular.table, rising(on_table)) * (n_cs * PER_RAD)
+    value = walk.tan_alpha * _branch_by_four(branches, DEPTH, zone, k, at) + on_cs_teeth
+    slope = rises * (step + s * _branch_by_four(branches, ON_CS, zone, k, up))
+    slope += walk.tan_alpha * _branch_by_four(branches, DEPTH, zone, k, up)
+    return value, angle, slope, walk.advance * step + s * _branch_by_four(branches, ON_FS, zone, k, up)
 
 
 @inlined

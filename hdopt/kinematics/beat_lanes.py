@@ -13,7 +13,7 @@ import math
 from typing import NamedTuple
 
 from hdopt.arrays import Singles
-from hdopt.kinematics.beat_bounds import CEILING, CLEAR, CREST, DIP, FLOOR, fill_cells, fill_nodes, least_single
+from hdopt.kinematics.beat_bounds import CEILING, CLEAR, CREST, DIP, FLOOR, ROOM, fill_cells, fill_nodes
 from hdopt.kinematics.beat_grid import (
     Walk,
     Work,
@@ -22,16 +22,29 @@ from hdopt.kinematics.beat_grid import (
     fill_gaps,
     node_at,
     rims_between,
+    zone_along,
     zone_at,
 )
-from hdopt.kinematics.beat_tables import BEFORE, WRAPPED, Comb, compiled, inlined, lanes_of, one_lane, widened
-from hdopt.kinematics.lanes.single import HUGE, ZERO, narrowed, single
+from hdopt.kinematics.beat_tables import (
+    BEFORE,
+    WRAPPED,
+    Comb,
+    along_lane,
+    compiled,
+    first_least,
+    inlined,
+    lanes_of,
+    one_lane,
+    widened,
+)
+from hdopt.kinematics.lanes.single import HUGE, ZERO
 
-EPSILON = single(2.0**-23)
-FAR = single(1e6)
-"""mm: further than any deviation."""
-NARROWER = 0.125
-"""Width of the second pair of parabolas as a share of the first."""
+NEAR = 0.125
+"""How far from where a slope was taken it is followed, in halves of a cell."""
+LOOKS = 4
+"""How often at most a slope is followed."""
+FINE = 1e-9
+"""mm: gain for which it is not."""
 
 
 class Cell(NamedTuple):
@@ -54,51 +67,62 @@ class Cell(NamedTuple):
     margin: float
 
 
-class Three(NamedTuple):
-    """Values of one zone at the ends of a piece and in its middle."""
+class Found(NamedTuple):
+    """Where something is lowest or highest, and how low or high it is there."""
 
-    low: float
-    middle: float
-    high: float
+    place: float
+    value: float
+
+
+class Parabola(NamedTuple):
+    """A zone around a place: its value (mm of arc), slope and bend there, over halves of a cell."""
+
+    value: float
+    slope: float
+    bend: float
 
 
 @inlined
-def _lowest_of_two(one: Three, two: Three) -> tuple[float, float]:
-    """Where in -1..1 the larger of two parabolas is lowest, an end, a vertex, or where they cross; and how low."""
-    slope_one, bend_one = (one.high - one.low) / 2, one.high - 2 * one.middle + one.low
-    slope_two, bend_two = (two.high - two.low) / 2, two.high - 2 * two.middle + two.low
-    least, place = math.inf, 0.0
-    curve, line, level = (bend_one - bend_two) / 2, slope_one - slope_two, one.middle - two.middle
+def _through(low: float, middle: float, high: float) -> Parabola:
+    """The parabola through the ends of a cell and its middle, around that."""
+    return Parabola(middle, (high - low) / 2, high - 2 * middle + low)
+
+
+@inlined
+def _reached(of: Parabola, x: float) -> float:
+    """The value of a parabola at `x` from its place."""
+    return of.value + x * (of.slope + x * of.bend / 2)
+
+
+@inlined
+def _lower_of(one: Parabola, two: Parabola, x: float, low: float, high: float, found: Found) -> Found:
+    """The lower of what was `found` and the larger of two parabolas at `x`, kept between `low` and `high`."""
+    x = min(high, max(low, x))
+    value = max(_reached(one, x), _reached(two, x))
+    return Found(x if value < found.value else found.place, min(value, found.value))
+
+
+@inlined
+def _lowest_of_two(one: Parabola, two: Parabola, low: float, high: float) -> Found:
+    """Where from `low` to `high` the larger of two parabolas is lowest, an end, a vertex, or where they cross."""
+    curve, line, level = (one.bend - two.bend) / 2, one.slope - two.slope, one.value - two.value
     inside = max(line * line - 4 * curve * level, 0.0)
     # The two roots without loss where the curvature is small.
     lead = -(line + math.copysign(math.sqrt(inside), line)) / 2
-    for case in range(6):
-        if case == 0:
-            x = -1.0
-        elif case == 1:
-            x = 1.0
-        elif case == 2:
-            x = -slope_one / bend_one if bend_one > 0.0 else 0.0
-        elif case == 3:
-            x = -slope_two / bend_two if bend_two > 0.0 else 0.0
-        elif case == 4:
-            x = lead / curve if curve != 0.0 else 0.0
-        else:
-            x = level / lead if lead != 0.0 else 0.0
-        x = min(1.0, max(-1.0, x))
-        first = one.middle + x * (slope_one + x * bend_one / 2)
-        value = max(first, two.middle + x * (slope_two + x * bend_two / 2))
-        if value < least:
-            least, place = value, x
-    return place, least
+    found = _lower_of(one, two, low, low, high, Found(0.0, math.inf))
+    found = _lower_of(one, two, high, low, high, found)
+    found = _lower_of(one, two, -one.slope / one.bend if one.bend > 0.0 else 0.0, low, high, found)
+    found = _lower_of(one, two, -two.slope / two.bend if two.bend > 0.0 else 0.0, low, high, found)
+    found = _lower_of(one, two, lead / curve if curve != 0.0 else 0.0, low, high, found)
+    return _lower_of(one, two, level / lead if lead != 0.0 else 0.0, low, high, found)
 
 
 @inlined
-def _highest(of: Three) -> tuple[float, float]:
-    """Where in -1..1 a parabola is highest, and how high that is."""
-    slope, bend = (of.high - of.low) / 2, of.high - 2 * of.middle + of.low
-    x = min(1.0, max(-1.0, -slope / bend)) if bend < 0.0 else (1.0 if slope > 0.0 else -1.0)
-    return x, of.middle + x * (slope + x * bend / 2)
+def _highest(of: Parabola, low: float, high: float) -> Found:
+    """Where from `low` to `high` a parabola is highest."""
+    x = -of.slope / of.bend if of.bend < 0.0 else (high if of.slope > 0.0 else low)
+    x = min(high, max(low, x))
+    return Found(x, _reached(of, x))
 
 
 @inlined
@@ -109,63 +133,58 @@ def _at(walk: Walk, zone: int, rim: int, place: float, phase: int) -> float:
 
 
 @inlined
-def _narrowed(cell: Cell, x: float) -> tuple[float, float]:
-    """Centre and half the width of the narrower piece of a cell around `x` of -1..1."""
-    half = (cell.high - cell.low) / 2
-    centre = (cell.low + cell.high) / 2 + half * x
-    half *= NARROWER
-    return min(cell.high - half, max(cell.low + half, centre)), half
+def _along(walk: Walk, zone: int, rim: int, place: float, phase: int, half: float, bend: float) -> Parabola:
+    """A zone around a place and at a phase, with its slope over `half` a cell; it bends as given."""
+    value, angle, slope, turns = zone_along(walk, zone, rim, place)
+    on_fs, rises = along_lane(walk.comb, angle, phase)
+    return Parabola(value + on_fs, half * (slope + rises * turns), bend)
 
 
 @inlined
-def _replaced(of: Three, step: int, value: float) -> Three:
-    """Three values with the one that a `step` of following looks at: 1 and 3 at the ends, all others in the middle."""
-    return Three(
-        value if step == 1 else of.low, of.middle if step == 1 or step == 3 else value, value if step == 3 else of.high
-    )
-
-
-@inlined
-def _follow_least(walk: Walk, cell: Cell, phase: int, one: Three, two: Three, best: float) -> float:
-    """The lesser of `best` and the least driving deviation in a cell at one phase, of which both zones' values `one`
-    and `two` at its ends are known."""
+def _follow_least(
+    walk: Walk, cell: Cell, phase: int, one: tuple[float, float], two: tuple[float, float], best: float
+) -> float:
+    """The lesser of `best` and the least driving deviation in a cell at one phase, of which both zones' values at its
+    ends are known, `one` and `two`: parabolas through the middle say where to look, from there on slopes."""
     centre, half = (cell.low + cell.high) / 2, (cell.high - cell.low) / 2
-    # The middle first, then three places around the least of the parabolas, at last the least of theirs.
-    for step in range(5):
-        if step == 1 or step == 4:
-            x, reached = _lowest_of_two(one, two)
-            if step == 4:
-                centre += half * x
-            elif reached - walk.beside >= best:
-                break
-            else:
-                centre, half = _narrowed(cell, x)
-        place = centre + half * (step - 2) if 1 <= step <= 3 else centre
-        a, b = _at(walk, 0, cell.one, place, phase), _at(walk, 1, cell.two, place, phase)
-        best = min(best, max(a, b))
-        one, two = _replaced(one, step, a), _replaced(two, step, b)
+    a, b = _at(walk, 0, cell.one, centre, phase), _at(walk, 1, cell.two, centre, phase)
+    best = min(best, max(a, b))
+    first, second = _through(one[0], a, one[1]), _through(two[0], b, two[1])
+    x, reached = _lowest_of_two(first, second, -1.0, 1.0)
+    if reached - walk.beside >= best:
+        return best
+    for _ in range(LOOKS):
+        place = centre + half * x
+        first = _along(walk, 0, cell.one, place, phase, half, first.bend)
+        second = _along(walk, 1, cell.two, place, phase, half, second.bend)
+        here = max(first.value, second.value)
+        best = min(best, here)
+        step, reached = _lowest_of_two(first, second, max(-NEAR, -1.0 - x), min(NEAR, 1.0 - x))
+        if here - reached < FINE:
+            break
+        x += step
     return best
 
 
 @inlined
-def _follow_largest(walk: Walk, cell: Cell, phase: int, zone: int, of: Three, best: float) -> float:
-    """The larger of `best` and the largest deviation of a zone in a cell at one phase, of which its values `of` at the
-    ends are known."""
+def _follow_largest(walk: Walk, cell: Cell, phase: int, zone: int, ends: tuple[float, float], best: float) -> float:
+    """The larger of `best` and the largest deviation of a zone in a cell at one phase, of which its values at the
+    `ends` are known."""
     centre, half = (cell.low + cell.high) / 2, (cell.high - cell.low) / 2
     rim = cell.one if zone == 0 else cell.two
-    for step in range(5):
-        if step == 1 or step == 4:
-            x, reached = _highest(of)
-            if step == 4:
-                centre += half * x
-            elif reached + walk.beside <= best:
-                break
-            else:
-                centre, half = _narrowed(cell, x)
-        place = centre + half * (step - 2) if 1 <= step <= 3 else centre
-        value = _at(walk, zone, rim, place, phase)
-        best = max(best, value)
-        of = _replaced(of, step, value)
+    middle = _at(walk, zone, rim, centre, phase)
+    best = max(best, middle)
+    of = _through(ends[0], middle, ends[1])
+    x, reached = _highest(of, -1.0, 1.0)
+    if reached + walk.beside <= best:
+        return best
+    for _ in range(LOOKS):
+        of = _along(walk, zone, rim, centre + half * x, phase, half, of.bend)
+        best = max(best, of.value)
+        step, reached = _highest(of, max(-NEAR, -1.0 - x), min(NEAR, 1.0 - x))
+        if reached - of.value < FINE:
+            break
+        x += step
     return best
 
 
@@ -177,25 +196,6 @@ def _least_of_lines(one_a: float, two_a: float, one_b: float, two_b: float) -> f
     if apart_a * apart_b < 0.0:
         least = min(least, (one_a * apart_b - one_b * apart_a) / (apart_b - apart_a))
     return least
-
-
-@compiled
-def _first_of(values: Singles, value: float) -> int:
-    """The place of the first of `values` that is `value`."""
-    place = len(values)
-    for p in range(len(values)):
-        at = p if values[p] == value else len(values)
-        place = at if at < place else place
-    return place
-
-
-@inlined
-def _below(values: Singles, limit: float) -> int:
-    """How many of `values` may be below a `limit`, which is rounded upward."""
-    count, at = 0, narrowed(limit) + narrowed(abs(limit)) * EPSILON
-    for p in range(len(values)):
-        count += 1 if values[p] < at else 0
-    return count
 
 
 @inlined
@@ -210,49 +210,38 @@ def _follow_lane(walk: Walk, lanes: Singles, cell: Cell, p: int, best: float) ->
     one_a, two_a = widened(lanes[0, 0, p]), widened(lanes[0, 1, p])
     one_b, two_b = widened(lanes[1, 0, p]), widened(lanes[1, 1, p])
     if _least_of_lines(one_a, two_a, one_b, two_b) - cell.margin < best:
-        best = _follow_least(walk, cell, p, Three(one_a, 0.0, one_b), Three(two_a, 0.0, two_b), best)
+        best = _follow_least(walk, cell, p, (one_a, one_b), (two_a, two_b), best)
     return best
 
 
 @compiled
-def _least_in(walk: Walk, lanes: Singles, cell: Cell, best: float) -> float:
-    """The lesser of `best` and the least driving deviation in a cell; `lanes` (3, 2, P) are room."""
-    one_a, two_a, one_b, two_b = lanes[0, 0], lanes[0, 1], lanes[1, 0], lanes[1, 1]
+def _least_in(walk: Walk, work: Work, cell: Cell, best: float) -> float:
+    """The lesser of `best` and the least driving deviation in a cell; the lanes of `work` are room."""
+    lanes, bits = work.lanes, work.lane_bits[2, 0]
+    one_a, two_a, one_b, two_b, floors = lanes[0, 0], lanes[0, 1], lanes[1, 0], lanes[1, 1], lanes[2, 0]
     lanes_of(walk.comb, cell.one_low, cell.on_one_low, one_a)
     lanes_of(walk.comb, cell.two_low, cell.on_two_low, two_a)
     lanes_of(walk.comb, cell.one_high, cell.on_one_high, one_b)
     lanes_of(walk.comb, cell.two_high, cell.on_two_high, two_b)
-    phases = len(one_a)
-    values, floors = lanes[2, 0], lanes[2, 1]
-    for p in range(phases):
+    for p in range(len(one_a)):
         one, two = one_a[p] if one_a[p] < one_b[p] else one_b[p], two_a[p] if two_a[p] < two_b[p] else two_b[p]
-        floor = one if one > two else two
-        values[p], floors[p] = floor, floor
-    lowest = least_single(values, phases)
-    if lowest - cell.margin >= best:
-        return best
+        floors[p] = one if one > two else two
     # The most promising phase first: what it finds rules others out.
-    promising = _first_of(floors, lowest)
-    best = _follow_lane(walk, lanes, cell, promising, best)
-    floors[promising] = HUGE
-    if _differ(walk.comb) and _below(floors, best + cell.margin) > 0:
-        for p in range(phases):
-            if floors[p] - cell.margin < best:
-                best = _follow_lane(walk, lanes, cell, p, best)
-    return best
-
-
-@inlined
-def _ends(low: Singles, high: Singles, p: int) -> Three:
-    """The values of phase `p` at the ends of a cell."""
-    return Three(widened(low[p]), 0.0, widened(high[p]))
+    while True:
+        p = first_least(bits)
+        if floors[p] - cell.margin >= best:
+            return best
+        best = _follow_lane(walk, lanes, cell, p, best)
+        if not _differ(walk.comb):
+            return best
+        floors[p] = HUGE
 
 
 @compiled
-def _largest_in(walk: Walk, lanes: Singles, cell: Cell, best: float) -> float:
-    """The larger of `best` and the largest deviation of either zone in a cell; `lanes` (3, 2, P) are room."""
-    low, high, values, floors = lanes[0, 0], lanes[0, 1], lanes[1, 0], lanes[1, 1]
-    phases = len(low)
+def _largest_in(walk: Walk, work: Work, cell: Cell, best: float) -> float:
+    """The larger of `best` and the largest deviation of either zone in a cell; the lanes of `work` are room."""
+    lanes, bits = work.lanes, work.lane_bits[2, 0]
+    low, high, floors = lanes[0, 0], lanes[0, 1], lanes[2, 0]
     second = max(cell.two_low, cell.two_high) > max(cell.one_low, cell.one_high)
     for turn in range(2):
         zone = 1 - turn if second else turn
@@ -261,19 +250,16 @@ def _largest_in(walk: Walk, lanes: Singles, cell: Cell, best: float) -> float:
             continue
         lanes_of(walk.comb, a, cell.on_one_low if zone == 0 else cell.on_two_low, low)
         lanes_of(walk.comb, b, cell.on_one_high if zone == 0 else cell.on_two_high, high)
-        for p in range(phases):
-            floor = -(low[p] if low[p] > high[p] else high[p])
-            values[p], floors[p] = floor, floor
-        lowest = least_single(values, phases)
-        if cell.margin - lowest <= best:
-            continue
-        promising = _first_of(floors, lowest)
-        best = _follow_largest(walk, cell, promising, zone, _ends(low, high, promising), best)
-        floors[promising] = HUGE
-        if _differ(walk.comb) and _below(floors, cell.margin - best) > 0:
-            for p in range(phases):
-                if cell.margin - floors[p] > best:
-                    best = _follow_largest(walk, cell, p, zone, _ends(low, high, p), best)
+        for p in range(len(low)):
+            floors[p] = -(low[p] if low[p] > high[p] else high[p])
+        while True:
+            p = first_least(bits)
+            if cell.margin - floors[p] <= best:
+                break
+            best = _follow_largest(walk, cell, p, zone, (widened(low[p]), widened(high[p])), best)
+            if not _differ(walk.comb):
+                break
+            floors[p] = HUGE
     return best
 
 
@@ -304,11 +290,8 @@ def _cut(walk: Walk, low: float, high: float, one: int, two: int) -> Cell:
 
 
 @compiled
-def _where_rims_change(
-    walk: Walk, work: Work, least: float, largest: float, lowest: int, highest: int
-) -> tuple[float, float]:
-    """The lesser of `least` and the greater of `largest` and what lies in the cells in which rims may change, or in
-    cells `lowest` and `highest` of them where these are not 0."""
+def _where_rims_change(walk: Walk, work: Work, least: float, largest: float) -> tuple[float, float]:
+    """The lesser of `least` and the greater of `largest` and what lies in the cells in which rims may change."""
     cells, m = work.cells, work.cells.shape[1] - WRAPPED
     fill_gaps(walk.branches, work.grid)
     for stretch in range(fill_changes(work.grid, work.changes)):
@@ -319,32 +302,34 @@ def _where_rims_change(
         for j in range(math.floor(low), math.ceil(high)):
             i = (j if j < m else j - m) + BEFORE
             below, above = cells[FLOOR, i] < least, cells[CEILING, i] > largest
-            if cells[CLEAR, i] > ZERO or not (below or above) or (lowest > 0 and i != lowest and i != highest):
+            if cells[CLEAR, i] > ZERO or not (below or above):
                 continue
             cell = _cut(walk, max(low, float(j)), min(high, j + 1.0), one, two)
             if below:
-                least = _least_in(walk, work.lanes, cell, least)
+                least = _least_in(walk, work, cell, least)
             if above:
-                largest = _largest_in(walk, work.lanes, cell, largest)
+                largest = _largest_in(walk, work, cell, largest)
     return least, largest
 
 
 @compiled
-def _promising(cells: Singles) -> tuple[int, int]:
-    """The numbers of the `cells` with the least floor and the largest ceiling of those in which no rim changes, or else
-    of all."""
-    end = cells.shape[1] - WRAPPED + BEFORE
-    lowest = highest = BEFORE
-    floor, ceiling = HUGE, -HUGE
-    for i in range(BEFORE, end):
-        barred = ZERO if cells[CLEAR, i] > ZERO else FAR
-        here = cells[FLOOR, i] + barred
-        if here < floor:
-            lowest, floor = i, here
-        here = cells[CEILING, i] - barred
-        if here > ceiling:
-            highest, ceiling = i, here
-    return lowest, highest
+def _fill_order(cells: Singles) -> None:
+    """Fill the room of the `cells` with what they reach at least, and less what they reach at most, where no rim can
+    change: by these they are looked at."""
+    low, high, clear, floor, ceiling = cells[ROOM], cells[ROOM + 1], cells[CLEAR], cells[FLOOR], cells[CEILING]
+    for i in range(cells.shape[1] - WRAPPED + BEFORE):
+        ok, at_least, at_most = clear[i] > ZERO, floor[i], -ceiling[i]
+        low[i], high[i] = at_least if ok else HUGE, at_most if ok else HUGE
+
+
+@compiled
+def _may_matter(cells: Singles, least: float, largest: float) -> bool:
+    """Whether any of the `cells` in which rims may change reaches below `least` or above `largest`."""
+    clear, floor, ceiling, count = cells[CLEAR], cells[FLOOR], cells[CEILING], 0
+    for i in range(BEFORE, cells.shape[1] - WRAPPED + BEFORE):
+        beyond = (widened(floor[i]) < least) | (widened(ceiling[i]) > largest)
+        count += 1 if (clear[i] <= ZERO) & beyond else 0
+    return count > 0
 
 
 @compiled
@@ -353,27 +338,25 @@ def extremes_in_lanes(walk: Walk, work: Work) -> tuple[float, float]:
 
     Jia 2021, Eqs. (31), (32). `work` of `new_work` is room for it.
     """
-    cells, lanes = work.cells, work.lanes
+    cells, bits = work.cells, work.cell_bits
+    end = cells.shape[1] - WRAPPED + BEFORE
     fill_nodes(walk.branches, walk.tan_alpha, walk.circular, work.nodes)
     fill_cells(walk.circular, walk.comb, walk.slack, work.nodes, cells, work.places)
-    lowest, highest = _promising(cells)
+    _fill_order(cells)
     least, largest = math.inf, -math.inf
-    if cells[CLEAR, lowest] > ZERO:
-        least = _least_in(walk, lanes, _whole(walk, lowest), least)
-        largest = _largest_in(walk, lanes, _whole(walk, highest), largest)
-    else:
-        least, largest = _where_rims_change(walk, work, least, largest, lowest, highest)
-    may_change = False
-    for i in range(BEFORE, cells.shape[1] - WRAPPED + BEFORE):
-        below, above = cells[FLOOR, i] < least, cells[CEILING, i] > largest
-        if below or above:
-            if cells[CLEAR, i] > ZERO:
-                if below and i != lowest:
-                    least = _least_in(walk, lanes, _whole(walk, i), least)
-                if above and i != highest:
-                    largest = _largest_in(walk, lanes, _whole(walk, i), largest)
-            else:
-                may_change = True
-    if may_change:
-        least, largest = _where_rims_change(walk, work, least, largest, 0, 0)
+    # The most promising cell first: what it holds rules others out.
+    while True:
+        i = first_least(bits[ROOM, BEFORE:end]) + BEFORE
+        if cells[ROOM, i] >= min(least, HUGE):
+            break
+        least = _least_in(walk, work, _whole(walk, i), least)
+        cells[ROOM, i] = HUGE
+    while True:
+        i = first_least(bits[ROOM + 1, BEFORE:end]) + BEFORE
+        if cells[ROOM + 1, i] >= min(-largest, HUGE):
+            break
+        largest = _largest_in(walk, work, _whole(walk, i), largest)
+        cells[ROOM + 1, i] = HUGE
+    if _may_matter(cells, least, largest):
+        least, largest = _where_rims_change(walk, work, least, largest)
     return least, largest

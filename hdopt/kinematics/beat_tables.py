@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar, cast  # Any: numba's options are of several kinds
+from typing import Any, NamedTuple, TypeAlias, TypeVar, cast  # Any: numba's options are of several kinds
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from hdopt.arrays import Array, Singles
 from hdopt.kinematics.lanes.single import narrowed, unsigned
@@ -46,6 +47,14 @@ whole_of = cast("Callable[[float], int]", np.int32)
 widened = cast("Callable[[float], float]", np.float64)
 """A number in double precision, inside kernels."""
 
+wide = cast("Callable[[int], int]", np.int64)
+"""A whole number of 64 bits, inside kernels."""
+
+Bits: TypeAlias = NDArray[np.int32]
+"""Numbers in single precision as the whole numbers that their bits are."""
+BUT_SIGN, PLACE_BITS, LAST = 0x7FFFFFFF, 16, 2**63 - 1
+"""All bits but the sign of a number in single precision; bits of a place in a row; more than any number of 64 bits."""
+
 PER_RAD = 1 / (2 * math.pi)
 """Turns in a radian."""
 BEFORE, WRAPPED = 1, 4
@@ -58,14 +67,16 @@ FLOORS = 256
 
 class Comb(NamedTuple):
     """The FS `table` over one turn, wrapped around (n + 4,), and in single precision as `rows` (n/P + 4, 2 P): place i
-    of the table stands in row i mod n/P + 1, column i // (n/P), the columns twice and the rows wrapped around. Its
-    least and largest value, its steepest slope (1/rad), its largest second difference over a grid angle and third over
-    half a one, and how far cubics through its places are off lines between them; mm of arc. `floor` (K,) is the least
-    over all x, with lines between places, of max(F(x) + D/2, F(x + pi) - D/2), for differences D of both zones from 0
-    to `reach` mm, which are those for -D too: below it, less the `ripple`, the driving deviation cannot fall."""
+    of the table stands in row i mod n/P + 1, column i // (n/P), the columns twice and the rows wrapped around; `flat`
+    are these row after row. Its least and largest value, its steepest slope (1/rad), its largest second difference over
+    a grid angle and third over half a one, and how far cubics through its places are off lines between them; mm of arc.
+    `floor` (K,) is the least over all x, with lines between places, of max(F(x) + D/2, F(x + pi) - D/2), for
+    differences D of both zones from 0 to `reach` mm, which are those for -D too: below it, less the `ripple`, the
+    driving deviation cannot fall."""
 
     table: Array
     rows: Singles
+    flat: Singles
     floor: Array
     reach: float
     least: float
@@ -112,6 +123,16 @@ def four(place: float) -> Four:
 
 
 @inlined
+def rising(place: float) -> Four:
+    """The same with the weights of the cubic's slope, per place."""
+    whole = whole_of(place)
+    x = place - whole
+    square, twice = 3 * x * x, 2 * x
+    w_a, w_d = -(square - 3 * twice + 2) / 6, (square - 1) / 6
+    return Four(unsigned(whole), w_a, (square - 2 * twice - 1) / 2, -(square - twice - 2) / 2, w_d)
+
+
+@inlined
 def by_four(values: Array, at: Four) -> float:
     """The cubic of a wrapped row of `values` (n + 4,) where `at` says."""
     i = at.first
@@ -130,6 +151,19 @@ def least_of(values: Array, n: int) -> float:
             values[i] = a if a < b else b
         n = half
     return float(values[0])
+
+
+@compiled
+def first_least(bits: Bits) -> int:
+    """The place of the first of the least of some numbers in single precision, of which `bits` (n,) are those: whole
+    numbers, unlike others, the compiler compares in lanes."""
+    least = LAST
+    for i in range(len(bits)):
+        of = wide(bits[i])
+        # Below nought all but the sign turns round; the place stands behind the number.
+        ordered = ((of ^ ((of >> wide(31)) & BUT_SIGN)) << PLACE_BITS) | i
+        least = ordered if ordered < least else least
+    return least & ((1 << PLACE_BITS) - 1)
 
 
 @compiled
@@ -261,17 +295,20 @@ def fill_comb(table: Array, phases: int, stride: int, work: Teeth) -> Comb:
     reach = 1.01 * (largest - least) + TINY
     _fill_floor(table, reach, floor)
     bend, bow = differences(table, stride)
-    return Comb(wrapped, rows, floor, reach, least, largest, step * n * PER_RAD, bend, bow, ripple)
+    return Comb(
+        wrapped, rows, rows.reshape(rows.size), floor, reach, least, largest, step * n * PER_RAD, bend, bow, ripple
+    )
 
 
 @inlined
-def _on_comb(comb: Comb, angle: float) -> tuple[int, Four]:
-    """The column and the four rows of `comb` at an `angle` (rad) on the FS."""
+def _on_comb(comb: Comb, angle: float) -> tuple[int, float]:
+    """The column of `comb` at an `angle` (rad) on the FS, and the place in its rows."""
     phases, apart = comb.rows.shape[1] // 2, comb.rows.shape[0] - WRAPPED
-    spacings = angle * (PER_RAD * phases)
-    whole = math.floor(spacings)
-    column = whole_of(whole) % whole_of(phases)
-    return unsigned(column), four((spacings - whole) * apart)
+    turns = angle * PER_RAD
+    # One past the last column, where rounding has it there, is the first again.
+    spacings = (turns - math.floor(turns)) * phases
+    column = whole_of(spacings)
+    return unsigned(column), (spacings - column) * apart
 
 
 @inlined
@@ -279,20 +316,41 @@ def lanes_of(comb: Comb, value: float, angle: float, out: Singles) -> None:
     """Fill `out` (P,) with a zone's deviation at every FS phase, mm of arc: the FS term of `comb` at an `angle` (rad)
     beside the `value` of all else."""
     phases = comb.rows.shape[1] // 2
-    column, at = _on_comb(comb, angle)
-    end, beside = column + unsigned(phases), narrowed(value)
-    row_a, row_b = comb.rows[at.first, column:end], comb.rows[at.first + unsigned(1), column:end]
-    row_c, row_d = comb.rows[at.first + unsigned(2), column:end], comb.rows[at.first + unsigned(3), column:end]
+    column, place = _on_comb(comb, angle)
+    at = four(place)
+    beside, width = narrowed(value), unsigned(comb.rows.shape[1])
+    a = at.first * width + column
+    b, c, d = a + width, a + width + width, a + width + width + width
     w_a, w_b, w_c, w_d = narrowed(at.w_a), narrowed(at.w_b), narrowed(at.w_c), narrowed(at.w_d)
+    flat = comb.flat
     for p in range(phases):
-        out[p] = beside + (w_a * row_a[p] + w_b * row_b[p] + w_c * row_c[p] + w_d * row_d[p])
+        on = unsigned(p)
+        out[p] = beside + (w_a * flat[a + on] + w_b * flat[b + on] + w_c * flat[c + on] + w_d * flat[d + on])
+
+
+@inlined
+def _on_lane(comb: Comb, angle: float, phase: int) -> tuple[int, float]:
+    """Where the tooth spacing of one `phase` of an `angle` (rad) begins in the table of `comb`, and the place in it."""
+    phases, apart = comb.rows.shape[1] // 2, comb.rows.shape[0] - WRAPPED
+    column, place = _on_comb(comb, angle)
+    on = column + unsigned(phase)
+    on = on if on < unsigned(phases) else on - unsigned(phases)
+    return on * unsigned(apart), place
 
 
 @inlined
 def one_lane(comb: Comb, angle: float, phase: int) -> float:
     """The FS term of `comb` at one `phase` of an `angle` (rad), mm of arc."""
-    phases, apart = comb.rows.shape[1] // 2, comb.rows.shape[0] - WRAPPED
-    column, at = _on_comb(comb, angle)
-    on = column + unsigned(phase)
-    on = on if on < unsigned(phases) else on - unsigned(phases)
-    return by_four(comb.table, Four(on * unsigned(apart) + at.first, at.w_a, at.w_b, at.w_c, at.w_d))
+    first, place = _on_lane(comb, angle, phase)
+    at = four(place)
+    return by_four(comb.table, Four(first + at.first, at.w_a, at.w_b, at.w_c, at.w_d))
+
+
+@inlined
+def along_lane(comb: Comb, angle: float, phase: int) -> tuple[float, float]:
+    """The FS term of `comb` at one `phase` of an `angle` (rad), mm of arc, and its slope over the angle, mm per rad."""
+    first, place = _on_lane(comb, angle, phase)
+    at, up = four(place), rising(place)
+    value = by_four(comb.table, Four(first + at.first, at.w_a, at.w_b, at.w_c, at.w_d))
+    slope = by_four(comb.table, Four(first + up.first, up.w_a, up.w_b, up.w_c, up.w_d))
+    return value, slope * ((len(comb.table) - WRAPPED) * PER_RAD)

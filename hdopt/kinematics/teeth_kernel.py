@@ -14,10 +14,20 @@ from numba import njit
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
-from hdopt.kinematics.beat_bounds import CIRCULAR, DEPTH, ON_CS, ON_FS, fill_circular
-from hdopt.kinematics.beat_grid import grid_angles, new_work, walk_of
+from hdopt.kinematics.beat_bounds import CIRCULAR, DEPTH, ON_CS, ON_FS, Bends, bends_of_motion, fill_circular
+from hdopt.kinematics.beat_grid import grid_angles, new_work, walk_bent
 from hdopt.kinematics.beat_lanes import extremes_in_lanes
-from hdopt.kinematics.beat_tables import WRAPPED, circle, differences, fill_comb, new_teeth, with_sine, wrap
+from hdopt.kinematics.beat_tables import (
+    BEFORE,
+    WRAPPED,
+    circle,
+    differences,
+    fill_comb,
+    new_teeth,
+    with_sine,
+    wrap,
+    wrap_ends,
+)
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
 from hdopt.kinematics.compiled_closed_form import motion_at, motion_of_row, rim_constants, rim_depth
 from hdopt.kinematics.load_sharing import PLACES_PER_TOOTH
@@ -25,6 +35,8 @@ from hdopt.kinematics.load_sharing import PLACES_PER_TOOTH
 FEWEST_ANGLES, ANGLES_PER_TOOTH = 120, 0.75
 """Grid angles of one input turn at least, and for each tooth of the circular spline. More of them are no more right:
 what a cell may hide is computed, and followed."""
+ABREAST = 16
+"""Angles that the processor takes at once: grids are multiples of it, since what is left over goes one by one."""
 
 compiled = njit(error_model="numpy", fastmath=False)
 
@@ -48,7 +60,8 @@ def beat_constants(drive: Drive, misalignment: float = 1.0, sine_share: float = 
     """The constants of `drive`; `misalignment` and `sine_share` multiply what it makes, and what tooth sines beside a
     table make, where the teeth in contact share them."""
     gear = drive.geometry
-    m = max(FEWEST_ANGLES, int(ANGLES_PER_TOOTH * gear.circular_spline_teeth))
+    fewest = max(FEWEST_ANGLES, int(ANGLES_PER_TOOTH * gear.circular_spline_teeth))
+    m = (fewest + ABREAST - 1) // ABREAST * ABREAST
     tan_alpha = misalignment * math.tan(gear.pressure_angle)
     return BeatConstants(
         tip_geometry(drive),
@@ -75,18 +88,23 @@ def whole_tables(drive: Drive, tables: tuple[Array, Array]) -> tuple[Array, Arra
 
 
 @compiled
-def _sample(constants: BeatConstants, row: Array, branches: Array) -> None:
-    """Fill the `branches` (3, 2, 2, m + 4) of one drive on the grid angles."""
+def _sample(constants: BeatConstants, row: Array, branches: Array) -> Bends:
+    """Fill the `branches` (3, 2, 2, m + 4) of one drive on the grid angles; how far they bend at most."""
     tip = constants.tip
     motion, _, _ = motion_of_row(tip, row)
     rim = rim_constants(tip)
     cos, sin = constants.angles[0], constants.angles[1]
-    for j in range(len(cos)):
+    for j in range(BEFORE, len(cos) - WRAPPED + BEFORE):
         e_a, e_l, t_a, t_l = motion_at(motion, cos[j], sin[j])
         for zone in range(2):
             for k in range(2):
                 found = rim_depth(rim, e_a, e_l, t_a, t_l, 1.0 - 2.0 * zone, 1.0 - 2.0 * k)
                 branches[DEPTH, zone, k, j], branches[ON_CS, zone, k, j], branches[ON_FS, zone, k, j] = found
+    for zone in range(2):
+        for k in range(2):
+            for of in range(3):
+                wrap_ends(branches[of, zone, k])
+    return bends_of_motion(motion, rim, len(cos) - WRAPPED)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=False)
@@ -117,6 +135,6 @@ def beat_extremes_block(constants: BeatConstants, cs: Array, fs: Array, rows: Ar
             own = fs[i if len(fs) > 1 else 0]
             with_sine(own, constants.sine_share * row[10], row[11], constants.fs_circle, on_fs)
             comb = fill_comb(on_fs, phases, stride_fs, teeth)
-        _sample(constants, row, branches)
-        walk = walk_of(branches, circular, constants.tan_alpha, constants.advance, comb, work)
+        bends = _sample(constants, row, branches)
+        walk = walk_bent(branches, bends, circular, constants.tan_alpha, constants.advance, comb)
         out[i, 0], out[i, 1] = extremes_in_lanes(walk, work)

@@ -14,7 +14,7 @@ from numba import njit
 from hdopt.arrays import Array
 from hdopt.drive.teeth import MeasuredTeeth
 from hdopt.kinematics.beat_bounds import CEILING, CIRCULAR, FLOOR, fill_cells, fill_circular, fill_nodes
-from hdopt.kinematics.beat_grid import new_work, walk_of
+from hdopt.kinematics.beat_grid import new_work, walk_bent
 from hdopt.kinematics.beat_lanes import extremes_in_lanes
 from hdopt.kinematics.beat_tables import BEFORE, WRAPPED, differences, fill_comb, new_teeth, wrap
 from hdopt.kinematics.kernel import design_of, peak_to_peak_block
@@ -23,7 +23,7 @@ from hdopt.kinematics.teeth_kernel import BeatConstants, _sample, beat_constants
 from tests.cases import drive, random_errors
 
 DRIVES = 4000
-STAGES = ("outermost points", "how far cells bend", "zones at the angles", "bounds", "cells left")
+STAGES = ("outermost points", "what bounds allow for", "zones at the angles", "bounds", "cells left")
 
 
 @njit(error_model="numpy")
@@ -39,9 +39,9 @@ def walked(stages: int, constants: BeatConstants, cs: Array, fs: Array, rows: Ar
     comb = fill_comb(fs[0], phases, stride_fs, new_teeth(fs.shape[1], phases))
     least = largest = 0
     for row in rows:
-        _sample(constants, row, branches)
+        bends = _sample(constants, row, branches)
         if stages > 1:
-            walk = walk_of(branches, circular, constants.tan_alpha, constants.advance, comb, work)
+            walk = walk_bent(branches, bends, circular, constants.tan_alpha, constants.advance, comb)
             if 2 < stages < 5:
                 fill_nodes(branches, constants.tan_alpha, circular, work.nodes)
             if stages == 4:
