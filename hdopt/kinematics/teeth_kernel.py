@@ -18,7 +18,6 @@ from hdopt.kinematics.beat_bounds import CIRCULAR, DEPTH, ON_CS, ON_FS, Bends, b
 from hdopt.kinematics.beat_grid import grid_angles, new_work, walk_bent
 from hdopt.kinematics.beat_lanes import extremes_in_lanes
 from hdopt.kinematics.beat_tables import (
-    BEFORE,
     WRAPPED,
     circle,
     differences,
@@ -26,7 +25,6 @@ from hdopt.kinematics.beat_tables import (
     new_teeth,
     with_sine,
     wrap,
-    wrap_ends,
 )
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
 from hdopt.kinematics.compiled_closed_form import motion_at, motion_of_row, rim_constants, rim_depth
@@ -94,16 +92,12 @@ def _sample(constants: BeatConstants, row: Array, branches: Array) -> Bends:
     motion, _, _ = motion_of_row(tip, row)
     rim = rim_constants(tip)
     cos, sin = constants.angles[0], constants.angles[1]
-    for j in range(BEFORE, len(cos) - WRAPPED + BEFORE):
+    for j in range(len(cos)):
         e_a, e_l, t_a, t_l = motion_at(motion, cos[j], sin[j])
         for zone in range(2):
             for k in range(2):
                 found = rim_depth(rim, e_a, e_l, t_a, t_l, 1.0 - 2.0 * zone, 1.0 - 2.0 * k)
                 branches[DEPTH, zone, k, j], branches[ON_CS, zone, k, j], branches[ON_FS, zone, k, j] = found
-    for zone in range(2):
-        for k in range(2):
-            for of in range(3):
-                wrap_ends(branches[of, zone, k])
     return bends_of_motion(motion, rim, len(cos) - WRAPPED)
 
 
