@@ -15,8 +15,8 @@ from hdopt.parallel.shared_memory import in_blocks
 BLOCK = 8192
 """Drives a thread takes at a time: long enough to hide the hand-over, short enough to keep all cores busy."""
 
-BEAT_BLOCK = 256
-"""The same where each drive's beat is walked."""
+BEAT_BLOCK = 512
+"""The same where each drive's beat is walked; what all of them share is made anew for each block."""
 
 
 def peak_to_peak_arcmin(drive: Drive, errors: DriveErrors) -> Array:
