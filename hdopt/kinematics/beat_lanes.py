@@ -41,7 +41,7 @@ from hdopt.kinematics.lanes.single import HUGE, ZERO
 
 NEAR = 0.125
 """How far from where a slope was taken it is followed, in halves of a cell."""
-LOOKS = 4
+LOOKS = 8
 """How often at most a slope is followed."""
 FINE = 1e-9
 """mm: gain for which it is not."""
