@@ -94,6 +94,18 @@ class BaseSettings:
     starts: int = threshold(16, "1", "choice: effort; a start more than once met in the best minimum")
     starts_again: int = threshold(4, "1", "choice: starts beside a minimum that is known")
     starts_clean: int = threshold(12, "1", "choice: starts beside smooth columns")
+    wavy: float = threshold(
+        1.25,
+        "1",
+        "measured: what the base and smooth columns leave over the noise: up to 1.22 in 32 cases of run-010 in which "
+        "they suffice, from 1.7 on where the teeth have waves",
+    )
+    wavy_share: float = threshold(
+        0.5,
+        "1",
+        "choice: part of what smooth columns leave above the noise that waves of the teeth may leave; in run-010 they "
+        "leave nearly none of what teeth, and nearly all of what foreign orders and lines make",
+    )
     starts_joint: int = threshold(10, "1", "choice: starts beside a set of effects")
     rows_for_starts: int = threshold(1750, "rows", "choice: effort; the twelve errors live below order 6")
     smallest_start: float = threshold(0.15, "1", "choice: size of a random drive over the prior")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -12,6 +11,13 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.diagnosis.inference.base_fit import fit_base
 from hdopt.diagnosis.inference.catalogue import SCALE, STRAIN_WAVE_ONLY
+from hdopt.diagnosis.inference.clean_base import (
+    beside_smooth,
+    beside_waves,
+    drive_alone,
+    fit_clean_base,
+    power_beside_smooth,
+)
 from hdopt.diagnosis.inference.common_slope import TakenSlope, common_slope, input_is_off
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.generic_basis import generic_columns
@@ -26,13 +32,9 @@ from hdopt.diagnosis.search.search_state import SearchPlan, SearchState, names_o
 from hdopt.diagnosis.search.subset_search import Selection, first_look, leading_evidence, select, select_from
 from hdopt.diagnosis.settings import DiagnosisSettings
 from hdopt.diagnosis.state import Guess, State
-from hdopt.effects.sines import sine_columns
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import Recording
 from hdopt.recordings.rows import gather, neighbours_for
-
-ORDER_DOMAINS = ("integer order", "output-synchronous order", "asynchronous order")
-"""Domains of the generic basis in which the base itself lives."""
 
 
 def begin(
@@ -122,30 +124,16 @@ def fit_time_warp(state: State) -> State:
 
 
 def fit_base_in_noise(state: State) -> State:
-    """The noise is measured, and the base fitted in it, once as it is and once beside smooth columns. `state` is
-    where the work stands.
+    """The noise is measured, and the base fitted in it, once as it is and once beside smooth columns; where these leave
+    much, also beside waves of the teeth. `state` is where the work stands.
     """
     rng, settings = state.draws(), state.settings.base
     measured = measure_noise(state.base)
     problem = state.problem.with_noise(measured.noise)
     base = refine(fit_base(problem, rng, settings.starts_again, near=state.base), settings.measured_iterations)
     clean = fit_clean_base(problem, rng)
-    return replace(state, base=base, clean=clean, inflation=measured.inflation, rng=rng)
-
-
-def fit_clean_base(problem: FitProblem, rng: np.random.Generator) -> Fit | None:
-    """The base of `problem` fitted beside smooth columns that soak up most additive physics, from drives drawn by
-    `rng`, then looked at without them.
-    """
-    if problem.base is None:
-        return None
-    columns, domains = generic_columns(problem.rows, settings=problem.settings.generic)
-    wanted = [i for i, domain in enumerate(domains) if domain not in ORDER_DOMAINS]
-    nuisance = np.column_stack([problem.nuisance, columns[:, wanted], sine_columns(problem.rows.theta, [1])])
-    fit = fit_base(replace(problem, nuisance=nuisance), rng, problem.settings.base.starts_clean)
-    bare = evaluate(problem, fit.errors, fit.offsets[: problem.nuisance.shape[1]], (), ())
-    offset = np.linalg.lstsq(problem.nuisance, bare.residual, rcond=None)[0]
-    return evaluate(problem, fit.errors, bare.offsets + offset, (), ())
+    wavy = None if clean is None else beside_waves(beside_smooth(clean), copy.deepcopy(rng))
+    return replace(state, base=base, clean=clean, wavy=wavy, inflation=measured.inflation, rng=rng)
 
 
 def choose_orientation(state: State) -> State:
@@ -177,12 +165,22 @@ def oriented(state: State, undecided: Callable[[State, State], State]) -> State:
     if not abs(preferred[0]) > settings.orientation.base_alone and state.clean is not None:
         clean = fit_clean_base(turned.problem, rng)
         if clean is not None:
-            preferred.append(preference(beside_smooth(state.clean), beside_smooth(clean)))
+            preferred = preferences_beside(preferred, state, beside_smooth(clean), rng)
     turned = replace(turned, orientation=Orientation(-1, -output, "data"))
     state = replace(state, orientation=Orientation(1, output, "data"))
     if is_decisive(preferred, settings.orientation):
         return state if preferred[0] > 0 else fit_base_in_noise(turned)
     return undecided(state, turned)
+
+
+def preferences_beside(alone: Sequence[float], state: State, turned: Fit, rng: np.random.Generator) -> list[float]:
+    """The preferences of the base of `state`, `alone` and beside smooth columns, of which `turned` is the fit turned
+    round; that beside waves of the teeth in place of both where there are such, by which bases that do without are
+    bent. `rng` draws new drives.
+    """
+    if state.clean is None or state.wavy is None:
+        return [*alone, *([] if state.clean is None else [preference(beside_smooth(state.clean), turned)])]
+    return [preference(state.wavy, beside_waves(turned, rng) or turned)]
 
 
 def begin_turned(state: State) -> State:
@@ -194,23 +192,6 @@ def begin_turned(state: State) -> State:
     return set_strong_ripple_aside(
         first_fit(turn_round(state.recordings), state.problem.base, rng, state.settings, asked, taken)
     )
-
-
-def beside_smooth(clean: Fit) -> Fit:
-    """A `clean` base's fit with its smooth columns beside it: what it was fitted for."""
-    problem = clean.problem
-    columns, domains = generic_columns(problem.rows, settings=problem.settings.generic)
-    wanted = [i for i, domain in enumerate(domains) if domain not in ORDER_DOMAINS]
-    own = np.column_stack([problem.nuisance, columns[:, wanted], sine_columns(problem.rows.theta, [1])])
-    beside = replace(problem, nuisance=own)
-    free = np.r_[clean.offsets, np.zeros(own.shape[1] - len(clean.offsets))]
-    return refine(evaluate(beside, clean.errors, free, (), ()), problem.settings.fit.offset_iterations)
-
-
-def power_beside_smooth(problem: FitProblem, rng: np.random.Generator) -> float:
-    """What the base of `problem`, from drives drawn by `rng`, and smooth columns leave: a whitened sum of squares."""
-    clean = fit_clean_base(problem, rng)
-    return math.inf if clean is None else beside_smooth(clean).objective
 
 
 def smooth_model(
@@ -289,7 +270,8 @@ def unexplained(state: State) -> float:
 def plan_of(state: State) -> SearchPlan:
     """What a search from `state` on is to do."""
     known = leaders_on(state.selection, state.problem)
-    return SearchPlan(skip=state.ruled_out, clean=state.clean, known=known)
+    wavy = None if state.wavy is None else drive_alone(state.wavy, state.problem)
+    return SearchPlan(skip=state.ruled_out, clean=state.clean, wavy=wavy, known=known)
 
 
 def search_effects(state: State) -> State:

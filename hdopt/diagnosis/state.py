@@ -35,7 +35,8 @@ class State:
     """Where a diagnosis stands.
 
     `recordings` with their errors about one zero; the `nuisances` beside every model and the effects `ruled_out`; the
-    best `base` fit, and `clean`, one less bent towards what is missing (None for a gear without a base); the
+    best `base` fit; `clean`, one less bent towards what is missing (None for a gear without a base), and `wavy`, one
+    beside smooth columns and waves of the teeth (None where those are not needed); the
     `selection` of explanations (the base alone, before any was looked for) and what they leave: the selection of
     `high` orders on the rows as recorded (None where none can be held) and what its best adds to these rows,
     (n,) arcmin (`ripple`, None for nothing). `inflation` says how much rougher the noise is than its model. `rng` is
@@ -60,6 +61,7 @@ class State:
     searched: bool = False
     looked: SearchState | None = None
     guesses: tuple[Guess, ...] = ()
+    wavy: Fit | None = None
 
     @property
     def problem(self) -> FitProblem:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hdopt.diagnosis import stages
+from hdopt.diagnosis.inference import clean_base
 from hdopt.diagnosis.inference.common_slope import TakenSlope
 from hdopt.diagnosis.orientation import Orientation
 from hdopt.diagnosis.search.candidates import Candidate
@@ -102,6 +103,18 @@ def test_where_it_is_not_the_bases_beside_smooth_columns_must_agree(ways):
     assert (state.orientation.input, turned.orientation.input) == (1, -1)
     assert turned.problem.noise is state.problem.noise
     assert ways(1.0, 1.2, 1.0, 9.0)[0] == "effects"
+
+
+def test_beside_waves_of_the_teeth_the_bent_bases_are_not_asked(monkeypatch):
+    """A base that is bent by waves prefers either way, bare and beside smooth columns: only the bases beside waves
+    decide, or, turned round, the one beside smooth columns where no waves help it. Faults caught: the bent ones asked
+    too, the way of the turned base without its waves.
+    """
+    state = state_of(Told("bent"), clean=Told("clean"), wavy=Told("wavy", 2.0))
+    monkeypatch.setattr(stages, "beside_waves", lambda fit, rng: Told("turned, wavy", 6.0))
+    assert stages.preferences_beside([-5.0], state, Told("turned", 40.0), None) == [pytest.approx(np.log(3.0))]
+    monkeypatch.setattr(stages, "beside_waves", lambda fit, rng: None)
+    assert stages.preferences_beside([-5.0], state, Told("turned", 40.0), None) == [pytest.approx(np.log(20.0))]
 
 
 def test_what_is_left_counts_in_noise_variances_half(monkeypatch):
@@ -418,8 +431,8 @@ def test_whether_the_input_is_off_is_asked_of_the_base_alone_and_beside_smooth_c
         return Told("output" if problem.noise is taken else "input", 1.0)
 
     monkeypatch.setattr(stages, "first_fit", fitted)
-    monkeypatch.setattr(stages, "fit_clean_base", clean)
-    monkeypatch.setattr(stages, "beside_smooth", lambda fit: replace(fit, objective=beside[fit.name == "input"]))
+    monkeypatch.setattr(clean_base, "fit_clean_base", clean)
+    monkeypatch.setattr(clean_base, "beside_smooth", lambda fit: replace(fit, objective=beside[fit.name == "input"]))
     angle = np.linspace(0.0, 9.0, 3)
     assert stages.begin([Recording("", 80.0, angle, angle)], "a base", 1, DEFAULT).base.name == chosen
 
@@ -439,11 +452,11 @@ def smooth(monkeypatch):
 
     columns = np.array([[10.0, 20.0, 30.0], [11.0, 21.0, 31.0]])
     domains = ["integer order", "time", "torque"]
-    monkeypatch.setattr(stages, "generic_columns", lambda rows, settings: (columns, domains))
-    monkeypatch.setattr(stages, "sine_columns", lambda theta, orders: np.array([[40.0], [41.0]]))
-    monkeypatch.setattr(stages, "fit_base", fit_base)
-    monkeypatch.setattr(stages, "evaluate", evaluate)
-    monkeypatch.setattr(stages, "refine", lambda fit, iterations: fit)
+    monkeypatch.setattr(clean_base, "generic_columns", lambda rows, settings: (columns, domains))
+    monkeypatch.setattr(clean_base, "sine_columns", lambda theta, orders: np.array([[40.0], [41.0]]))
+    monkeypatch.setattr(clean_base, "fit_base", fit_base)
+    monkeypatch.setattr(clean_base, "evaluate", evaluate)
+    monkeypatch.setattr(clean_base, "refine", lambda fit, iterations: fit)
     return seen
 
 
@@ -456,17 +469,17 @@ def test_a_clean_base_is_fitted_beside_what_is_not_its_own(smooth, monkeypatch):
     zero is the mean of what is left. Faults caught: the base's own orders beside it, the smooth columns' zero kept.
     """
     fitted = []
-    own = stages.fit_base
-    monkeypatch.setattr(stages, "fit_base", lambda problem, *rest: fitted.append(problem) or own(problem, *rest))
-    fit = stages.fit_clean_base(POSED, np.random.default_rng(0))
+    own = clean_base.fit_base
+    monkeypatch.setattr(clean_base, "fit_base", lambda problem, *rest: fitted.append(problem) or own(problem, *rest))
+    fit = clean_base.fit_clean_base(POSED, np.random.default_rng(0))
     np.testing.assert_array_equal(fitted[0].nuisance[0], BESIDE)
     assert fit.problem is POSED
     assert fit.offsets == pytest.approx([1.0 + 4.0])
-    assert stages.fit_clean_base(replace(POSED, base=None), np.random.default_rng(0)) is None
+    assert clean_base.fit_clean_base(replace(POSED, base=None), np.random.default_rng(0)) is None
 
 
 def test_beside_smooth_columns_it_has_them_again(smooth):
     clean = SimpleNamespace(problem=POSED, errors="errors", offsets=np.array([5.0]))
-    fit = stages.beside_smooth(clean)
+    fit = clean_base.beside_smooth(clean)
     np.testing.assert_array_equal(fit.problem.nuisance[0], BESIDE)
     np.testing.assert_array_equal(fit.offsets, [5.0, 0.0, 0.0, 0.0])

@@ -20,13 +20,15 @@ Names = frozenset[str]
 @dataclass(frozen=True)
 class SearchPlan:
     """What a search is to do: effects to `skip`; the `order_range` that it looks at (None: all that the rows hold);
-    `clean`, a base fitted beside smooth columns, less bent towards what is missing, from which it also starts; `known`,
-    the leaders of an earlier search, from which it goes on; and what was `subtracted` from the rows before.
+    `clean`, a base fitted beside smooth columns, less bent towards what is missing, from which it also starts, and
+    `wavy`, one fitted beside waves of the teeth, if those were needed; `known`, the leaders of an earlier search, from
+    which it goes on; and what was `subtracted` from the rows before.
     """
 
     skip: tuple[str, ...] = ()
     order_range: tuple[float, float] | None = None
     clean: Fit | None = None
+    wavy: Fit | None = None
     known: tuple[Fit, ...] = ()
     subtracted: SubtractedTerms = NOTHING_SUBTRACTED
 

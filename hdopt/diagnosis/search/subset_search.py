@@ -103,7 +103,18 @@ def explore_base(state: SearchState) -> SearchState:
     if state.fits:
         return state
     pool = state.terms_for(state.probe(state.base))
-    return teeth_from_new_drives(explore(state, state.base, pool, afresh=True), pool)
+    return about_wavy_base(teeth_from_new_drives(explore(state, state.base, pool, afresh=True), pool))
+
+
+def about_wavy_base(state: SearchState) -> SearchState:
+    """The best sets about a base that was fitted beside waves of the teeth, where one was: those bend every other base.
+    `state` is where the work stands; the draws are its own.
+    """
+    wavy = state.plan.wavy
+    if wavy is None:
+        return state
+    own = replace(state, rng=copy.deepcopy(state.rng))
+    return replace(explore(own, wavy, own.terms_for(own.probe(wavy))), rng=state.rng)
 
 
 def teeth_from_new_drives(state: SearchState, pool: Sequence[Term]) -> SearchState:

@@ -1,0 +1,94 @@
+"""A base that is less bent towards what is missing: fitted beside columns that soak up what the model leaves out.
+
+Smooth columns take up what is additive: load, speed, time, reversals. Waves of the teeth act inside the meshing zones
+and choose which one drives; a base without them is drawn to the end of its box, and all that is looked for about such
+a base is wrong. Beside them it comes to the drive from nearly every start.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from hdopt.diagnosis.inference.base_fit import fit_base
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.generic_basis import generic_columns
+from hdopt.effects.sines import sine_columns
+
+ORDER_DOMAINS = ("integer order", "output-synchronous order", "asynchronous order")
+"""Domains of the generic basis in which the base itself lives."""
+
+WAVES_OF_TEETH = tuple(
+    tuple((f"{spline}_tooth_harmonics", last) for spline in splines)
+    for last in (8, 24)
+    for splines in (("fs",), ("cs",), ("fs", "cs"))
+)
+"""Sets of waves of the teeth by effect, from the second wave to the last: long ones of either spline and of both."""
+
+
+def fit_clean_base(problem: FitProblem, rng: np.random.Generator) -> Fit | None:
+    """The base of `problem` fitted beside smooth columns that soak up most additive physics, from drives drawn by
+    `rng`, then looked at without them.
+    """
+    if problem.base is None:
+        return None
+    return drive_alone(fit_base(with_smooth_columns(problem), rng, problem.settings.base.starts_clean), problem)
+
+
+def with_smooth_columns(problem: FitProblem) -> FitProblem:
+    """`problem` with smooth columns, and a sine once a turn, free beside the base."""
+    columns, domains = generic_columns(problem.rows, settings=problem.settings.generic)
+    wanted = [i for i, domain in enumerate(domains) if domain not in ORDER_DOMAINS]
+    own = np.column_stack([problem.nuisance, columns[:, wanted], sine_columns(problem.rows.theta, [1])])
+    return replace(problem, nuisance=own)
+
+
+def drive_alone(fit: Fit, problem: FitProblem) -> Fit:
+    """The drive of `fit`, made beside more than `problem` has, on that problem and without terms."""
+    bare = evaluate(problem, fit.errors, fit.offsets[: problem.nuisance.shape[1]], (), ())
+    offset = np.linalg.lstsq(problem.nuisance, bare.residual, rcond=None)[0]
+    return evaluate(problem, fit.errors, bare.offsets + offset, (), ())
+
+
+def beside_smooth(clean: Fit) -> Fit:
+    """A `clean` base's fit with its smooth columns beside it: what it was fitted for."""
+    beside = with_smooth_columns(clean.problem)
+    free = np.r_[clean.offsets, np.zeros(beside.nuisance.shape[1] - len(clean.offsets))]
+    return refine(evaluate(beside, clean.errors, free, (), ()), beside.settings.fit.offset_iterations)
+
+
+def power_beside_smooth(problem: FitProblem, rng: np.random.Generator) -> float:
+    """What the base of `problem`, from drives drawn by `rng`, and smooth columns leave: a whitened sum of squares."""
+    clean = fit_clean_base(problem, rng)
+    return math.inf if clean is None else beside_smooth(clean).objective
+
+
+def beside_waves(smooth: Fit, rng: np.random.Generator) -> Fit | None:
+    """The base of `smooth`, its fit beside smooth columns, with those waves of the teeth beside these that pay best for
+    their freedom, from drives drawn by `rng`; None where it leaves no more than noise, or where waves take up little of
+    what is above it.
+    """
+    problem, settings = smooth.problem, smooth.problem.settings.base
+    if problem.base is None:
+        return None
+    variance = problem.noise.sigma**2
+    of_noise = problem.weighed_rows * variance
+    if smooth.objective < settings.wavy * of_noise:
+        return None
+
+    def cost(fit: Fit) -> float:
+        return fit.objective / variance + sum(term.width for term in fit.terms) * math.log(problem.weighed_rows)
+
+    fits = [smooth]
+    for members in WAVES_OF_TEETH:
+        runs = [(effect, {"members": tuple(range(2, last + 1))}) for effect, last in members]
+        able = all(problem.explanations[effect].lacks(problem.rows) is None for effect, _ in runs)
+        if able and 2 * members[0][1] < problem.rows.rows_per_turn:
+            terms = tuple(
+                problem.explanations[effect].term(problem.rows, shape, smooth.motion) for effect, shape in runs
+            )
+            fits.append(fit_base(problem, rng, settings.starts_clean, terms=terms))
+    best = min(fits, key=cost)
+    return best if best.objective - of_noise < settings.wavy_share * (smooth.objective - of_noise) else None
