@@ -16,7 +16,7 @@ from hdopt.cli.recorded import RecordingOptions, recording_options
 from hdopt.words import counted
 
 if TYPE_CHECKING:
-    from hdopt.diagnosis.verdict.diagnosis import Diagnosis
+    from hdopt.diagnosis.verdict.diagnosis import Diagnosis, FitNumbers
     from hdopt.diagnosis.verdict.many import DiagnosedBatch
 
 MOST_LISTED = 12
@@ -125,7 +125,7 @@ def _lines(diagnosis: Diagnosis) -> Iterator[str]:
     if fit["heldout_nested_rms_arcmin"] is not None:
         yield (
             f"  turns that no stage saw: base {fit['heldout_nested_rms_base_arcmin']:.4f}, extended "
-            f"{fit['heldout_nested_rms_arcmin']:.4f} arcmin"
+            f"{fit['heldout_nested_rms_arcmin']:.4f} arcmin{_proposed(fit)}"
         )
     if fit["heldout_conditions_rms_base_arcmin"] is not None:
         yield (
@@ -136,3 +136,9 @@ def _lines(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"  nuisance {name} {p.value:.3g}  ({p.low:.3g} to {p.high:.3g}) {p.unit}"
     for warning in diagnosis.warnings:
         yield f"  note: {warning}"
+
+
+def _proposed(fit: FitNumbers) -> str:
+    """What the numbers of `fit` say of the set that the turns left to a part prefer to what was found on them alone."""
+    proposed = fit["heldout_proposed_rms_arcmin"]
+    return "" if proposed is None else f"; what all turns found, fitted without these: {proposed:.4f} arcmin"

@@ -4,12 +4,17 @@ What is refitted by one linear step with the rest in sight (`inference.cross_val
 zones and noise chosen on the very turns that it then predicts. Here the turns are taken out of the recordings before
 the first stage; orientation, scale, noise, search, shapes and drive all come from what is left (an orientation that
 the base leaves open is not searched for twice). One split: a fold more would cost one diagnosis more.
+
+A search may miss what is there: the two zones of a drive make many minima, and fewer turns hold fewer of its ways. So
+what the search on all turns found is proposed to the turns that were left; where these prefer it to what was found on
+them alone, that was missed, and `of_proposal` says what it leaves of the hidden turns.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +24,7 @@ from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut, hidden_samples
 from hdopt.diagnosis.orientation import turn_round
 from hdopt.diagnosis.search.high_order import subtract
 from hdopt.diagnosis.settings import DiagnosisSettings
+from hdopt.diagnosis.stages import on_problem
 from hdopt.diagnosis.state import Guess, State
 from hdopt.effects.term import Term
 from hdopt.recordings.recording import Recording
@@ -27,11 +33,68 @@ from hdopt.recordings.rows import Rows, gather, neighbours_for
 Pipeline = Callable[[Sequence[Recording]], State]
 
 
-def nested_held_out(
+@dataclass(frozen=True)
+class Part:
+    """A diagnosis of the turns that were left: what its `base` alone and all that it chose (`best`) make of all turns,
+    fitted to those that were left; which rows hold hidden samples (`touched`, (n,)) and which nothing else (`hidden`,
+    (n,)); the `effects` found, and with how many coefficients and shapes (`freedom`), those of high orders among them;
+    and `guesses` for a search on all turns.
+    """
+
+    base: Fit
+    best: Fit
+    touched: Mask
+    hidden: Mask
+    effects: tuple[str, ...]
+    freedom: int
+    guesses: tuple[Guess, ...]
+
+    @property
+    def held_out(self) -> NestedHeldOut:
+        """Errors of what was found on the turns that were left, on those that were hidden."""
+        return self._errors_of(self.base, self.best, self.effects)
+
+    def of_proposal(self, found: State) -> NestedHeldOut | None:
+        """Errors on the hidden turns of the best set of `found`, the last state of the diagnosis of all turns, fitted
+        to those that were left, on the rows of `found`: without the ripple that it took out. None where the turns that
+        were left do not clearly prefer it to what was found on them alone, by Schwarz's criterion.
+        """
+        best = found.selection.best.fit
+        settings = best.problem.settings
+        if best.problem.base is None or not best.terms or len(best.residual) != len(self.best.residual):
+            return None
+        problem = best.problem.with_noise(best.problem.noise.without(self.touched))
+        base, fit = (
+            refine(on_problem(one, problem), settings.fit.settled_iterations) for one in (found.selection.base, best)
+        )
+        effects, freedom = all_found(found)
+
+        def cost(residual: Array, coefficients: int) -> float:
+            power = float(np.sum(problem.noise.whiten(residual) ** 2)) / problem.noise.sigma**2 / found.inflation
+            return (power + coefficients * math.log(problem.weighed_rows)) / 2
+
+        # Turned round, a residual is the same but for its sign.
+        gained = cost(self.best.residual, self.freedom) - cost(fit.residual, freedom)
+        return self._errors_of(base, fit, effects) if gained > settings.search.better else None
+
+    def _errors_of(self, base: Fit, extended: Fit, effects: tuple[str, ...]) -> NestedHeldOut:
+        """Errors of the `base` alone and of the `extended` fit on the hidden turns."""
+        left = [_rms(fit.residual[self.hidden]) for fit in (base, extended)]
+        return NestedHeldOut(left[0], left[1], len(np.unique(base.problem.rows.block[self.hidden])), effects)
+
+
+def all_found(state: State) -> tuple[tuple[str, ...], int]:
+    """The effects that `state` found, in the order of the alphabet, and their coefficients and shapes."""
+    found = [one.best.fit for one in (state.selection, state.high) if one is not None]
+    terms = [term for fit in found for term in fit.terms]
+    return tuple(sorted({term.effect for term in terms})), sum(term.freedom for term in terms)
+
+
+def diagnosis_of_a_part(
     recordings: Sequence[Recording], pipeline: Pipeline, seed: int, settings: DiagnosisSettings
-) -> tuple[NestedHeldOut, tuple[Guess, ...]] | None:
-    """The error of the last state of `pipeline`, run on some turns of the `recordings`, on the turns that were hidden
-    from it, and what it found; None where too few can be hidden. Turns are drawn with `seed`, by the `settings`.
+) -> Part | None:
+    """What the last state of `pipeline`, run on some turns of the `recordings`, makes of all of them; None where too
+    few can be hidden. Turns are drawn with `seed`, by the `settings`.
     """
     hidden = hidden_samples(recordings, np.random.default_rng(seed), settings.held_out)
     if hidden is None:
@@ -42,11 +105,8 @@ def nested_held_out(
     neighbours = neighbours_for(recordings)
     rows = gather(subtract(seen, ripple_of(seen, state)), neighbours)
     share = shares_of_samples(seen, hidden, neighbours)
-    best, base = state.selection.best.fit, state.selection.base
-    errors = [_rms(refitted(fit, rows, share > 0, state).residual[share == 1]) for fit in (base, best)]
-    named = {name for found in (state.selection, state.high) if found is not None for name in found.best.effects}
-    turns = len(np.unique(rows.block[share == 1]))
-    return NestedHeldOut(errors[0], errors[1], turns, tuple(sorted(named))), state.as_guesses()
+    base, best = (refitted(fit, rows, share > 0, state) for fit in (state.selection.base, state.selection.best.fit))
+    return Part(base, best, share > 0, share == 1, *all_found(state), state.as_guesses())
 
 
 def as_seen(recordings: Sequence[Recording], hidden: Sequence[Mask], state: State) -> tuple[Recording, ...]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from hdopt.diagnosis.checks.assessment import Evidence, assess
 from hdopt.diagnosis.inference.encoder_steps import without_output_steps
-from hdopt.diagnosis.nested import nested_held_out
+from hdopt.diagnosis.nested import diagnosis_of_a_part
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
 from hdopt.diagnosis.stages import STAGES, STAGES_OF_A_PART, begin, smooth_model
 from hdopt.diagnosis.state import Guess, State
@@ -25,7 +25,7 @@ def gather_evidence(
     """Run all stages on `recordings` with the `base` model (None for a gear without one); random drives are drawn
     with `seed`, and `nuisance` names what is free beside the model (`inference.nuisance`). `settings` are the
     thresholds. Steps of a coarse output encoder are taken out first. All else is done once more on a part of the turns,
-    and looked at on the others; what was found there is tried on all of them.
+    and looked at on the others; what was found there is tried on all of them, and what was found on all of them there.
     """
 
     def run(
@@ -40,6 +40,8 @@ def gather_evidence(
         recordings, lambda some: smooth_model(some, base, seed, settings, nuisance), settings.encoder_steps
     )
     # First, so that what it worked with is gone before the diagnosis itself is in memory.
-    nested = nested_held_out(recordings, lambda some: run(some, STAGES_OF_A_PART), seed, settings)
-    held_out, guesses = nested or (None, ())
-    return replace(assess(run(recordings, STAGES, guesses)), nested=held_out)
+    part = diagnosis_of_a_part(recordings, lambda some: run(some, STAGES_OF_A_PART), seed, settings)
+    if part is None:
+        return assess(run(recordings, STAGES))
+    state = run(recordings, STAGES, part.guesses)
+    return replace(assess(state), nested=part.held_out, proposed=part.of_proposal(state))

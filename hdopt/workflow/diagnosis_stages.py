@@ -42,9 +42,9 @@ def _stages() -> dict[CodeType, str]:
 
 def _part() -> CodeType:
     """The code of the diagnosis of a part of the turns."""
-    from hdopt.diagnosis.nested import nested_held_out
+    from hdopt.diagnosis.nested import diagnosis_of_a_part
 
-    return nested_held_out.__code__
+    return diagnosis_of_a_part.__code__
 
 
 @dataclass

@@ -45,16 +45,16 @@ def test_a_watch_sees_stage_pass_and_what_is_left(seen, monkeypatch):
         look()
         return state
 
-    def nested_held_out(recordings):
+    def diagnosis_of_a_part(recordings):
         look()
         search_effects(None)
 
     monkeypatch.setattr(stages, "search_effects", search_effects)
     known = {search_effects.__code__: "search of effects"}
     monkeypatch.setattr(diagnosis_stages, "_stages", lambda: known)
-    monkeypatch.setattr(diagnosis_stages, "_part", lambda: nested_held_out.__code__)
+    monkeypatch.setattr(diagnosis_stages, "_part", lambda: diagnosis_of_a_part.__code__)
     look()
-    nested_held_out([])
+    diagnosis_of_a_part([])
     for _ in range(9):
         search_effects(None)
     assert said[0] == ""
@@ -67,7 +67,7 @@ def test_a_watch_sees_stage_pass_and_what_is_left(seen, monkeypatch):
 
 def test_the_real_functions_are_the_ones_that_are_looked_for():
     """Would catch a pipeline that runs its part under another name: the words of the first pass would never come."""
-    assert pipeline.nested_held_out.__code__ is diagnosis_stages._part()
+    assert pipeline.diagnosis_of_a_part.__code__ is diagnosis_stages._part()
     assert pipeline.begin.__code__ in diagnosis_stages._stages()
     assert pipeline.assess.__code__ in diagnosis_stages._stages()
 

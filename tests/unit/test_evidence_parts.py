@@ -170,14 +170,15 @@ def hidden(monkeypatch):
 
     def refitted(fit, rows, mask, state):
         left_out.append(mask.tolist())
-        return SimpleNamespace(residual=fit.size * np.array([100.0, -3.0, 10.0, 4.0]))
+        problem = SimpleNamespace(rows=SimpleNamespace(block=np.array([0, 1, 1, 2])))
+        return SimpleNamespace(residual=fit.size * np.array([100.0, -3.0, 10.0, 4.0]), problem=problem)
 
-    class Fit(SimpleNamespace):
-        pass
+    def fit(size, *effects):
+        return SimpleNamespace(size=size, terms=[SimpleNamespace(effect=name, freedom=2) for name in effects])
 
-    base, best = Fit(size=10.0), Fit(size=1.0)
-    found = SimpleNamespace(best=SimpleNamespace(fit=best, effects=("hysteresis",)), base=base)
-    high = SimpleNamespace(best=SimpleNamespace(effects=("tooth_mesh",)))
+    base, best = fit(10.0), fit(1.0, "hysteresis")
+    found = SimpleNamespace(best=SimpleNamespace(fit=best), base=base)
+    high = SimpleNamespace(best=SimpleNamespace(fit=fit(1.0, "tooth_mesh")))
     state = SimpleNamespace(selection=found, high=high, recordings=(), as_guesses=lambda: ("a guess",))
     monkeypatch.setattr(nested, "hidden_samples", lambda *about: ("mask",))
     monkeypatch.setattr(nested, "without_samples", lambda recordings, mask: recordings)
@@ -188,13 +189,14 @@ def hidden(monkeypatch):
     monkeypatch.setattr(nested, "neighbours_for", lambda recordings: 3)
     monkeypatch.setattr(nested, "shares_of_samples", lambda *about: np.array([0.0, 1.0, 0.5, 1.0]))
     monkeypatch.setattr(nested, "refitted", refitted)
-    return nested.nested_held_out((), lambda recordings: state, 1, DEFAULT), left_out
+    return nested.diagnosis_of_a_part((), lambda recordings: state, 1, DEFAULT), left_out
 
 
 def test_a_row_with_hidden_samples_is_neither_fitted_nor_judged(hidden):
     """A row that is the mean of hidden samples and others has seen both. Faults caught: it takes part in the last fit,
     or in the figure; base and best exchanged; the mean error in place of its rms."""
-    (figure, _), left_out = hidden
+    part, left_out = hidden
+    figure = part.held_out
     assert left_out == [[False, True, True, True]] * 2
     assert figure.extended == pytest.approx(np.sqrt((9 + 16) / 2))
     assert figure.base == pytest.approx(10 * np.sqrt((9 + 16) / 2))
@@ -202,6 +204,7 @@ def test_a_row_with_hidden_samples_is_neither_fitted_nor_judged(hidden):
 
 
 def test_a_nested_run_tells_all_that_it_found(hidden):
-    (figure, guesses), _ = hidden
-    assert figure.effects == ("hysteresis", "tooth_mesh")
-    assert guesses == ("a guess",)
+    part, _ = hidden
+    assert part.held_out.effects == ("hysteresis", "tooth_mesh")
+    assert part.freedom == 4
+    assert part.guesses == ("a guess",)

@@ -80,6 +80,12 @@ class Evidence:
     scale: Scale | None
     passes: RepeatedPasses
     nested: NestedHeldOut | None = None
+    proposed: NestedHeldOut | None = None
+
+    @property
+    def unseen(self) -> NestedHeldOut | None:
+        """Errors on the hidden turns of the best set that the turns left to the diagnosis of a part know of."""
+        return self.proposed or self.nested
 
     @property
     def settings(self) -> DiagnosisSettings:

@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 
 class FitNumbers(TypedDict):
     """The numbers behind a verdict, arcmin rms: cross-validated errors of base, extended, generic and placebo model, on
-    turns that no stage saw (`nested`; None where too few could be spared), and on whole conditions (None where there is
-    one condition), and the noise floor; the chance of a false alarm.
+    turns that no stage saw (`nested`; None where too few could be spared), on the same turns of what the search on all
+    turns found, fitted to the others (`proposed`; None where these do not prefer it), and on whole conditions (None
+    where there is one condition), and the noise floor; the chance of a false alarm.
     """
 
     heldout_rms_base_arcmin: float
@@ -35,6 +36,7 @@ class FitNumbers(TypedDict):
     heldout_rms_placebo_arcmin: float
     heldout_nested_rms_base_arcmin: float | None
     heldout_nested_rms_arcmin: float | None
+    heldout_proposed_rms_arcmin: float | None
     heldout_conditions_rms_base_arcmin: float | None
     heldout_conditions_rms_extended_arcmin: float | None
     noise_floor_arcmin: float

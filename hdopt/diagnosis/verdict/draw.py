@@ -75,7 +75,7 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
 
 def fit_numbers(evidence: Evidence) -> FitNumbers:
     """The numbers behind the verdict, as in the JSON's `fit`. `evidence` is that of the diagnosis."""
-    across, nested = evidence.across_conditions, evidence.nested
+    across, nested, proposed = evidence.across_conditions, evidence.nested, evidence.proposed
     return {
         "heldout_rms_base_arcmin": evidence.base_held_out.rms,
         "heldout_rms_extended_arcmin": evidence.extended_held_out.rms,
@@ -83,6 +83,7 @@ def fit_numbers(evidence: Evidence) -> FitNumbers:
         "heldout_rms_placebo_arcmin": evidence.placebo_held_out.rms,
         "heldout_nested_rms_base_arcmin": nested.base if nested is not None else None,
         "heldout_nested_rms_arcmin": nested.extended if nested is not None else None,
+        "heldout_proposed_rms_arcmin": proposed.extended if proposed is not None else None,
         "heldout_conditions_rms_base_arcmin": across.base if across is not None else None,
         "heldout_conditions_rms_extended_arcmin": across.extended if across is not None else None,
         "noise_floor_arcmin": evidence.noise_floor,

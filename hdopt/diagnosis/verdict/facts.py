@@ -53,10 +53,10 @@ class Facts:
     `turns_suffice`: turns can be held out; `too_little`: the record cannot say even that the base is
     adequate. `rivals`: other sets that are as good, placebo and
     perfect imitations among them; `scale_as_good`: so is a ratio or gain that is off, alone. `heldout_over_floor`:
-    error on turns that no stage saw (cross-validated where none could be spared) over what a generic basis leaves;
-    `found_again`: what is said was found without those turns too; `noise_over_neighbours`: cross-validated error over
-    the noise that neighbouring samples and the sensors' steps show; `walk`: what is left is as rough at every scale as
-    a walk, which noise may be; `left_over_passes`: what is left over what differs
+    error on turns that were hidden from the fit (cross-validated where none could be spared) over what a generic basis
+    leaves; `found_again`: what is said is preferred without those turns too; `noise_over_neighbours`: cross-validated
+    error over the noise that neighbouring samples and the sensors' steps show; `walk`: what is left is as rough at
+    every scale as a walk, which noise may be; `left_over_passes`: what is left over what differs
     from pass to pass of one angle. `above_resolution`: some effect is larger than what sensors and model resolve.
     """
 
@@ -204,15 +204,16 @@ def find(evidence: Evidence) -> Findings:
 
 
 def unseen_rms(evidence: Evidence) -> float:
-    """Error of what was found in `evidence` on turns that no stage saw, arcmin rms; cross-validated where none could be
-    spared.
+    """Error of what was found in `evidence` on turns that were hidden from its fit, arcmin rms; cross-validated where
+    none could be spared.
     """
-    return evidence.extended_held_out.rms if evidence.nested is None else evidence.nested.extended
+    return evidence.extended_held_out.rms if evidence.unseen is None else evidence.unseen.extended
 
 
 def found_again(evidence: Evidence, effects: Sequence[NamedEffect]) -> bool:
-    """Whether the diagnosis of a part of the turns, if `evidence` has one, found every one of the `effects` said."""
-    return evidence.nested is None or {one.id for one in effects} <= set(evidence.nested.effects)
+    """Whether a part of the turns alone, if `evidence` has a diagnosis of one, prefers a set with every one of the
+    `effects` said."""
+    return evidence.unseen is None or {one.id for one in effects} <= set(evidence.unseen.effects)
 
 
 def above_resolution(evidence: Evidence) -> bool:

@@ -220,7 +220,7 @@ def unstable(findings: Findings) -> Conclusion:
     """
     evidence, effects = findings.evidence, findings.effects
     unseen, floor = unseen_rms(evidence), evidence.noise_floor
-    named = evidence.nested.effects if evidence.nested is not None else ()
+    named = evidence.unseen.effects if evidence.unseen is not None else ()
     again = " and ".join(name for name in named if name in EFFECTS) or "none of the catalogue's effects"
     says = " ".join(found.says for found in effects)
     says += (
