@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import hdopt
 from hdopt.errors import HdoptError
 from hdopt.recordings.orders import error_growth, inseparable_groups, model_orders, order_spectrum
 
@@ -31,6 +32,20 @@ def test_known_sinusoids_are_found_at_exact_orders(amplitudes, phases):
     assert found.phases == pytest.approx(phases)
     assert found.mean == pytest.approx(0.3)
     assert found.residual_rms < 1e-9
+
+
+@pytest.mark.parametrize("structure", ["integral", "automatic", "one_way_major", "one_way_minor"])
+def test_no_order_of_a_hundredth_of_the_whole_is_left_out(structure):
+    """All multiples of 1/N over a whole relative turn, where they are orthogonal: what `ke` does not list of the base
+    case is below a hundredth of the peak-to-peak. Fault caught: a harmonic of the beat left out (2/N: 0.015 arcmin).
+    """
+    found = hdopt.kinematic_error(hdopt.load_study("csf-25-80", [f"wave_generator.structure={structure}"]))
+    turns = round((found.theta[1] - found.theta[0]) * len(found.theta) / (2 * np.pi))
+    assert turns == 80
+    amplitudes = 2 * np.abs(np.fft.rfft(found.waveform_arcmin)) / len(found.theta)
+    listed = [round(order["order"] * turns) for order in found.orders]
+    unlisted = np.delete(amplitudes, [0, *listed])
+    assert unlisted.max() < 0.01 * found.peak_to_peak_arcmin
 
 
 def test_one_output_turn_separates_what_shorter_records_confound():
