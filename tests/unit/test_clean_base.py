@@ -101,12 +101,12 @@ def test_where_smooth_columns_leave_noise_no_waves_are_asked():
 
 
 def test_waves_that_take_up_little_are_not_the_teeths():
-    """A sine at a foreign order, ten times the noise: no wave of the teeth explains it. Fault caught: a search about a
-    base that was bent to it.
+    """A sine at a foreign order, twenty times the noise, beside waves of a few times it: these pay for their freedom,
+    but no wave of the teeth explains the sine. Fault caught: a search about a base that was bent to it.
     """
-    _, _, _, smooth = recorded(0.0)
+    _, _, _, smooth = recorded(0.2)
     problem = smooth.problem
-    added = 0.2 * np.sin(9.37 * THETA)
+    added = 0.4 * np.sin(9.37 * THETA)
     rows = replace(problem.rows, error=problem.rows.error + added)
     other = replace(
         smooth, problem=replace(problem, rows=rows), objective=float(np.sum((smooth.residual + added) ** 2))

@@ -277,6 +277,31 @@ def test_the_noise_comes_with_its_roughness(monkeypatch):
     assert (again.inflation, again.problem.noise.sigma, inflations) == (6.0, 0.5, [6.0])
 
 
+def test_a_base_beside_waves_is_made_from_the_clean_one(monkeypatch):
+    """With draws of its own: what comes after goes on as without it. Faults caught: no such base; none of its draws
+    kept apart.
+    """
+
+    def beside_waves(smooth, rng):
+        rng.normal()
+        return f"waves beside {smooth}"
+
+    monkeypatch.setattr(stages, "measure_noise", measured(0.5, 6.0))
+    monkeypatch.setattr(stages, "fit_base", lambda problem, *rest, near: replace(near, problem=problem))
+    monkeypatch.setattr(stages, "refine", lambda fit, iterations: fit)
+    monkeypatch.setattr(stages, "fit_clean_base", lambda problem, rng: "the clean base")
+    monkeypatch.setattr(stages, "beside_smooth", lambda clean: f"smooth columns of {clean}")
+    monkeypatch.setattr(stages, "beside_waves", beside_waves)
+    after = stages.fit_base_in_noise(state_of(Told("")))
+    assert after.wavy == "waves beside smooth columns of the clean base"
+    assert after.draws().normal() == np.random.default_rng(5).normal()
+    plan = replace(after, wavy=Told("wavy"))
+    monkeypatch.setattr(stages, "leaders_on", lambda *about: ())
+    monkeypatch.setattr(stages, "drive_alone", lambda fit, problem: (fit.name, problem is plan.problem))
+    assert stages.plan_of(plan).wavy == ("wavy", True)
+    assert stages.plan_of(plan).clean == "the clean base"
+
+
 @pytest.fixture
 def without_ripple(monkeypatch):
     """`of(effects before, effects after, power of the best)`: what was measured, the plan, the state after."""
