@@ -23,6 +23,7 @@ from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut, hidden_samples, shares_of_samples, without_samples
 from hdopt.diagnosis.orientation import turn_round
 from hdopt.diagnosis.search.high_order import subtract
+from hdopt.diagnosis.search.penalty import flexibility
 from hdopt.diagnosis.settings import DiagnosisSettings
 from hdopt.diagnosis.stages import on_problem
 from hdopt.diagnosis.state import Guess, State
@@ -57,11 +58,15 @@ class Part:
     def of_proposal(self, found: State) -> NestedHeldOut | None:
         """Errors on the hidden turns of the best set of `found`, the last state of the diagnosis of all turns, fitted
         to those that were left, on the rows of `found`: without the ripple that it took out. None where the turns that
-        were left do not clearly prefer it to what was found on them alone, by Schwarz's criterion.
+        were left do not clearly prefer it to what was found on them alone, by Schwarz's criterion, and where it has
+        many waves of an effect that was not found on them: in which waves these are the hidden turns had a say.
         """
         best = found.selection.best.fit
         settings = best.problem.settings
         if best.problem.base is None or not best.terms or len(best.residual) != len(self.best.residual):
+            return None
+        many_waves = {term.effect for term in best.terms if flexibility(term, settings.penalty) >= 1}
+        if not many_waves <= set(self.effects):
             return None
         problem = best.problem.with_noise(best.problem.noise.without(self.touched))
         base, fit = (

@@ -70,6 +70,12 @@ class ProfileSettings:
     )
     tolerance: float = threshold(0.02, "standard deviations", "choice: accuracy of an interval's end: 1 % of it")
     tries: int = threshold(6, "1", "choice: doublings of 1.96 standard deviations after which an end is open")
+    widened: float = threshold(
+        1.2,
+        "1",
+        "measured: of 178 parameters named on runs 007 to 011 half lie beyond 1.15 and a fifth beyond 1.19 times what "
+        "their standard deviations say",
+    )
 
 
 @dataclass(frozen=True)
@@ -558,6 +564,9 @@ class VerdictSettings:
         30.0, "1", "choice: log evidence for something beside a scale, clock or zero that is off"
     )
     flatten: float = threshold(2.0, "1", "choice: by which log evidences are divided: models are not exact")
+    odds_of_a_part: float = threshold(
+        2.0, "1", "choice: log prior odds against an imitator without one of its parts, as a code wheel oval, yet true"
+    )
     smallest_weight: float = threshold(-60.0, "1", "choice: log weight below which a candidate is none")
     most_confident: float = threshold(0.97, "1", "measured: 97 of 100 names of three runs of the injection study")
     listed_orders: int = threshold(4, "1", "choice: orders listed")

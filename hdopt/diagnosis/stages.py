@@ -14,7 +14,7 @@ from hdopt.diagnosis.inference.catalogue import SCALE, STRAIN_WAVE_ONLY
 from hdopt.diagnosis.inference.clean_base import (
     beside_smooth,
     beside_waves,
-    drive_alone,
+    drive_with_terms,
     fit_clean_base,
     power_beside_smooth,
 )
@@ -270,7 +270,7 @@ def unexplained(state: State) -> float:
 def plan_of(state: State) -> SearchPlan:
     """What a search from `state` on is to do."""
     known = leaders_on(state.selection, state.problem)
-    wavy = None if state.wavy is None else drive_alone(state.wavy, state.problem)
+    wavy = None if state.wavy is None else drive_with_terms(state.wavy, state.problem)
     return SearchPlan(skip=state.ruled_out, clean=state.clean, wavy=wavy, known=known)
 
 

@@ -191,6 +191,13 @@ class LocalToothDefect(Effect):
         pulses = [pulse(0.0), pulse(math.pi)] if seat.twice else [pulse(0.0)]
         return Term(self.id, kept, columns=np.column_stack(pulses), steps=steps, trials=trials)
 
+    def in_zones(self, shape: Shape) -> Sequence[Shape]:
+        seat: Seat = shape["on"]
+        if seat.in_zones or seat is Seat.OUTPUT:
+            return ()
+        on = Seat.FLEXSPLINE if seat.spline is Spline.FLEX else Seat.CIRCULAR_SPLINE
+        return ({**shape, "on": on},)
+
     def highest_order(self, shape: Shape, ratio: float) -> float:
         """A Gaussian of this standard deviation rises within a quarter of a period."""
         return float(360 / shape["width_deg"] / 4)

@@ -116,7 +116,9 @@ def test_waves_that_take_up_little_are_not_the_teeths():
 
 
 def test_a_search_goes_about_the_base_beside_waves_with_draws_of_its_own(monkeypatch):
-    """Faults caught: the base beside waves left out of the first look; a search that goes on otherwise for it."""
+    """Once without the waves, once beside them. Faults caught: the base beside waves left out of the first look; what
+    is smaller than the waves looked for without them alone; a search that goes on otherwise for it.
+    """
     centres = []
 
     def explore(state, centre, pool, afresh=False):
@@ -126,11 +128,15 @@ def test_a_search_goes_about_the_base_beside_waves_with_draws_of_its_own(monkeyp
 
     monkeypatch.setattr(subset_search, "explore", explore)
     monkeypatch.setattr(SearchState, "probe", lambda state, fit, keep=None: f"probe of {fit}")
-    monkeypatch.setattr(SearchState, "terms_for", lambda state, probe, *others: f"terms for {probe}")
+    monkeypatch.setattr(SearchState, "terms_for", lambda state, probe, *others: [f"terms for {probe}", *others])
+    monkeypatch.setattr(subset_search, "drive_alone", lambda fit, problem: f"drive on {problem}")
     rng = np.random.default_rng(4)
-    state = SearchState("base", SearchPlan(wavy="wavy"), 1.0, rng)
+    wave = SimpleNamespace(effect="waves")
+    wavy = SimpleNamespace(terms=(wave,))
+    state = SearchState(SimpleNamespace(problem="its rows"), SearchPlan(wavy=wavy), 1.0, rng)
     after = subset_search.about_wavy_base(state)
-    assert centres == [("wavy", "terms for probe of wavy")]
+    alone = ("drive on its rows", ["terms for probe of drive on its rows"])
+    assert centres == [alone, (wavy, [wave, f"terms for probe of {wavy}", "waves"])]
     assert after.rng is rng and rng.normal() == np.random.default_rng(4).normal()
     without = SearchState("base", SearchPlan(), 1.0, rng)
     assert subset_search.about_wavy_base(without) is without

@@ -7,6 +7,7 @@ import pytest
 
 from hdopt.diagnosis.checks.confounding import (
     _may_be_itself,
+    _paid_for_bending,
     confounded_with,
     remaining_span,
     share_in_span,
@@ -17,10 +18,13 @@ from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.nuisance import nuisances_for
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.search.candidates import joint_fit, search_terms
+from hdopt.diagnosis.settings import DEFAULT
 from hdopt.drive.geometry import ARCMIN
 from hdopt.effects import EFFECTS
 from hdopt.effects._friction_law import Law
+from hdopt.effects.conditions import TURN
 from hdopt.effects.declared import Shaft
+from hdopt.effects.local_tooth_defect import Seat
 from hdopt.effects.resonance import Foot
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.recordings.rows import gather
@@ -176,3 +180,42 @@ def test_evidence_apart_falls_with_rougher_noise(study):
     assert plain.evidence_apart > 0
     assert rough.evidence_apart == pytest.approx(plain.evidence_apart / 4)
     assert rough.imitates == plain.imitates
+
+
+def test_an_oval_wheel_that_runs_true_is_a_coupling_with_odds_against_it(study):
+    """Twice an output turn and nothing once: the columns are the same, but an eccentric wheel shows its first order.
+    Beside it the oval is a variant, one less likely. Fault caught: as likely as a coupling.
+    """
+    pair = against(study, "output_coupling", "encoder_output_eccentricity")
+    assert pair.imitates > 0.99
+    oval = EFFECTS["encoder_output_eccentricity"].odds[1]
+    assert pair.odds == pytest.approx(oval - DEFAULT.verdict.odds_of_a_part)
+    assert against(study, "lost_motion", "hysteresis").odds == 0.0
+
+
+def test_the_odds_of_an_imitator_are_never_for_it(study):
+    """A coupling on the input is itself a rare one: what is as usual as most has no odds over it."""
+    shapes = {"output_coupling": {"shaft": Shaft.INPUT, "orders": (2,)}}
+    hidden = {"output_coupling": lambda state: 0.3 * np.sin(2 * state["theta"])}
+    fit = fitted(study, ["output_coupling"], shapes, hidden)
+    assert fit.terms[0].odds < 0
+    assert all(pair.odds <= 0 for pair in confounded_with(fit, 0))
+
+
+def test_many_waves_pay_for_bending_to_a_pulse(study):
+    """They imitate it wholly, but of all that they could be few are a pulse: 5 nats or so for each coefficient above
+    those of a stiff term. Fault caught: a damaged tooth that many waves make ambiguous in every recording.
+    """
+    shapes = {"local_tooth_defect": {"centre": 2.0, "width_deg": 8.0, "on": Seat.CIRCULAR_SPLINE_ONCE}}
+    pulse = {
+        "local_tooth_defect": lambda state: 0.5 * np.exp(-0.5 * ((state["theta"] % TURN - 2.0) / np.radians(8)) ** 2)
+    }
+    fit = fitted(study, ["local_tooth_defect"], shapes, pulse)
+    (pair,) = confounded_with(fit, 0, others=["cs_tooth_harmonics"])
+    rows, few = fit.problem.weighed_rows, fit.problem.settings.penalty.few_coefficients
+    power = float(np.sum(fit.contribution(0) ** 2)) / NOISE**2
+    assert pair.evidence_apart > 10 * fit.problem.settings.verdict.tie
+    wide = EFFECTS["cs_tooth_harmonics"].term(fit.problem.rows, {"members": tuple(range(2, 25))})
+    assert _paid_for_bending(wide, fit) == pytest.approx((46 - few) * np.log(rows) / 2)
+    assert _paid_for_bending(fit.terms[0], fit) == 0.0
+    assert pair.evidence_apart < power / 2

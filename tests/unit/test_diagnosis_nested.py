@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hdopt.diagnosis import diagnose
+from hdopt.diagnosis import diagnose, nested
 from hdopt.diagnosis.inference.cross_validation import held_out, turn_folds
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.hidden_turns import hidden_samples, uncut_blocks, without_samples
@@ -216,9 +216,10 @@ def test_the_figure_of_a_whole_diagnosis_is_the_noise():
     assert diagnosis.fit["heldout_nested_rms_base_arcmin"] == nested.base == pytest.approx(0.3 / np.sqrt(2), rel=0.1)
 
 
-def proposed(sizes, found, hidden_arcmin=0.0):
+def proposed(sizes, found, hidden_arcmin=0.0, effects=("a part",)):
     """The figure of a proposal, where a part of the turns found waves of these `sizes` (order -> arcmin) alone of what
-    is there, twice and five times a turn, and all turns `found` others; the hidden turns are off by so much more.
+    is there, twice and five times a turn, by the name of `effects`, and all turns `found` others; the hidden turns are
+    off by so much more.
     """
     error = 0.3 * np.sin(2 * THETA) + 0.2 * np.sin(5 * THETA) + noise()
     recording = record(error)
@@ -236,7 +237,7 @@ def proposed(sizes, found, hidden_arcmin=0.0):
         return joint_fit(seen, terms) if terms else refine(seen, 3)
 
     base, best, proposal = beside(()), beside(sizes), beside(found)
-    part = Part(base, best, hidden, hidden, ("a part",), 2 * len(sizes), ())
+    part = Part(base, best, hidden, hidden, effects, 2 * len(sizes), ())
     on_all = replace(proposal, problem=problem)
     selection = Selection(replace(base, problem=problem), (Candidate(on_all, 1.0, 1.0),), 1.0)
     return part, part.of_proposal(SimpleNamespace(selection=selection, high=None, inflation=1.0))
@@ -258,6 +259,17 @@ def test_what_they_do_not_prefer_is_none():
     assert proposed((2, 5), (2, 5))[1] is None
     assert proposed((2, 5), (2, 5, 7.3))[1] is None
     assert proposed((2, 5), (2,))[1] is None
+
+
+def test_many_waves_of_what_the_part_did_not_find_are_no_proposal(monkeypatch):
+    """In which waves these are the hidden turns had a say. Of what it found they are one, and a few waves are. Faults
+    caught: a tooth imitated by many waves that is named for what the hidden turns chose; a right name refused.
+    """
+    monkeypatch.setattr(nested, "flexibility", lambda term, settings: 1.0)
+    assert proposed((2,), (2, 5))[1] is None
+    assert proposed((2,), (2, 5), effects=("_sine_in_angle",))[1] is not None
+    monkeypatch.setattr(nested, "flexibility", lambda term, settings: 0.9)
+    assert proposed((2,), (2, 5))[1] is not None
 
 
 def test_a_proposal_is_not_fitted_to_the_hidden_turns():

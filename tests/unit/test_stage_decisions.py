@@ -297,7 +297,7 @@ def test_a_base_beside_waves_is_made_from_the_clean_one(monkeypatch):
     assert after.draws().normal() == np.random.default_rng(5).normal()
     plan = replace(after, wavy=Told("wavy"))
     monkeypatch.setattr(stages, "leaders_on", lambda *about: ())
-    monkeypatch.setattr(stages, "drive_alone", lambda fit, problem: (fit.name, problem is plan.problem))
+    monkeypatch.setattr(stages, "drive_with_terms", lambda fit, problem: (fit.name, problem is plan.problem))
     assert stages.plan_of(plan).wavy == ("wavy", True)
     assert stages.plan_of(plan).clean == "the clean base"
 

@@ -133,6 +133,7 @@ def effect(name, confidence=0.97):
     ("changes", "weighed", "confidence"),
     [
         ({}, (), 0.97 / 2),  # nothing apart
+        ({"odds": -2.0}, (), 0.97 / (1 + np.exp(-2.0))),  # seven to one against it beforehand
         ({"evidence_apart": 3.0}, (), 0.97 / (1 + np.exp(-1.5))),
         ({"evidence_apart": 6.0}, (), 0.97),
         ({"imitates": 0.9}, (), 0.97),

@@ -10,6 +10,7 @@ apart. All follow from the recording: two speeds part what one speed leaves alik
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -36,7 +37,8 @@ class Confounding:
 
     `angle_deg` is the smallest principal angle between their columns; `imitates` the share, 0 to 1, of the power of the
     effect's contribution that the other could take over; `evidence_apart` the log evidence that the rest of it holds
-    against the other; `separating` the measurement that would part them.
+    against the other, and that it pays for bending; `separating` the measurement that would part them; `odds` the log
+    prior odds, at most 0, of the other with the numbers by which it imitates over the effect.
     """
 
     effect: str
@@ -45,6 +47,7 @@ class Confounding:
     imitates: float
     evidence_apart: float
     separating: str
+    odds: float = 0.0
 
     def to_dict(self) -> dict[str, object]:
         """As in the JSON."""
@@ -115,15 +118,18 @@ def confounded_with(
             candidates = [term for term in (*searched, *further) if _may_be_itself(probe, term)]
         own = _basis(seen, term)
         contribution = seen.white_residual
-        compared = [
-            (share_in_span(contribution, basis), smallest_angle_deg(own, basis))
-            for basis in (_basis(seen, candidate) for candidate in candidates)
-        ]
+        power = float(contribution @ contribution) / fit.problem.noise.sigma**2
+        compared = []
+        for candidate in candidates:
+            basis = _basis(seen, candidate)
+            imitates = share_in_span(contribution, basis)
+            apart = (1 - imitates) * power / 2 / inflation + _paid_for_bending(candidate, fit)
+            compared.append((apart, imitates, smallest_angle_deg(own, basis), candidate))
         if compared:
-            imitates, angle = max(compared)
-            power = float(contribution @ contribution) / fit.problem.noise.sigma**2
-            apart = (1 - imitates) * power / 2 / inflation
-            found.append(Confounding(term.effect, name, angle, imitates, apart, EFFECTS[term.effect].separating))
+            apart, imitates, angle, imitator = min(compared, key=lambda one: (one[0], -one[1]))
+            odds = min(_odds_of(imitator, seen) - term.odds, 0.0)
+            separating = EFFECTS[term.effect].separating
+            found.append(Confounding(term.effect, name, angle, imitates, apart, separating, odds))
     return sorted(found, key=lambda pair: -pair.imitates)
 
 
@@ -138,18 +144,41 @@ def _only_contribution(fit: Fit, index: int, without: Sequence[int]) -> Fit:
     )
 
 
+def _paid_for_bending(imitator: Term, fit: Fit) -> float:
+    """What `imitator` pays, by Schwarz's criterion on the rows of `fit`, for coefficients above those of a stiff term:
+    many waves imitate a pulse, but few of the ways in which they may stand make one.
+    """
+    beyond = max(imitator.width - fit.problem.settings.penalty.few_coefficients, 0)
+    return beyond * math.log(fit.problem.weighed_rows) / 2
+
+
+def _odds_of(imitator: Term, probe: FitProbe) -> float:
+    """Log prior odds of the variant of `imitator`, less where what it imitates in `probe` would leave it without one of
+    its parts: it may be so, but that is not how it is known.
+    """
+    known = _shows_all(probe, imitator)
+    return imitator.odds - (0.0 if known else probe.fit.problem.settings.verdict.odds_of_a_part)
+
+
+def _shows_all(probe: FitProbe, term: Term) -> bool:
+    """Whether every part of `term` shows in what it imitates in `probe`."""
+    effect = properties_of(term.effect)
+    return not effect.has_parts or effect.every_part_shows(term, _numbers(probe, term))
+
+
 def _may_be_itself(probe: FitProbe, term: Term) -> bool:
     """Whether `term`, one that follows the drive's motion, imitates what `probe` sees with numbers that it may have: an
     inertia of no gain that only drags is another's name for a delay.
     """
-    if not is_driven(term):
-        return True
-    variance = probe.noise.sigma**2
+    return not is_driven(term) or properties_of(term.effect).may_imitate(term, _numbers(probe, term))
+
+
+def _numbers(probe: FitProbe, term: Term) -> FitEstimate:
+    """The coefficients of `term` where it imitates what `probe` sees, and its free shape parameters."""
     numbers = [float(term.shape[name]) for name in term.steps]
     covariance = np.zeros((term.freedom, term.freedom))
-    covariance[: term.width, : term.width] = variance * np.linalg.pinv(probe.table(term)[0])
-    estimate = FitEstimate(np.r_[probe.solve(term)[1], numbers], covariance)
-    return properties_of(term.effect).may_imitate(term, estimate)
+    covariance[: term.width, : term.width] = probe.noise.sigma**2 * np.linalg.pinv(probe.table(term)[0])
+    return FitEstimate(np.r_[probe.solve(term)[1], numbers], covariance)
 
 
 def _basis(probe: FitProbe, term: Term) -> Array:

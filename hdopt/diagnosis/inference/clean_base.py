@@ -8,14 +8,17 @@ a base is wrong. Beside them it comes to the drive from nearly every start.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from hdopt.arrays import Array
 from hdopt.diagnosis.inference.base_fit import fit_base
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.generic_basis import generic_columns
 from hdopt.effects.sines import sine_columns
+from hdopt.effects.term import Term
 
 ORDER_DOMAINS = ("integer order", "output-synchronous order", "asynchronous order")
 """Domains of the generic basis in which the base itself lives."""
@@ -47,9 +50,20 @@ def with_smooth_columns(problem: FitProblem) -> FitProblem:
 
 def drive_alone(fit: Fit, problem: FitProblem) -> Fit:
     """The drive of `fit`, made beside more than `problem` has, on that problem and without terms."""
-    bare = evaluate(problem, fit.errors, fit.offsets[: problem.nuisance.shape[1]], (), ())
+    return _without_smooth_columns(fit, problem, (), ())
+
+
+def drive_with_terms(fit: Fit, problem: FitProblem) -> Fit:
+    """The drive of `fit`, made beside more than `problem` has, and its terms as they stand, on that problem."""
+    return _without_smooth_columns(fit, problem, fit.terms, fit.coefficients)
+
+
+def _without_smooth_columns(fit: Fit, problem: FitProblem, terms: Sequence[Term], coefficients: Sequence[Array]) -> Fit:
+    """The drive of `fit` on `problem`, and `terms` with their `coefficients`, with the offsets that these want."""
+    free = fit.offsets[: problem.nuisance.shape[1]]
+    bare = evaluate(problem, fit.errors, free, terms, coefficients)
     offset = np.linalg.lstsq(problem.nuisance, bare.residual, rcond=None)[0]
-    return evaluate(problem, fit.errors, bare.offsets + offset, (), ())
+    return evaluate(problem, fit.errors, bare.offsets + offset, terms, coefficients)
 
 
 def beside_smooth(clean: Fit) -> Fit:

@@ -123,9 +123,11 @@ def profiled_estimates(fit: Fit) -> list[FitEstimate]:
     """The estimates of each term of a `fit` that stands, with profile intervals of those free shape parameters whose
     +-1.96 standard deviations do not serve; none is narrower than they are within its bounds.
 
-    The rise that ends an interval is counted in the robust variance: what widens a standard deviation widens it.
+    The rise that ends an interval is counted in the robust variance: what widens a standard deviation widens it. All
+    are wider by `settings.widened` than that has it, for what no noise model knows: shapes that are not exact.
     """
-    settings, estimates = fit.problem.settings.profile, fit.estimates()
+    settings = fit.problem.settings.profile
+    estimates = [replace(one, covariance=settings.widened**2 * one.covariance) for one in fit.estimates()]
     if not any(term.steps for term in fit.terms):
         return estimates
     expected, settled = fit.expected_rises(), settle(fit)

@@ -138,6 +138,13 @@ def flexibility(term: Term, settings: PenaltySettings = DEFAULT.penalty) -> floa
     return min(max((term.width - few) / (many - few), 0.0), 1.0)
 
 
+def bends(term: Term, settings: PenaltySettings = DEFAULT.penalty) -> bool:
+    """Whether `term` may take up whatever is not its own: a description without physics, or one of so many coefficients
+    that it bends to anything. `settings` are the thresholds.
+    """
+    return is_outside(term.effect) or flexibility(term, settings) >= 1
+
+
 def kind_of(term: Term) -> str:
     """What the misfit of `term` looks like; that of a resonance, whose frequency lies in its response to each speed,
     like no other's.

@@ -70,6 +70,10 @@ class SearchState:
         """That of `fit` against the base alone."""
         return self.weigh(fit).log_bayes_factor
 
+    def above_noise(self, fit: Fit) -> float:
+        """By how much what `fit` leaves is above what the noise makes, in noise variances."""
+        return fit.objective / fit.problem.noise.sigma**2 / self.inflation - self.scale.rows
+
     @property
     def top_gain(self) -> float:
         """The largest gain of all fits, noise variances."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from hdopt.diagnosis.inference.base_fit import is_far
 from hdopt.diagnosis.inference.catalogue import is_outside
+from hdopt.diagnosis.inference.clean_base import drive_alone
 from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import Candidate, joint_fit, search_terms, without_each
@@ -30,6 +31,7 @@ from hdopt.diagnosis.search.refinement import (
     with_a_plain_term,
 )
 from hdopt.diagnosis.search.search_state import SearchPlan, SearchState
+from hdopt.diagnosis.search.several_for_one import several_first, several_for_one, with_teeth_in_the_zones
 from hdopt.effects.met import Waves
 from hdopt.effects.term import Term
 from hdopt.parallel.shared_memory import each
@@ -72,7 +74,8 @@ def select_from(state: SearchState) -> Selection:
     """`select` where the work stands at `state`: a first look is not taken twice."""
     for stage in STAGES:
         state = stage(state)
-    candidates = completed(state, acceptable_first(ranked(state), state.settings.close_behind))
+    candidates = acceptable_first(ranked(state), state.settings.close_behind)
+    candidates = several_first(state, completed(state, candidates))
     best = candidates[0]
     if best.fit.terms:
         best = replace(best, fit=widened_where_it_pays(best.fit, state.base, state.inflation, state.order_range))
@@ -107,14 +110,18 @@ def explore_base(state: SearchState) -> SearchState:
 
 
 def about_wavy_base(state: SearchState) -> SearchState:
-    """The best sets about a base that was fitted beside waves of the teeth, where one was: those bend every other base.
-    `state` is where the work stands; the draws are its own.
+    """The best sets about a base that was fitted beside waves of the teeth, where one was, without these and beside
+    them: those bend every other base, and hide what is smaller. `state` is where the work stands; the draws are its
+    own.
     """
     wavy = state.plan.wavy
     if wavy is None:
         return state
     own = replace(state, rng=copy.deepcopy(state.rng))
-    return replace(explore(own, wavy, own.terms_for(own.probe(wavy))), rng=state.rng)
+    alone = drive_alone(wavy, state.base.problem)
+    own = explore(own, alone, own.terms_for(own.probe(alone)))
+    pool = [*wavy.terms, *own.terms_for(own.probe(wavy), *(term.effect for term in wavy.terms))]
+    return replace(explore(own, wavy, pool), rng=state.rng)
 
 
 def teeth_from_new_drives(state: SearchState, pool: Sequence[Term]) -> SearchState:
@@ -326,6 +333,8 @@ STAGES: tuple[Callable[[SearchState], SearchState], ...] = (
     look_beside_flexible_leader,
     search_about_leader,
     beside_a_far_drive,
+    with_teeth_in_the_zones,
+    several_for_one,
     refit_close_rivals,
     beside_what_is_told,
     leave_out_hidden_parts,
@@ -358,14 +367,14 @@ def completed(state: SearchState, candidates: list[Candidate]) -> list[Candidate
     do not pay for it. `state` is where the work stands.
     """
     first, settings = candidates[0], state.settings
-    left = above_noise(state, first.fit)
+    left = state.above_noise(first.fit)
     if not first.fit.terms or left < settings.begun * state.scale.rows:
         return candidates
     found = []
     for candidate in candidates[1:]:
         beside = [term for term in candidate.fit.terms if term.effect not in first.effects]
         if set(first.effects) < set(candidate.effects) and all(may_complete(term, settings.narrow) for term in beside):
-            if above_noise(state, candidate.fit) <= settings.complete * left:
+            if state.above_noise(candidate.fit) <= settings.complete * left:
                 found.append(without_inexactness(state, first, candidate))
     if not found:
         return candidates
@@ -377,13 +386,6 @@ def may_complete(term: Term, narrow: int) -> bool:
     """Whether `term` is sines at lines that are known, or turns with the drive and has no more than `narrow`
     coefficients: it bends to nothing."""
     return leaves_nothing(term) or (kind_of(term) == "turning" and term.width <= narrow)
-
-
-def above_noise(state: SearchState, fit: Fit) -> float:
-    """By how much what `fit` leaves is above what the noise makes, in noise variances. `state` is where the work
-    stands.
-    """
-    return fit.objective / fit.problem.noise.sigma**2 / state.inflation - state.scale.rows
 
 
 def without_inexactness(state: SearchState, first: Candidate, more: Candidate) -> Candidate:

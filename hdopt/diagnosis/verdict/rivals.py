@@ -115,15 +115,15 @@ def shared_with_imitators(
     effects: Sequence[NamedEffect], pairs: Sequence[Confounding], weighed: Sets, settings: VerdictSettings
 ) -> tuple[NamedEffect, ...]:
     """The `effects` said, each with its confidence shared with what could imitate it wholly: of confounded `pairs` that
-    the recording does not tell apart each side has the weight of its evidence, flattened by the `settings` like all
-    evidence. Sets that were `weighed` as candidates have their share already.
+    the recording does not tell apart each side has the weight of its prior odds and of its evidence, flattened by the
+    `settings` like all evidence. Sets that were `weighed` as candidates have their share already.
     """
     ids = [one.id for one in effects]
     known = {frozenset(one) for one in weighed}
     shares = dict.fromkeys(ids, 1.0)
     for pair in pairs:
         if is_tie(pair, settings) and pair.other not in ids and frozenset(with_imitator(pair, ids)) not in known:
-            shares[pair.effect] += math.exp(-max(pair.evidence_apart, 0.0) / settings.flatten)
+            shares[pair.effect] += math.exp(pair.odds - max(pair.evidence_apart, 0.0) / settings.flatten)
     return tuple(replace(one, confidence=one.confidence / shares[one.id]) for one in effects)
 
 

@@ -1,0 +1,106 @@
+"""Several effects that bend to little, in place of one that bends to anything.
+
+Many waves of the teeth take up whatever repeats with the angle, a damaged tooth or an encoder's lines as well: beside
+them nothing is left to be found, and in their place no single effect explains as much. Of several that do together,
+each is seen at its true shape only beside the others. So such sets are searched among themselves, apart from the sets
+that bend.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.search.acceptance import is_acceptable
+from hdopt.diagnosis.search.candidates import Candidate, joint_fit, search_terms
+from hdopt.diagnosis.search.explore import explore
+from hdopt.diagnosis.search.penalty import bends, discrepancy
+from hdopt.diagnosis.search.search_state import SearchState
+from hdopt.effects import HIGH_ORDER
+from hdopt.parallel.shared_memory import each
+
+
+def several_for_one(state: SearchState) -> SearchState:
+    """The best sets without a term that bends, where the leader, one of physics, has such a term: searched about the
+    leader's drive without those terms, then about the best of these sets as long as another comes. `state` is where the
+    work stands; the draws are its own, so that a search in which nothing comes of it goes on as without it.
+    """
+    leader = state.leader
+    if leader is None or leader.outside or not has_bending(leader.fit):
+        return state
+    plain = {names: fit for names, fit in state.fits.items() if not has_bending(fit)}
+    own = about(replace(state, rng=copy.deepcopy(state.rng), fits=plain), leader.fit)
+    centre: Fit | None = None
+    for _ in range(state.settings.rounds):
+        best = own.leader
+        if best is None or best.fit is centre:
+            break
+        own = with_teeth_in_the_zones(own.taking([joint_fit(best.fit, best.fit.terms, own.rng)]))
+        best = own.leader
+        if best is None:
+            break
+        centre = best.fit
+        own = about(own, centre)
+    return state.taking(list(own.fits.values()))
+
+
+def has_bending(fit: Fit) -> bool:
+    """Whether a term of `fit` may take up whatever is not its own."""
+    return any(bends(term, fit.problem.settings.penalty) for term in fit.terms)
+
+
+def about(state: SearchState, centre: Fit) -> SearchState:
+    """`state` with the best sets of terms that do not bend, those of `centre` among them: of what is seen in place of
+    its terms that bend, beside the others, and in place of each of the others.
+    """
+    penalties = centre.problem.settings.penalty
+    kept = [i for i, term in enumerate(centre.terms) if not bends(term, penalties)]
+    pool = [centre.terms[i] for i in kept]
+    for beside in (kept, *([j for j in kept if j != i] for i in kept)):
+        skip = [*state.plan.skip, *(centre.terms[i].effect for i in beside)]
+        found = search_terms(state.probe(centre, keep=beside), skip)
+        pool += [term for term in found if not bends(term, penalties)]
+    return explore(state, centre, pool)
+
+
+def several_first(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
+    """`candidates` in order of evidence, where the first, one of physics, has a term that bends to anything: the best
+    set that does not, and leaves little more than noise, pays neither for several that are alike nor for lines that
+    could be the teeth's against it. What a slightly wrong shape of one of them leaves is not taken up by the others,
+    but by what bends. `state` is where the work stands.
+    """
+    first, scale = candidates[0], state.scale
+    if first.outside or not has_bending(first.fit):
+        return candidates
+    stiff = (candidate for candidate in candidates if candidate.fit.terms and not has_bending(candidate.fit))
+    best = next((candidate for candidate in stiff if is_acceptable(candidate.fit)), None)
+    if best is None or state.above_noise(best.fit) > state.settings.begun * scale.rows:
+        return candidates
+    share = discrepancy(best.fit.terms, scale.settings)
+    share += scale.settings.clear_win * sum(term.doubtful for term in best.fit.terms)
+    freed = best.log_bayes_factor + share * state.top_gain / state.inflation / 2
+    if first.log_bayes_factor > freed:
+        return candidates
+    others = [candidate for candidate in candidates if candidate is not best]
+    return sorted([replace(best, log_bayes_factor=freed), *others], key=lambda c: -c.log_bayes_factor)
+
+
+def with_teeth_in_the_zones(state: SearchState) -> SearchState:
+    """`state` with its leader's terms that stand beside the drive's motion tried inside the meshing zones, from new
+    drives: a tooth much too high takes the load from the other zone, which no look beside a drive without it shows.
+    What stands at high orders has a search of its own there.
+    """
+    leader = state.leader
+    if leader is None or state.base.problem.base is None:
+        return state
+    fit, rows, penalties = leader.fit, state.base.problem.rows, state.base.problem.settings.penalty
+    sets = []
+    for i, term in enumerate(fit.terms):
+        if term.effect in HIGH_ORDER:
+            continue
+        effect = fit.problem.explanations[term.effect]
+        moved = (effect.term(rows, shape, fit.motion) for shape in effect.in_zones(term.shape))
+        sets += [[*fit.terms[:i], one, *fit.terms[i + 1 :]] for one in moved if not bends(one, penalties)]
+    draws = copy.deepcopy(state.rng).spawn(len(sets))
+    return state.taking(each(lambda numbered: joint_fit(fit, *numbered), zip(sets, draws, strict=True)))
