@@ -134,5 +134,6 @@ def test_a_kernel_knows_the_files_that_are_compiled_into_it():
     beat = imported(sources, "hdopt/simulation/beat/kernel.py")
     lanes = {f"hdopt/kinematics/lanes/{name}.py" for name in ("compiled", "minima", "motion", "single")}
     assert turn > lanes | {f"hdopt/simulation/turn/{name}.py" for name in ("lows", "rows", "scan", "tops")}
-    assert beat > lanes | {f"hdopt/simulation/beat/{name}.py" for name in ("edges", "looks", "turns")}
+    own = ("edges", "gather", "looks", "parts", "turns")
+    assert beat > lanes | {f"hdopt/simulation/beat/{name}.py" for name in own}
     assert not any("simulation" in name for name in imported(sources, "hdopt/kinematics/kernel.py"))

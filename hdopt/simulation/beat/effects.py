@@ -10,6 +10,7 @@ import numpy as np
 from hdopt.arrays import Array, Singles
 from hdopt.kinematics.lanes.minima import GROUP
 from hdopt.kinematics.lanes.single import single
+from hdopt.simulation.beat.on_fs import OnFs, on_fs_of
 from hdopt.simulation.turn.effects import (
     FARTHEST,
     LEFT_BY_CELL,
@@ -18,7 +19,6 @@ from hdopt.simulation.turn.effects import (
     OVERLAP,
     Scan,
     Turn,
-    derived,
     largest,
     parts,
     scan_of,
@@ -29,15 +29,31 @@ from hdopt.simulation.turn.effects import (
 
 FEWEST_CELLS = 60
 """Wider cells than of effects that repeat, since each is taken in every turn, and places are looked at twice."""
+PARTS_FROM, MOST_PARTED = 3 * FEWEST_CELLS, 2 * FEWEST_CELLS
+"""So many cells and more are parts of cells, of which there are so many at most."""
+LEFT_BY_CHORD = 2.5e-4
+"""What the chord of a part leaves at most, arcmin, where the table's places allow it."""
 MOST_BOUNDS = 2**18
 """Cells of all turns at most: 4 MiB of bounds."""
 OFFSET = 0.1
-"""Offsets o', rad, up to which the bend of an effect on the FS is looked at: three times the shipped tolerances reach
-0.07. Where a drive's are larger the effect's range is left open."""
-KINDS = 6
-"""Rows of an edge: of the effects the mean of both zones and half their difference; how far a cell goes beyond its
-chord, mm of arc; of those on the FS the slope in either zone, mm of arc per rad, and half the largest curvature near
-the cell."""
+"""Offsets o', rad, up to which an effect on the FS is bounded where it is met: three times the shipped tolerances
+reach 0.07. Where a drive's are larger the effect's range is left open."""
+KINDS = 4
+"""Rows of an edge: of the effects the mean of both zones and half their difference, and how far a cell goes below and
+above its chord, mm of arc."""
+
+
+class Parts(NamedTuple):
+    """Parts of the cells where effects are finer than these, `each` of every cell, or 1 and no more. `fixed`, flat: of
+    what does not stand on the FS, turn by turn and cell by cell, so many rows (`kinds`) of the edges of the parts: the
+    mean of both zones and half their difference, or the mean alone where zones do not differ, or none where there is
+    nothing; then a row of zeros, which begins at `zeros`. How far a part goes `beyond` its chord, mm of arc."""
+
+    each: int
+    fixed: Singles
+    kinds: int
+    zeros: int
+    beyond: float
 
 
 class Beat(NamedTuple):
@@ -47,7 +63,7 @@ class Beat(NamedTuple):
     rest. `circle`, flat: cosine and sine of the edges, and of these times Z_CS/Z_FS, group by group. `bounds`, flat:
     cosine and sine of the FS phase in every turn, then for each edge the rows of KINDS; rows are padded to whole
     groups, with turns that nothing is expected of. `phases` (B,), rad; `per_turn` places of `fixed` a turn; `fs` (m, 6)
-    or (0, 6), what stands on the FS, with its largest slope and its range.
+    or (0, 6), what stands on the FS, with its range, and bounded in every turn, `on_fs`; the `parts` of a cell.
     """
 
     turn: Turn
@@ -56,8 +72,9 @@ class Beat(NamedTuple):
     phases: Singles
     per_turn: int
     fs: Singles
-    fs_slope: float
     fs_range: float
+    on_fs: OnFs
+    parts: Parts
 
 
 def beat_of(zones: Array, cs: Array, fs: Array, turns: int, advance: float, per_mm: float) -> Beat | None:
@@ -71,15 +88,21 @@ def beat_of(zones: Array, cs: Array, fs: Array, turns: int, advance: float, per_
     rows = _derivatives(zones, 2 * math.pi / places)
     bend = float(np.abs(np.diff(rows[:, 2])).max()) * places / (2 * math.pi)
     bend = per_mm * (bend + largest(of_cs, 3) + largest(of_fs, 3) * advance**3)
-    cells = next((n for n in range(FEWEST_CELLS, places + 1) if places % n == 0 and n >= parts(bend, LEFT_BY_CELL)), 0)
-    if not cells or cells * turns > MOST_BOUNDS:
+    bow = per_mm * (float(np.abs(rows[:, 2]).max()) + largest(of_fs, 2) * advance**2)
+    cells, each = _cells(places, parts(bend, LEFT_BY_CELL), math.pi * math.sqrt(bow / (2 * LEFT_BY_CHORD)))
+    if not cells or cells * each * turns > MOST_BOUNDS:
         return None
     # Four a cell at least: where a function jumps between the last turn and the first, half a place is not told.
-    fewest = max(4 * cells, parts(bend, LEFT_BY_PLACE))
+    told = max(cells, parts(bend, LEFT_BY_CELL))
+    fewest = max(4 * told, parts(bend, LEFT_BY_PLACE))
     every = next(n for n in range(places, 0, -1) if n == 1 or (places % n == 0 and places // n >= fewest))
     on_cs, on_fs = (table_of(spectrum, parts(bend, LEFT_BY_PLACE)) for spectrum in (of_cs, of_fs))
     phases = np.arange(turns, dtype=np.float64) * (advance % 1.0) % 1.0 * 2 * math.pi
-    bounds, scan = _bounds(zones, of_fs if fs.size else None, of_cs, (turns, cells), advance)
+    bounds, scan = _bounds(zones, of_cs, (turns, cells), smooth=each > 1)
+    met = on_fs_of(of_fs if fs.size else None, (turns, cells, each), advance)
+    # Between places of the table nothing is seen of what goes beyond a chord.
+    beyond = met.beyond + float(np.abs(rows[:, 2]).max()) * (2 * math.pi / places) ** 2 / 8
+    scan = scan._replace(below=scan.below - met.lowest, above=scan.above + met.highest)
     turn = Turn(
         scan,
         NO_PARTS,
@@ -88,7 +111,7 @@ def beat_of(zones: Array, cs: Array, fs: Array, turns: int, advance: float, per_
         cs_bend=single(largest(of_cs, 2)),
         cs_slope=single(largest(of_cs, 1)),
         cs_range=single(float(np.ptp(on_cs[:, [0, 3]]))),
-        reach=single(min(FARTHEST, OVERLAP * math.pi / cells)),
+        reach=single(min(FARTHEST, OVERLAP * math.pi / (cells * each))),
     )
     padded: Array = np.zeros(-(-turns // GROUP) * GROUP)
     padded[:turns] = phases
@@ -102,9 +125,24 @@ def beat_of(zones: Array, cs: Array, fs: Array, turns: int, advance: float, per_
         singles(phases),
         places // every,
         on_fs if fs.size else on_fs[:0],
-        single(largest(of_fs, 1)),
         single(float(np.ptp(on_fs[:, [0, 3]]))),
+        met,
+        _parts(zones, scan_of(np.zeros((2, 2), complex), of_cs, cells), (turns, cells, each), beyond),
     )
+
+
+def _cells(places: int, fewest: int, chords: float) -> tuple[int, int]:
+    """How many cells a turn of so many `places` has, and how many parts each: the `fewest` that parabolas ask for, as
+    parts also what `chords` do, or the most that there are places for. (0, 1) where no whole number of places does."""
+    if fewest >= PARTS_FROM:
+        for most in (places, 0):
+            for n in range(max(fewest, min(math.ceil(chords), most)), places + 1):
+                if places % n == 0:
+                    for cells in range(MOST_PARTED, FEWEST_CELLS - 1, -1):
+                        if n % cells == 0:
+                            return cells, n // cells
+    whole = (n for n in range(FEWEST_CELLS, places + 1) if places % n == 0 and n >= fewest)
+    return next(whole, 0), 1
 
 
 def _derivatives(values: Array, step: float) -> Array:
@@ -120,48 +158,66 @@ def _derivatives(values: Array, step: float) -> Array:
     return np.stack([values, slope, bend], axis=1)
 
 
-def _bounds(
-    zones: Array, of_fs: Array | None, of_cs: Array, size: tuple[int, int], advance: float
-) -> tuple[Array, Scan]:
-    """The rows of KINDS, (c + 1, KINDS, padded turns), and the scan of the cells over all turns, of so many turns and
-    cells (`size`); effects on the FS are met there as if o' were 0."""
-    turns, cells = size
-    m, inside = zones.shape[1], zones.shape[1] // (turns * cells)
-    slopes, bent = np.zeros((2, m)), np.zeros(m)
-    if of_fs is not None:
-        # Places of the FS that the input's places meet.
-        at = np.arange(m) * (advance * turns / m) % 1.0
-        fine = 8 * of_fs.shape[1]
-        grid = np.arange(fine + 1) / fine
-        met = [
-            np.array([np.interp(at, grid, np.append(row, row[0])) for row in derived(of_fs, k, fine)]) for k in range(3)
-        ]
-        zones, slopes, bent = zones + met[0], met[1], np.abs(met[2]).max(axis=0) / 2
-    edges, after = zones[:, ::inside], np.roll(zones[:, ::inside], -1, axis=1)
-    share = np.arange(inside) / inside
+def _beyond(zones: Array, edges: Array, inside: int) -> tuple[Array, Array]:
+    """How far `zones` (2, m) go below and above the chords between `edges` (2, m / inside) over so many places each
+    (`inside`), both ends counted, in either zone, (m / inside,) each."""
+    share = np.arange(inside + 1) / inside
+    after = np.roll(edges, -1, axis=1)
     chords = edges[:, :, None] * (1 - share) + after[:, :, None] * share
-    sag, bent = np.abs(zones.reshape(2, -1, inside) - chords).max(axis=(0, 2)), bent.reshape(-1, inside).max(axis=1)
-    if of_fs is not None:
-        near = math.ceil(OFFSET * cells / (2 * math.pi))
-        sag, bent = (np.max([np.roll(x, k) for k in range(-near, near + 1)], axis=0) for x in (sag, bent))
-    lowest, highest = np.minimum(edges, after).min(axis=0) - sag, np.maximum(edges, after).max(axis=0) + sag
+    own = zones.reshape(2, -1, inside)
+    beyond = np.concatenate([own, np.roll(own[:, :, :1], -1, axis=1)], axis=2) - chords
+    return np.maximum(-beyond.min(axis=(0, 2)), 0), np.maximum(beyond.max(axis=(0, 2)), 0)
+
+
+def _midway(zones: Array, inside: int) -> Array:
+    """Midway between the least and the greatest of `zones` (2, m) within half a cell of so many places (`inside`) of
+    each edge, (2, m / inside): where waves are shorter than a cell, what they are laid upon."""
+    before = inside // 2
+    near = np.roll(zones, before, axis=1).reshape(2, -1, inside)
+    found: Array = (near.min(axis=2) + near.max(axis=2)) / 2
+    return found
+
+
+def _bounds(zones: Array, of_cs: Array, size: tuple[int, int], smooth: bool) -> tuple[Array, Scan]:
+    """The rows of KINDS, (c + 1, KINDS, padded turns), and the scan of the cells over all turns, of so many turns and
+    cells (`size`), without what stands on the FS; `smooth` where waves are shorter than a cell."""
+    turns, cells = size
+    inside = zones.shape[1] // (turns * cells)
+    edges = _midway(zones, inside) if smooth else zones[:, ::inside]
+    below, above = _beyond(zones, edges, inside)
+    if not smooth:
+        below = above = np.maximum(below, above)
+    after = np.roll(edges, -1, axis=1)
+    lowest, highest = np.minimum(edges, after).min(axis=0) - below, np.maximum(edges, after).max(axis=0) + above
     scan = scan_of(np.zeros((2, 2), complex), of_cs, cells)
-    on_cs = np.maximum(scan.below, scan.above)
+    below_cs, above_cs = np.tile(scan.below, turns), np.tile(scan.above, turns)
     of_cells = [found.reshape(turns, cells) for found in (lowest, highest)]
     scan = scan._replace(
         below=singles(scan.below - of_cells[0].min(axis=0)), above=singles(scan.above + of_cells[1].max(axis=0))
     )
     padded = np.zeros((cells + 1, KINDS, -(-turns // GROUP) * GROUP))
-    padded[:, 2, turns:] = -1e9
-    kinds = [
-        edges[0] + edges[1],
-        edges[0] - edges[1],
-        2 * (sag + np.tile(on_cs, turns)),
-        *(2 * slopes[:, ::inside]),
-        2 * bent,
-    ]
+    padded[:, 2:, turns:] = -1e9
+    kinds = [(edges[0] + edges[1]) / 2, (edges[0] - edges[1]) / 2, below + below_cs, above + above_cs]
     for row, found in enumerate(kinds):
-        found = found / 2
         padded[:-1, row, :turns] = found.reshape(turns, cells).T
         padded[-1, row, :turns] = np.roll(found.reshape(turns, cells)[:, 0], -1)
     return padded, scan
+
+
+def _parts(zones: Array, of_cs: Scan, size: tuple[int, int, int], unseen: float) -> Parts:
+    """The parts of so many turns, cells, and parts of each (`size`); the cells' chords leave out what stands on the CS
+    as its scan says, `of_cs`, and those of the parts what is `unseen` here."""
+    turns, cells, each = size
+    if each == 1:
+        return Parts(1, singles(np.zeros(0)), 0, 0, single(0.0))
+    inside = zones.shape[1] // (turns * cells * each)
+    edges = zones[:, ::inside]
+    beyond = max(float(x.max()) for x in _beyond(zones, edges, inside))
+    beyond += max(float(x.max()) for x in (of_cs.below, of_cs.above)) + unseen
+    own = edges.reshape(2, turns * cells, each)
+    own = np.concatenate([own, np.roll(own[:, :, :1], -1, axis=1)], axis=2)
+    rows = (own[0] + own[1]) / 2, (own[0] - own[1]) / 2
+    kinds = 2 if rows[1].any() else (1 if rows[0].any() else 0)
+    fixed = np.stack([rows[0], rows[1]][:kinds], axis=1).ravel() if kinds else np.zeros(0)
+    # Lanes beyond a cell's parts read on.
+    return Parts(each, singles(np.append(fixed, np.zeros(each + 2 * GROUP))), kinds, len(fixed), single(beyond))

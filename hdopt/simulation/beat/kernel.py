@@ -8,53 +8,36 @@ nothing but its own errors. Numba's cache looks at this file's date alone: touch
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from hdopt.arrays import Array, Index, Singles
 from hdopt.kinematics.compiled_closed_form import compiled, entry
 from hdopt.kinematics.kernel import describe
 from hdopt.kinematics.lanes.candidates import at_most, first_order, second_order
+from hdopt.kinematics.lanes.minima import GROUP
 from hdopt.kinematics.lanes.motion import LANES, Design, motion_of, teeth_of
-from hdopt.kinematics.lanes.single import HUGE, ONE, TWO, ZERO, narrowed, single
+from hdopt.kinematics.lanes.single import HUGE, ZERO, narrowed, single
 from hdopt.simulation.beat.edges import ON_CIRCLE, ROWS, fill_edges
 from hdopt.simulation.beat.effects import KINDS, OFFSET, Beat
+from hdopt.simulation.beat.gather import Room, gather
 from hdopt.simulation.beat.looks import IN, PHASE, look_again, look_at_list
-from hdopt.simulation.beat.turns import bound_turns
+from hdopt.simulation.beat.parts import PartRoom
+from hdopt.simulation.beat.turns import ON_FS_ROWS
 from hdopt.simulation.turn.rows import (
     ANGLE,
     BOUNDS,
     GREATEST,
-    HIGHEST_AT,
     LEAST,
     LIST,
-    LOWEST_AT,
-    MARGIN,
     OFFSETS,
     SLACK,
+    SLACK_OF_PARTS,
     middle,
 )
 from hdopt.simulation.turn.scan import fill_parts, scan
 
-FAR, BENT = single(OFFSET), single(4.0)
+FAR, BENT, THIRD = single(OFFSET), single(4.0), single(1 / 3)
 """Where effects on the FS are not looked at; how much faster than the errors terms of second order turn, squared."""
-
-
-class Room(NamedTuple):
-    """Room for a list of lanes (LANES,), a drive at all edges, two edges' effects, a cell's bounds in every turn, for
-    what may be looked at of one drive: bounds, cells and turns; and lane, cell and turn of what is to be, of both
-    sides, (2, 3, n), and how many that are (2,)."""
-
-    lanes: Index
-    edges: Singles
-    effects: Singles
-    turns: Singles
-    values: Singles
-    cells: Index
-    at: Index
-    queue: Index
-    waiting: Index
 
 
 @compiled
@@ -67,63 +50,20 @@ def _fill_slack(work: Singles, design: Design, beat: Beat) -> None:
         across = at_most(m.el_cos, m.el_sin) + abs(m.el_0) + at_most(m.tl_cos, m.tl_sin) + abs(m.tl_0)
         off = across * design.rim.per_flatness
         work[i + OFFSETS] = off
-        work[i + SLACK] = beat.turn.scan.sag * (swing + BENT * second) + (beat.fs_range if off > FAR else ZERO)
-
-
-@compiled
-def _note(
-    room: Singles, bounds: Singles, values: Singles, turns: Index, off: float, slack: float, below: float
-) -> tuple[int, float]:
-    """Note those of the `turns`, of which `room` holds a cell's bounds, that go `below` what must be, with their
-    `values`: how many, and what must be now, since the deviation itself lies not far above its bound."""
-    size, count = len(room), 0
-    for j in range(size):
-        value = room[j]
-        if value < below:
-            values[count], turns[count] = value, j
-            count += 1
-            beyond = bounds[2 * size + j] + off * bounds[5 * size + j]
-            below = min(below, value + slack + beyond + beyond)
-    return count, below
-
-
-@compiled
-def _gather(
-    work: Singles, room: Room, i: int, bounds: Singles, cells: int, fs_slope: float, high: bool
-) -> tuple[int, float]:
-    """Note of lane i all cells and turns that may hold the least (or greatest), the cell of the best bound first: how
-    many, and what those must be below that do."""
-    edges, effects, turns, values, of_cell, at = room.edges, room.effects, room.turns, room.values, room.cells, room.at
-    slot, best = (LANES, int(work[HIGHEST_AT + i])) if high else (0, int(work[LOWEST_AT + i]))
-    size, sign = len(turns), (-ONE if high else ONE)
-    beyond = work[MARGIN + i] + work[OFFSETS + i] * fs_slope
-    off, slack = work[OFFSETS + i] * work[OFFSETS + i], TWO * work[SLACK + i]
-    jump, count, below = TWO * work[MARGIN + i], 0, HUGE
-    for k in range(-1, cells):
-        g = best if k < 0 else k
-        if k == best or (k >= 0 and sign * work[BOUNDS + 2 * LANES * g + slot + i] - beyond >= below):
-            continue
-        parted = bound_turns(edges, g, bounds, effects, high, turns)
-        fewer = 0
-        for j in range(size):
-            fewer += 1 if turns[j] < below else 0
-        if fewer:
-            start = (2 + KINDS * g) * size
-            more, below = _note(
-                turns, bounds[start:], values[count:], at[count:], off, slack + (jump if parted else ZERO), below
-            )
-            for j in range(count, count + more):
-                of_cell[j] = g
-            count += more
-    return count, below
+        sag, far = beat.turn.scan.sag, (beat.fs_range if off > FAR else ZERO)
+        work[i + SLACK] = sag * (swing + BENT * second) + far
+        # A parabola leaves the third order out, a sixth of the width or so as much as the second.
+        work[i + SLACK_OF_PARTS] = (
+            sag * (beat.turn.scan.half * THIRD * swing + BENT * second + beat.turn.cs_range) + far
+        )
 
 
 @compiled
 def _queue(queue: Index, waiting: int, room: Room, count: int, below: float, i: int) -> int:
-    """Queue of the `count` cells and turns noted of lane i those `below` what must be: how many are waiting."""
+    """Queue of the `count` cells and turns noted of lane i those not above `below`: how many are waiting."""
     values, cells, at = room.values, room.cells, room.at
     for k in range(count):
-        if values[k] < below:
+        if values[k] <= below:
             queue[0, waiting], queue[1, waiting], queue[2, waiting] = i, cells[k], at[k]
             waiting += 1
     return waiting
@@ -133,7 +73,8 @@ def _queue(queue: Index, waiting: int, room: Room, count: int, below: float, i: 
 def _look(work: Singles, room: Room, design: Design, beat: Beat, side: int, waiting: int, fewest: int) -> int:
     """Look at what is waiting for a `side` while there are `fewest` at least: at the middle of a cell in a turn; later
     cells are seen from the next turn. How many are left."""
-    lanes, queue, phases, cells = room.lanes, room.queue[side], beat.phases, len(beat.turn.scan.below)
+    lanes, queue, phases = room.lanes, room.queue[side], beat.phases
+    cells = len(beat.turn.scan.below) * beat.parts.each
     done = 0
     while waiting - done >= fewest:
         count = min(LANES, waiting - done)
@@ -154,7 +95,7 @@ def _look(work: Singles, room: Room, design: Design, beat: Beat, side: int, wait
 @compiled
 def _find(work: Singles, room: Room, design: Design, beat: Beat) -> None:
     """Fill the least of the drives of `work`, and the negative of the greatest."""
-    bounds, cells, waiting = beat.bounds, len(beat.turn.scan.below), room.waiting
+    cells, waiting = len(beat.turn.scan.below), room.waiting
     waiting[0] = waiting[1] = 0
     for i in range(LANES):
         work[LEAST + i], work[GREATEST + i] = HUGE, HUGE
@@ -163,7 +104,7 @@ def _find(work: Singles, room: Room, design: Design, beat: Beat) -> None:
     for i in range(LANES):
         fill_edges(room.edges, work, i, design, beat.circle, beat.turn.cs, cells)
         for side in range(2):
-            count, below = _gather(work, room, i, bounds, cells, beat.fs_slope, side == 1)
+            count, below = gather(work, room, i, design, beat, side == 1)
             waiting[side] = _queue(room.queue[side], waiting[side], room, count, below, i)
             if waiting[side] >= fewest:
                 waiting[side] = _look(work, room, design, beat, side, waiting[side], fewest)
@@ -182,15 +123,23 @@ def beat_block(design: Design, matrix: Array, beat: Beat, out: Array) -> None:
     n, names = matrix.shape
     cells, turns = len(beat.turn.scan.below), len(beat.bounds) // (2 + KINDS * len(beat.turn.scan.cos))
     work = np.zeros(BOUNDS + 2 * LANES * cells, np.float32)
-    every = cells * turns
+    every, each = cells * turns * beat.parts.each, beat.parts.each
     values, at = np.empty(every, np.float32), np.empty(every, np.int64)
     edges, effects = (
         np.zeros(ROWS * len(beat.circle) // ON_CIRCLE, np.float32),
-        np.zeros(2 * KINDS * turns if len(beat.fs) else 0, np.float32),
+        np.zeros(ON_FS_ROWS * turns if len(beat.fs) else 0, np.float32),
     )
     queue = np.empty((2, 3, every + LANES), np.int64)
     lanes, of_cell = np.zeros(LANES, np.int64), np.empty(turns, np.float32)
-    room = Room(lanes, edges, effects, of_cell, values, np.empty(every, np.int64), at, queue, np.zeros(2, np.int64))
+    of_part, edge = np.empty(every, np.int64), GROUP * ((each + GROUP - 1) // GROUP + 1)
+    parts = PartRoom(
+        np.zeros(edge, np.float32),
+        np.zeros(edge, np.float32),
+        np.zeros(edge, np.float32),
+        np.zeros(edge, np.float32),
+        np.zeros(edge, np.float32),
+    )
+    room = Room(lanes, edges, effects, of_cell, parts, values, of_part, at, queue, np.zeros(2, np.int64))
     errors = np.zeros(names * LANES)
     for start in range(0, n, LANES):
         count = min(LANES, n - start)

@@ -1,21 +1,42 @@
 """A cell in every turn, lanes along the turns: what the driving deviation cannot fall below there, nor exceed.
 
 Over a cell each branch is taken as a straight line between what it is at the edges, with the FS teeth at the phase that
-each turn has and the effects of that turn; where the deepest rim of a zone changes, the cell is parted. The driving
-deviation is the mean of both zones plus the size of half their gap: convex, so that it is largest at an end, and least
-there or where the gap vanishes. What lines leave out is the slack.
+each turn has and the effects of that turn, those on the FS where either zone meets them; where the deepest rim of a
+zone changes, the cell is parted. The driving deviation is the mean of both zones plus the size of half their gap:
+convex, so that it is largest at an end, and least there or where the gap vanishes. What lines leave out is the slack.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from hdopt.arrays import Singles
 from hdopt.kinematics.compiled_closed_form import compiled
 from hdopt.kinematics.lanes.minima import GROUP
-from hdopt.kinematics.lanes.single import HALF, HUGE, ONE, TINY, ZERO, clipped, unsigned
+from hdopt.kinematics.lanes.motion import Design
+from hdopt.kinematics.lanes.single import HALF, HUGE, ONE, TINY, ZERO, clipped, narrowed, unsigned
 from hdopt.simulation.beat.edges import COSINE, GAP, OFF, SINE, STEP
-from hdopt.simulation.beat.effects import KINDS
+from hdopt.simulation.beat.effects import KINDS, Beat
+from hdopt.simulation.beat.on_fs import OnFs
+from hdopt.simulation.turn.rows import PER_TURN
+
+ON_FS_ROWS = 4
+"""Rows of the room for what both zones meet on the FS at the ends of a piece."""
+
+
+class Side(NamedTuple):
+    """A drive as its cells are bounded: what it is at their `edges`, its `design`, the effects of a `beat`, at first
+    order the constants of t and d, mm of arc; for the least driving deviation, or (`high`) for the greatest, negative.
+    """
+
+    edges: Singles
+    design: Design
+    beat: Beat
+    t_0: float
+    d_0: float
+    high: bool
 
 
 class End(NamedTuple):
@@ -42,8 +63,8 @@ def _line(edges: Singles, here: int, after: int, x: float) -> float:
 
 
 @compiled
-def _end(edges: Singles, g: int, one: int, two: int, x: float) -> End:
-    """Branches `one` and `two` at a share x of cell g."""
+def end_of(edges: Singles, g: int, one: int, two: int, x: float) -> End:
+    """Branches `one` and `two` at a share `x` of cell `g`, from the `edges` of a drive."""
     here = unsigned((g // GROUP) * STEP + g % GROUP)
     after = unsigned(((g + 1) // GROUP) * STEP + (g + 1) % GROUP)
     a, b = unsigned(one * GROUP), unsigned(two * GROUP)
@@ -60,42 +81,50 @@ def _end(edges: Singles, g: int, one: int, two: int, x: float) -> End:
 
 
 @compiled
-def _meet_fs(rows: Singles, start: int, end: End, kind: int, room: Singles, side: int) -> None:
-    """Put into `room`, for a side of a piece, the row of a `kind` of the effects at an end of it: the mean (0) or half
-    the difference (1) with those on the FS where its zones meet them. More streams than one at a time the compiler
-    does not tell apart."""
-    turns = len(room) // (2 * KINDS)
-    size, to = unsigned(turns), unsigned((side * KINDS + kind) * turns)
-    step, share, one = unsigned(KINDS * turns), end.share, HALF * end.one
-    two = -HALF * end.two if kind else HALF * end.two
-    first, slope = unsigned(start + kind * turns), unsigned(start + 3 * turns)
-    for group in range(turns // GROUP):
-        for lane in range(GROUP):
-            j = unsigned(group * GROUP + lane)
-            at, a, b = first + j, slope + j, slope + size + j
-            value = rows[at] + share * (rows[at + step] - rows[at])
-            value += one * (rows[a] + share * (rows[a + step] - rows[a]))
-            room[to + j] = value + two * (rows[b] + share * (rows[b + step] - rows[b]))
+def met_place(end: End, g: int, design: Design, cells: int, off: float) -> float:
+    """Where on the FS, in turns from 0 to 1, a zone whose o' is `off` (rad) stands in the first turn at an `end` of a
+    piece of cell `g` of so many `cells`, under a `design`."""
+    turned = design.advance * ((narrowed(g) + end.share) / narrowed(cells)) + off * PER_TURN
+    found: float = turned - np.floor(turned)
+    return found
 
 
 @compiled
-def _loosen_fs(rows: Singles, start: int, off: float, room: Singles) -> None:
-    """Put into `room` how far the effects go beyond their chords where o' is at most `off`, rad."""
-    turns, squared = len(room) // (2 * KINDS), off * off
-    sag, bend, to = unsigned(start + 2 * turns), unsigned(start + 5 * turns), unsigned(2 * turns)
-    for group in range(turns // GROUP):
-        for lane in range(GROUP):
-            j = unsigned(group * GROUP + lane)
-            room[to + j] = rows[sag + j] + squared * rows[bend + j]
+def _row_of(on_fs: OnFs, zone: int, side: int, place: float) -> int:
+    """Where in the table a zone that stands at a `place` of the FS in the first turn begins to read; the `side` of the
+    greatest is another table where cells have parts."""
+    turns = len(on_fs.starts)
+    at = place * narrowed(turns)
+    tooth = min(int(at), turns - 1)
+    row = min(int((at - narrowed(tooth)) * narrowed(on_fs.rows)), on_fs.rows - 1)
+    start: int = ((2 * side + zone) * on_fs.rows + row) * on_fs.length + on_fs.starts[unsigned(tooth)]
+    return start
 
 
 @compiled
-def _at_ends(
-    phases: Singles, rows: Singles, size: int, at: int, j: int, left: End, right: End
-) -> tuple[float, float, float, float]:
+def _meet_fs(table: Singles, starts: tuple[int, int], room: Singles, kind: int) -> None:
+    """Put what both zones meet on the FS in every turn into the row `kind` of `room` and the next one: the mean of what
+    the `table` holds from either of `starts` on, and half the difference."""
+    turns = len(room) // ON_FS_ROWS
+    one, two, mean, half = (
+        unsigned(starts[0]),
+        unsigned(starts[1]),
+        unsigned(kind * turns),
+        unsigned((kind + 1) * turns),
+    )
+    for lane in range(turns):
+        j = unsigned(lane)
+        room[mean + j] = HALF * (table[one + j] + table[two + j])
+    for lane in range(turns):
+        j = unsigned(lane)
+        room[half + j] = HALF * (table[one + j] - table[two + j])
+
+
+@compiled
+def _at_ends(rows: Singles, size: int, at: int, j: int, left: End, right: End) -> tuple[float, float, float, float]:
     """The zones' mean at both ends of a piece in turn `j` of `size`, then half their difference, with the effects whose
-    `rows` begin `at`."""
-    cos, sin, to = phases[j], phases[size + j], at + unsigned(KINDS) * size
+    `rows` begin `at`; the first two rows are the FS phases."""
+    cos, sin, to = rows[j], rows[size + j], at + unsigned(KINDS) * size
     mean, half = rows[at + j], rows[at + size + j]
     mean_on, half_on = rows[to + j] - mean, rows[to + size + j] - half
     return (
@@ -107,67 +136,92 @@ def _at_ends(
 
 
 @compiled
-def _lower(phases: Singles, rows: Singles, start: int, left: End, right: End, out: Singles) -> None:
+def _least(m0: float, m1: float, d0: float, d1: float) -> float:
+    """The least of the mean and the size of half the difference, both straight lines between two ends."""
+    on = d1 - d0
+    x = clipped(-d0 / (on if abs(on) > TINY else TINY), ZERO, ONE)
+    return min(m0 + abs(d0), m1 + abs(d1), m0 + x * (m1 - m0) + abs(d0 + x * on))
+
+
+@compiled
+def _lower(rows: Singles, start: int, left: End, right: End, out: Singles) -> None:
     """Lower `out` (turns,) to the least of a piece in every turn, with the effects whose `rows` begin at `start`."""
     size, at = unsigned(len(out)), unsigned(start)
     slack = at + unsigned(2) * size
-    for group in range(len(out) // GROUP):
-        for lane in range(GROUP):
-            j = unsigned(group * GROUP + lane)
-            m0, m1, d0, d1 = _at_ends(phases, rows, size, at, j, left, right)
-            on = d1 - d0
-            x = clipped(-d0 / (on if abs(on) > TINY else TINY), ZERO, ONE)
-            least = min(m0 + abs(d0), m1 + abs(d1), m0 + x * (m1 - m0) + abs(d0 + x * on))
-            out[j] = min(out[j], least - rows[slack + j])
+    for lane in range(len(out)):
+        j = unsigned(lane)
+        m0, m1, d0, d1 = _at_ends(rows, size, at, j, left, right)
+        out[j] = min(out[j], _least(m0, m1, d0, d1) - rows[slack + j])
 
 
 @compiled
-def _raise(phases: Singles, rows: Singles, start: int, left: End, right: End, out: Singles) -> None:
+def _raise(rows: Singles, start: int, left: End, right: End, out: Singles) -> None:
     """Lower `out` (turns,) to the negative of the greatest of the same."""
     size, at = unsigned(len(out)), unsigned(start)
-    slack = at + unsigned(2) * size
-    for group in range(len(out) // GROUP):
-        for lane in range(GROUP):
-            j = unsigned(group * GROUP + lane)
-            m0, m1, d0, d1 = _at_ends(phases, rows, size, at, j, left, right)
-            out[j] = min(out[j], -max(m0 + abs(d0), m1 + abs(d1)) - rows[slack + j])
+    slack = at + unsigned(3) * size
+    for lane in range(len(out)):
+        j = unsigned(lane)
+        m0, m1, d0, d1 = _at_ends(rows, size, at, j, left, right)
+        out[j] = min(out[j], -max(m0 + abs(d0), m1 + abs(d1)) - rows[slack + j])
 
 
 @compiled
-def _sharing(end: End, x: float) -> End:
-    e = end
-    return End(e.mean, e.mean_sine, e.mean_cosine, e.half, e.half_sine, e.half_cosine, e.one, e.two, x)
+def _lower_on_fs(
+    rows: Singles, start: int, on_fs: Singles, after: int, left: End, right: End, beyond: float, out: Singles
+) -> None:
+    """The same as `_lower` with what is met on the FS at the piece's start, and at its end in the row `after`; it goes
+    as far as `beyond` below its chord."""
+    size, at, then = unsigned(len(out)), unsigned(start), unsigned(after * len(out))
+    slack = at + unsigned(2) * size
+    for lane in range(len(out)):
+        j = unsigned(lane)
+        m0, m1, d0, d1 = _at_ends(rows, size, at, j, left, right)
+        m0, d0 = m0 + on_fs[j], d0 + on_fs[size + j]
+        m1, d1 = m1 + on_fs[then + j], d1 + on_fs[then + size + j]
+        out[j] = min(out[j], _least(m0, m1, d0, d1) - rows[slack + j] - beyond)
+
+
+@compiled
+def _raise_on_fs(
+    rows: Singles, start: int, on_fs: Singles, after: int, left: End, right: End, beyond: float, out: Singles
+) -> None:
+    """The same as `_raise` with what is met on the FS."""
+    size, at, then = unsigned(len(out)), unsigned(start), unsigned(after * len(out))
+    slack = at + unsigned(3) * size
+    for lane in range(len(out)):
+        j = unsigned(lane)
+        m0, m1, d0, d1 = _at_ends(rows, size, at, j, left, right)
+        m0, d0 = m0 + on_fs[j], d0 + on_fs[size + j]
+        m1, d1 = m1 + on_fs[then + j], d1 + on_fs[then + size + j]
+        out[j] = min(out[j], -max(m0 + abs(d0), m1 + abs(d1)) - rows[slack + j] - beyond)
 
 
 @compiled
 def _bound_piece(
-    edges: Singles,
-    g: int,
-    bounds: Singles,
-    room: Singles,
-    high: bool,
-    branches: tuple[int, int],
-    ends: tuple[float, float],
-    out: Singles,
+    drive: Side, g: int, room: Singles, branches: tuple[int, int], ends: tuple[float, float], out: Singles
 ) -> None:
     """Lower `out` to what the two branches do in a part of cell g."""
-    (one, two), (first, last), turns = branches, ends, len(out)
-    left, right = _end(edges, g, one, two, first), _end(edges, g, one, two, last)
-    start = (2 + KINDS * g) * turns
+    edges, beat, high, bounds = drive.edges, drive.beat, drive.high, drive.beat.bounds
+    (one, two), (first, last) = branches, ends
+    left, right = end_of(edges, g, one, two, first), end_of(edges, g, one, two, last)
+    start = (2 + KINDS * g) * len(out)
     if len(room):
-        for each in range(4):
-            _meet_fs(bounds, start, left if each < 2 else right, each % 2, room, each // 2)
-        off = max(max(abs(left.one), abs(left.two)), max(abs(right.one), abs(right.two)))
-        _loosen_fs(bounds, start, off, room)
-        left, right = _sharing(left, ZERO), _sharing(right, ONE)
+        cells, windows = len(beat.turn.scan.below), beat.parts.each > 1
+        # The least and the greatest of a cell that begins where this one does bound all of it.
+        side, table, beyond = (1 if windows and high else 0), beat.on_fs.table, beat.on_fs.left
+        for each in range(1 if windows else 2):
+            at = end_of(edges, g, one, two, ZERO if windows else (last if each else first))
+            here = _row_of(beat.on_fs, 0, side, met_place(at, g, drive.design, cells, at.one))
+            there = _row_of(beat.on_fs, 1, side, met_place(at, g, drive.design, cells, at.two))
+            _meet_fs(table, (here, there), room, 2 * each)
         if high:
-            _raise(bounds, room, 0, left, right, out)
+            _raise_on_fs(bounds, start, room, 0 if windows else 2, left, right, beyond, out)
         else:
-            _lower(bounds, room, 0, left, right, out)
+            _lower_on_fs(bounds, start, room, 0 if windows else 2, left, right, beyond, out)
     elif high:
-        _raise(bounds, bounds, start, left, right, out)
+        _raise(bounds, start, left, right, out)
     else:
-        _lower(bounds, bounds, start, left, right, out)
+        _lower(bounds, start, left, right, out)
 
 
 @compiled
@@ -180,22 +234,48 @@ def _change(edges: Singles, g: int, row: int) -> tuple[int, int, float]:
     return before, then, (here / (here - after) if before != then else ONE)
 
 
+class Changes(NamedTuple):
+    """Of both zones of a cell: which rim is deepest at its start, which at its end, and where that changes, as a share
+    of the cell."""
+
+    one: int
+    one_then: int
+    x_one: float
+    two: int
+    two_then: int
+    x_two: float
+
+
 @compiled
-def bound_turns(edges: Singles, g: int, bounds: Singles, room: Singles, high: bool, out: Singles) -> bool:
-    """Fill `out` (turns, padded) with the least driving deviation in cell `g` of every turn, mm of arc less what the
-    effects' lines leave out, or (`high`) with that of its negative: with those `edges` of the drive and these `bounds`
-    of the effects; `room` has room for two edges of them where some stand on the FS, or for none. Whether a
+def changes_of(edges: Singles, g: int) -> Changes:
+    """Where in cell `g` of the `edges` of a drive the rims change."""
+    one, one_then, x_one = _change(edges, g, GAP)
+    two, two_then, x_two = _change(edges, g, GAP + GROUP)
+    return Changes(one, one_then, x_one, two, two_then, x_two)
+
+
+@compiled
+def piece_of(changes: Changes, piece: int) -> tuple[float, float, int, int]:
+    """A `piece` of the three that a cell with these `changes` has at most: where it begins and ends, as shares of the
+    cell, and the branches of both zones there. Where there are fewer it ends where it begins."""
+    c = changes
+    first, last = min(c.x_one, c.x_two), max(c.x_one, c.x_two)
+    start = ZERO if piece == 0 else (first if piece == 1 else last)
+    end = first if piece == 0 else (last if piece == 1 else ONE)
+    return start, end, (c.one if start < c.x_one else c.one_then), 2 + (c.two if start < c.x_two else c.two_then)
+
+
+@compiled
+def bound_turns(drive: Side, g: int, room: Singles, out: Singles) -> bool:
+    """Fill `out` (turns, padded) with the least that a side of a `drive` has in cell `g` of every turn, mm of arc less
+    what the effects' lines leave out; `room` has room for ON_FS_ROWS where some stand on the FS, or for none. Whether a
     rim changes: then what is found need not be met."""
     for j in range(len(out)):
         out[j] = HUGE
-    one, one_then, x_one = _change(edges, g, GAP)
-    two, two_then, x_two = _change(edges, g, GAP + GROUP)
-    first, start = min(x_one, x_two), ZERO
+    changes = changes_of(drive.edges, g)
     # One loop, since each piece would else be compiled for itself.
     for piece in range(3):
-        end = first if piece == 0 else (max(x_one, x_two) if piece == 1 else ONE)
+        start, end, one, two = piece_of(changes, piece)
         if piece == 0 or end > start:
-            branches = (one if start < x_one else one_then, 2 + (two if start < x_two else two_then))
-            _bound_piece(edges, g, bounds, room, high, branches, (start, end), out)
-        start = end
-    return first < ONE
+            _bound_piece(drive, g, room, (one, two), (start, end), out)
+    return min(changes.x_one, changes.x_two) < ONE

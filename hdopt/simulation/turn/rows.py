@@ -65,7 +65,9 @@ RIM_NEAR = SWING + 23 * LANES
 """How near to nought t is where either rim may drive, mm of arc."""
 FINE_AT = SWING + 24 * LANES
 """Which part was looked at first."""
-LIST = SWING + 25 * LANES
+SLACK_OF_PARTS = SWING + 25 * LANES
+"""The same beyond a parabola, where cells of effects that differ from turn to turn have parts."""
+LIST = SWING + 26 * LANES
 """The second area: places to look at, dense."""
 NEAR = LIST + AREA
 """The third area: drives whose parts of a cell are bounded, dense, with the rows of the first."""
