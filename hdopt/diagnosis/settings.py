@@ -549,6 +549,12 @@ class VerdictSettings:
     stepped_resolution: float = threshold(
         0.5, "1", "choice: share of what steps taken out of a coarse encoder leave below which nothing is a finding"
     )
+    spread_over_turns: float = threshold(
+        0.5,
+        "1",
+        "choice: of an effect's size from one turn to the next, over its mean, beyond noise; pulses that are there "
+        "with chance p have ((1 - p)/p)^(1/2), 0.8 at 0.6",
+    )
     smallest_share: float = threshold(0.02, "1", "choice: share of the held-out power that is worth a name")
     unconfirmed_share: float = threshold(
         0.05, "1", "measured: clean drives of run-002 reach 0.014, what pulses of random height showed was 0.148"

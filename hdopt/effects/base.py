@@ -45,6 +45,9 @@ class Explanation(ABC):
     at_once: ClassVar[bool] = False
     """Whether what is `driven` answers in each row to the motion of that row alone."""
 
+    same_each_time: ClassVar[bool] = False
+    """Whether it is the same each time that it is met, turn by turn."""
+
     aside: ClassVar[bool] = False
     """Whether the search asks for it once, when all others are weighed, and not among them."""
 

@@ -76,6 +76,7 @@ class LocalToothDefect(Effect):
     place = 150
     domain = "angle"
     excites = True
+    same_each_time = True
     needs_strain_wave = True
     acts = "zones, or beside"
     separating = (

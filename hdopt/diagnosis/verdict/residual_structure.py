@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from hdopt.diagnosis.checks.assessment import Evidence
+from hdopt.diagnosis.checks.turn_by_turn import from_turn_to_turn
 from hdopt.diagnosis.inference.catalogue import TOLD, is_outside, properties_of
 from hdopt.diagnosis.inference.cross_validation import paired_chance
 from hdopt.diagnosis.inference.fit import Fit
@@ -57,10 +58,35 @@ def in_what_way(where: Where) -> str:
     return ""
 
 
-def unsteady(evidence: Evidence) -> Where | None:
-    """Where something lives that changes in time as no noise does, if it is a fair part of what is there, or None.
-    `evidence` is that of the diagnosis.
+def comes_and_goes(evidence: Evidence) -> Where | None:
+    """Where an effect of the best set lives that is the same each time it is met, but differs from turn to turn by more
+    than noise and by a fair part of itself; None where none does. `evidence` is that of the diagnosis.
     """
+    fit, settings = evidence.selection.best.fit, evidence.settings.verdict
+    for index, term in enumerate(fit.terms):
+        effect = properties_of(term.effect)
+        if not effect.same_each_time or fit.problem.rows.locked:
+            continue
+        differs = from_turn_to_turn(fit, index)
+        if differs.t > settings.remainder_t_alone and differs.spread > settings.spread_over_turns:
+            contribution = fit.contribution(index)
+            rms = differs.spread * float(np.std(contribution))
+            return {
+                "domain": effect.domain,
+                "orders_per_input_turn": main_orders(fit, contribution),
+                "direction": "both",
+                "share_of_residual": float(min(rms**2 / max(evidence.base_held_out.variance, TINY), 1.0)),
+                "rms_arcmin": rms,
+            }
+    return None
+
+
+def unsteady(evidence: Evidence) -> Where | None:
+    """Where something lives that changes in time as no noise does, or that comes and goes, if it is a fair part of what
+    is there, or None. `evidence` is that of the diagnosis.
+    """
+    if (where := comes_and_goes(evidence)) is not None:
+        return where
     settings = evidence.settings.verdict
     least = settings.remainder_share * max(evidence.base_held_out.variance - evidence.extended_held_out.variance, 0.0)
     floor = settings.smallest_share * evidence.extended_held_out.variance
