@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numba
 import numpy as np
 import pytest
 from cases import PROFILES, drive, random_errors
@@ -9,15 +10,21 @@ from effect_examples import EXAMPLES, NAMES
 
 from hdopt.drive.geometry import Structure
 from hdopt.effects import EFFECTS
+from hdopt.kinematics.compiled_closed_form import OPTIONS
 from hdopt.kinematics.kernel import design_of
+from hdopt.kinematics.lanes.minima import GROUP
+from hdopt.kinematics.lanes.motion import FS, FS_PHASE, LANES
 from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin as base_alone
 from hdopt.simulation import EffectValues, Operation, batch
 from hdopt.simulation.batch import matrix_peak_to_peak_arcmin, stacked_peak_to_peak_arcmin, tabulate
 from hdopt.simulation.beat.effects import beat_of
+from hdopt.simulation.beat.gather import _most_on_fs
 from hdopt.simulation.beat.kernel import beat_block
+from hdopt.simulation.turn.rows import BOUNDS
 from hdopt.study import load_study
 
 DRIVE = load_study(drive="csf-25-80").drive
+GEAR = DRIVE.geometry
 FORWARD = Operation(torque=20.0, speed=3.0, temperature_difference=5.0, time=0.0)
 DRIVES = 64
 FINER = 4
@@ -104,6 +111,37 @@ def test_what_is_finer_than_a_cell_is_found_part_by_part(label, sign, profile, s
     held = structure is Structure.ONE_WAY_MINOR
     assert np.quantile(off, 0.96 if held else 0.99) < 1e-3
     assert off.max() < (2.5e-2 if held else 5e-3)
+
+
+@numba.njit(**OPTIONS)
+def joint_most(work, beat, room, out):
+    """Fill `out` (LANES,) with the greatest that is granted to FS teeth and effects on the FS together, mm of arc."""
+    for i in range(LANES):
+        out[i] = work[FS + i] + beat.on_fs.highest - _most_on_fs(work, i, beat, room)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("label", [DEFECT, ON_FS])
+def test_fs_teeth_and_effects_on_the_fs_are_granted_what_they_reach_together(label, sign):
+    """Neither less than at any of 20,000 places in either zone, nor more by what a stretch of either leaves open, which
+    the answers that others compare would hide."""
+    (one,) = effect(label)
+    table = tabulate(DRIVE, [replace(one, coefficients=tuple(sign * c for c in one.coefficients))], FORWARD)
+    (beat,) = table.in_lanes(GEAR.arcmin_per_mm, GEAR.beat_phases, GEAR.flexspline_advance)[1]
+    work, granted = np.zeros(BOUNDS, np.float32), np.zeros(LANES)
+    rng, places = np.random.default_rng(0), 20_000
+    amplitude, phase = 4e-3 * rng.random(LANES), 2 * np.pi * rng.random(LANES)
+    work[FS : FS + LANES], work[FS_PHASE : FS_PHASE + LANES] = amplitude, phase
+    joint_most(work, beat, np.zeros(GROUP, np.float32), granted)
+    angle = 2 * np.pi * np.arange(places) / places
+    grid = 2 * np.pi * np.arange(table.fs.shape[1] + 1) / table.fs.shape[1]
+    one, two = (np.interp(angle, grid, np.append(zone, zone[0])) for zone in table.fs)
+    sine = amplitude[:, None] * np.sin(angle + phase[:, None])
+    reached = np.maximum(one + sine, two - sine).max(axis=1)
+    # A stretch of 1/128 of a turn counts as all at its greatest: half of it away the sum falls by its own slopes.
+    slope = amplitude + np.abs(np.gradient(table.fs, grid[1], axis=1)).max()
+    assert (granted >= reached - 1e-8).all()
+    assert (granted <= reached + np.pi / 128 * slope + 1e-8).all()
 
 
 @pytest.mark.parametrize("on_fs", [False, True])
