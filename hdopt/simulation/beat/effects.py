@@ -89,7 +89,8 @@ def beat_of(zones: Array, cs: Array, fs: Array, turns: int, advance: float, per_
     bend = float(np.abs(np.diff(rows[:, 2])).max()) * places / (2 * math.pi)
     bend = per_mm * (bend + largest(of_cs, 3) + largest(of_fs, 3) * advance**3)
     bow = per_mm * (float(np.abs(rows[:, 2]).max()) + largest(of_fs, 2) * advance**2)
-    cells, each = _cells(places, parts(bend, LEFT_BY_CELL), math.pi * math.sqrt(bow / (2 * LEFT_BY_CHORD)))
+    chords = math.pi * math.sqrt(bow / (2 * LEFT_BY_CHORD))
+    cells, each = _cells(places, MOST_BOUNDS // turns, parts(bend, LEFT_BY_CELL), chords)
     if not cells or cells * each * turns > MOST_BOUNDS:
         return None
     # Four a cell at least: where a function jumps between the last turn and the first, half a place is not told.
@@ -131,12 +132,13 @@ def beat_of(zones: Array, cs: Array, fs: Array, turns: int, advance: float, per_
     )
 
 
-def _cells(places: int, fewest: int, chords: float) -> tuple[int, int]:
+def _cells(places: int, most: int, fewest: int, chords: float) -> tuple[int, int]:
     """How many cells a turn of so many `places` has, and how many parts each: the `fewest` that parabolas ask for, as
-    parts also what `chords` do, or the most that there are places for. (0, 1) where no whole number of places does."""
+    parts also what `chords` do, where that is not more than there are places or bounds for (`most`). (0, 1) where no
+    whole number of places does."""
     if fewest >= PARTS_FROM:
-        for most in (places, 0):
-            for n in range(max(fewest, min(math.ceil(chords), most)), places + 1):
+        for wanted in (math.ceil(chords), fewest):
+            for n in range(max(fewest, min(wanted, places, most)), min(places, most) + 1):
                 if places % n == 0:
                     for cells in range(MOST_PARTED, FEWEST_CELLS - 1, -1):
                         if n % cells == 0:
