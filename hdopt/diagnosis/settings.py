@@ -524,6 +524,12 @@ class VerdictSettings:
     unseen_over_floor: float = threshold(
         2.0, "1", "measured: right names of run-002 and run-003 reach 1.47, a drift by the power of travel was at 2.4"
     )
+    adequate_over_floor: float = threshold(
+        1.15,
+        "1",
+        "measured: held-out error over noise floor of 161 clean recordings of runs 007 to 012 called adequate reaches "
+        "1.01, 1.09 with a coarse encoder; two that were not clean had 1.20 and 1.90",
+    )
     placebo_share: float = threshold(0.98, "1", "choice: share of the effects' held-out gain that a placebo must reach")
     placebo_t: float = threshold(2.0, "1", "theorem: t below which two held-out errors do not differ (95 %)")
     placebo_apart: float = threshold(

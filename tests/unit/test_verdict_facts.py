@@ -16,7 +16,15 @@ from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut
 from hdopt.diagnosis.search.penalty import Scale, penalty
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.verdict import rules
-from hdopt.diagnosis.verdict.facts import found_again, own_gain, stands_out, too_little, unseen_gain, unseen_rms
+from hdopt.diagnosis.verdict.facts import (
+    found_again,
+    left_over_floor,
+    own_gain,
+    stands_out,
+    too_little,
+    unseen_gain,
+    unseen_rms,
+)
 from hdopt.diagnosis.verdict.named_effect import confidences
 from hdopt.diagnosis.verdict.residual_structure import (
     beaten_by_generic,
@@ -329,3 +337,26 @@ def test_confidence_is_the_weight_of_the_sets_that_hold_an_effect():
 def test_what_is_left_is_held_against_what_differs_from_pass_to_pass(passes, more, over):
     said = evidence(candidate({"hysteresis": 1.0}), passes=passes, **({"base": 1.0} | more))
     assert left_over_passes(said) == pytest.approx(over)
+
+
+@pytest.mark.parametrize(
+    ("floor", "base_power", "noise", "ratio"),
+    [
+        (0.5, 1.0, 0.0, 2.0),
+        (1.0, 1.0, 0.0, 1.0),
+        (0.5, 1e6, 0.0, 1.0),  # between the two 0.87, of which the model resolves 2
+        (0.5, 1.0, 10.0, 1.0),  # a tenth of the noise between neighbours is 1
+    ],
+)
+def test_what_is_left_over_the_floor_counts_where_it_is_resolved(floor, base_power, noise, ratio):
+    """1 arcmin is left, and a generic basis leaves less. Fault caught: `adequate` for whatever has no name."""
+    found = SimpleNamespace(
+        settings=DEFAULT,
+        rows=SimpleNamespace(output_step=0.0),
+        extended_held_out=SimpleNamespace(rms=1.0),
+        noise_floor=floor,
+        neighbours_arcmin=noise,
+        sensor_arcmin=0.0,
+        selection=SimpleNamespace(base=SimpleNamespace(base_value=np.sqrt(base_power) * SWING)),
+    )
+    assert left_over_floor(found) == pytest.approx(ratio)

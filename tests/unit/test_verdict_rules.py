@@ -86,6 +86,10 @@ FIRED = [
     ("more than is told", replace(CLEAN, beside_told=70.0), {"beside_told": 12.0}),
     ("more than is told", replace(CLEAN, beside_told=70.0), {"turns_suffice": False}),
     ("more than is told", replace(CLEAN, beside_told=70.0), {"high": True}),
+    ("something is left", replace(CLEAN, left_over_floor=1.2, generic_t=2.1), {"left_over_floor": 1.1}),
+    ("something is left", replace(CLEAN, left_over_floor=1.2, generic_t=2.1), {"generic_t": 1.9}),
+    ("something is left", replace(CLEAN, left_over_floor=1.2, generic_t=2.1), {"turns_suffice": False}),
+    ("something is left", replace(CLEAN, left_over_floor=1.2, generic_t=2.1), {"high": True}),
     ("too little", replace(CLEAN, too_little=True), {"too_little": False}),
     ("adequate", CLEAN, {"too_little": True}),
 ]

@@ -57,7 +57,9 @@ class Facts:
     leaves; `found_again`: what is said is preferred without those turns too; `noise_over_neighbours`: cross-validated
     error over the noise that neighbouring samples and the sensors' steps show; `walk`: what is left is as rough at
     every scale as a walk, which noise may be; `left_over_passes`: what is left over what differs
-    from pass to pass of one angle. `above_resolution`: some effect is larger than what sensors and model resolve.
+    from pass to pass of one angle; `left_over_floor`: cross-validated error over what a generic basis leaves, 1 where
+    what is between is less than sensors and model resolve. `above_resolution`: some effect is larger than what sensors
+    and model resolve.
     """
 
     settings: VerdictSettings
@@ -85,6 +87,7 @@ class Facts:
     above_resolution: bool = True
     beaten_by_generic: bool = False
     beside_told: float = 0.0
+    left_over_floor: float = 1.0
 
     @property
     def significant(self) -> bool:
@@ -187,6 +190,7 @@ def find(evidence: Evidence) -> Findings:
         above_resolution=above_resolution(evidence),
         beaten_by_generic=beaten_by_generic(evidence),
         beside_told=adding,
+        left_over_floor=left_over_floor(evidence),
     )
     pairs = confounded_pairs(evidence, facts.named, high) if facts.said else ()
     effects = effects_said(evidence, facts, high)
@@ -223,6 +227,15 @@ def above_resolution(evidence: Evidence) -> bool:
     least = resolution(evidence) ** 2
     predicted = evidence.base_held_out.variance - evidence.extended_held_out.variance
     return predicted >= least and any(power >= least for power in effect_powers(evidence.selection.best))
+
+
+def left_over_floor(evidence: Evidence) -> float:
+    """What the best set of the `evidence` leaves, cross-validated, over what a generic basis beside it leaves; 1 where
+    what is between the two is less than sensors and model resolve.
+    """
+    left, floor = evidence.extended_held_out.rms, evidence.noise_floor
+    between = math.sqrt(max(left**2 - floor**2, 0.0))
+    return left / floor if between > resolution(evidence) else 1.0
 
 
 def own_gain(evidence: Evidence) -> float:

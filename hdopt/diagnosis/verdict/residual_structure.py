@@ -85,8 +85,8 @@ def unsteady(evidence: Evidence) -> Where | None:
     """Where something lives that changes in time as no noise does, or that comes and goes, if it is a fair part of what
     is there, or None. `evidence` is that of the diagnosis.
     """
-    if (where := comes_and_goes(evidence)) is not None:
-        return where
+    if (gone := comes_and_goes(evidence)) is not None:
+        return gone
     settings = evidence.settings.verdict
     least = settings.remainder_share * max(evidence.base_held_out.variance - evidence.extended_held_out.variance, 0.0)
     floor = settings.smallest_share * evidence.extended_held_out.variance

@@ -138,6 +138,15 @@ def more_than_is_told(facts: Facts) -> bool:
     return facts.turns_suffice and not facts.said and facts.beside_told > facts.settings.beside_told_evidence
 
 
+def something_is_left(facts: Facts) -> bool:
+    """Nothing is said, but a basis without physics predicts held-out turns better than the base and what is told do, by
+    more than any clean recording shows. `facts` are those of the recording.
+    """
+    s = facts.settings
+    much = facts.left_over_floor > s.adequate_over_floor and facts.generic_t > s.placebo_t
+    return facts.turns_suffice and not facts.said and much
+
+
 def others_are_as_good(facts: Facts) -> bool:
     """Effects are named, and another set explains as well. `facts` are those of the recording."""
     return facts.said and bool(facts.rivals)
@@ -369,6 +378,7 @@ RULES = (
     Rule("others are as good", others_are_as_good, ambiguous),
     Rule("named", lambda facts: facts.said, named),
     Rule("more than is told", more_than_is_told, more),
+    Rule("something is left", something_is_left, unknown),
     Rule("too little", lambda facts: facts.too_little, insufficient),
     Rule("adequate", lambda facts: True, adequate),
 )
