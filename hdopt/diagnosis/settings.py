@@ -358,6 +358,9 @@ class SearchSettings:
     worth_a_fit: float = threshold(0.25, "1", "choice: share of the best gain from which a single effect is fitted")
     better: float = threshold(1e-3, "1", "choice: log evidence by which a fit is better")
     close_behind: float = threshold(10.0, "1", "choice: log evidence within which a rival must be acceptable too")
+    clearly: float = threshold(
+        20.0, "1", "choice: log evidence by which a set of no more coefficients explains more; four times a tie"
+    )
     close: float = threshold(0.8, "1", "choice: share of the leader's evidence from which new drives are tried")
     beside_flexible: float = threshold(
         0.2, "1", "choice: share of a flexible leader's evidence from which a single effect may be half of it"

@@ -15,7 +15,7 @@ from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import Candidate, joint_fit, search_terms
 from hdopt.diagnosis.search.explore import explore
-from hdopt.diagnosis.search.penalty import bends, discrepancy
+from hdopt.diagnosis.search.penalty import bends, discrepancy, penalty
 from hdopt.diagnosis.search.search_state import SearchState
 from hdopt.effects import HIGH_ORDER
 from hdopt.parallel.shared_memory import each
@@ -84,6 +84,42 @@ def several_first(state: SearchState, candidates: list[Candidate]) -> list[Candi
         return candidates
     others = [candidate for candidate in candidates if candidate is not best]
     return sorted([replace(best, log_bayes_factor=freed), *others], key=lambda c: -c.log_bayes_factor)
+
+
+def fewest_first(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
+    """`candidates` in order of evidence, but first a set that explains more than the first with no more coefficients,
+    clearly so, and is not just the same effects and others: it does not pay for being alike, or of two kinds, since
+    nothing of it can stand for what an inexact shape of the first leaves. Each of its effects must pay for its freedom.
+    `state` is where the work stands.
+    """
+    first = candidates[0]
+
+    def freedom(candidate: Candidate) -> float:
+        return sum(term.freedom for term in candidate.fit.terms)
+
+    def paid(candidate: Candidate) -> float:
+        return candidate.gain / state.inflation / 2 - penalty(candidate.fit.terms, 0.0, state.scale)
+
+    def pays(candidate: Candidate) -> bool:
+        parts = (c for c in candidates if set(c.effects) < set(candidate.effects))
+        return all(paid(candidate) > paid(part) for part in parts)
+
+    found = [
+        candidate
+        for candidate in candidates[1:]
+        if not candidate.outside
+        and freedom(candidate) <= freedom(first)
+        and paid(candidate) > paid(first) + state.settings.clearly
+        and not set(first.effects) <= set(candidate.effects)
+        and pays(candidate)
+        and is_acceptable(candidate.fit)
+    ]
+    if first.outside or not found:
+        return candidates
+    best = max(found, key=paid)
+    ahead = first.log_bayes_factor + paid(best) - paid(first)
+    others = [candidate for candidate in candidates if candidate is not best]
+    return sorted([replace(best, log_bayes_factor=ahead), *others], key=lambda c: -c.log_bayes_factor)
 
 
 def with_teeth_in_the_zones(state: SearchState) -> SearchState:

@@ -31,7 +31,7 @@ from hdopt.diagnosis.search.refinement import (
     with_a_plain_term,
 )
 from hdopt.diagnosis.search.search_state import SearchPlan, SearchState
-from hdopt.diagnosis.search.several_for_one import several_first, several_for_one, with_teeth_in_the_zones
+from hdopt.diagnosis.search.several_for_one import fewest_first, several_first, several_for_one, with_teeth_in_the_zones
 from hdopt.effects.met import Waves
 from hdopt.effects.term import Term
 from hdopt.parallel.shared_memory import each
@@ -75,7 +75,7 @@ def select_from(state: SearchState) -> Selection:
     for stage in STAGES:
         state = stage(state)
     candidates = acceptable_first(ranked(state), state.settings.close_behind)
-    candidates = several_first(state, completed(state, candidates))
+    candidates = fewest_first(state, several_first(state, completed(state, candidates)))
     best = candidates[0]
     if best.fit.terms:
         best = replace(best, fit=widened_where_it_pays(best.fit, state.base, state.inflation, state.order_range))
