@@ -558,6 +558,9 @@ class VerdictSettings:
     stepped_resolution: float = threshold(
         0.5, "1", "choice: share of what steps taken out of a coarse encoder leave below which nothing is a finding"
     )
+    met_in_a_turn: float = threshold(
+        0.1, "1", "choice: power of an effect in a turn, over its median over the turns, from which it is met there"
+    )
     spread_over_turns: float = threshold(
         0.5,
         "1",

@@ -16,11 +16,6 @@ import numpy as np
 
 from hdopt.diagnosis.inference.fit import Fit
 
-LEAST_POWER = 0.1
-"""Power of an effect in a turn, over its median over the turns, from which the turn is looked at."""
-FEWEST_TURNS = 3
-"""Turns in which it is met, of which two differences can be made."""
-
 
 @dataclass(frozen=True)
 class FromTurnToTurn:
@@ -35,19 +30,21 @@ def from_turn_to_turn(fit: Fit, index: int) -> FromTurnToTurn:
     """How the size of term `index` of a `fit` differs between neighbouring input turns of its rows.
 
     Half the mean square of the differences is the variance of a factor. Over the noise's, the squares of K differences
-    have a mean of K and a variance of 3 K: each shares a turn with the next.
+    have a mean of K and a variance of 3 K: 2 each, and each shares a turn with the next. Where it is met in too few
+    turns for a verdict nothing is said.
     """
+    settings = fit.problem.settings.verdict
     noise, block = fit.problem.noise, fit.problem.rows.block
     added, left = noise.whiten(fit.contribution(index)), noise.whiten(fit.residual)
     power = np.bincount(block, added**2)
-    met = power > LEAST_POWER * np.median(power[power > 0]) if power.any() else power > 0
+    met = power > settings.met_in_a_turn * np.median(power[power > 0]) if power.any() else power > 0
     turns = int(np.count_nonzero(met))
-    if turns < FEWEST_TURNS:
+    if turns < settings.fewest_blocks:
         return FromTurnToTurn(0.0, 0.0)
     power = power[met]
     steps = np.diff(np.bincount(block, added * left)[met] / power)
     of_noise = np.mean(left**2) * (1 / power[1:] + 1 / power[:-1])
     weight = 1 / of_noise
     excess = float(np.sum((steps**2 - of_noise) * weight) / np.sum(weight)) / 2
-    t = float(np.sum(steps**2 * weight) - len(steps)) / math.sqrt(3 * len(steps))
+    t = float(np.sum(steps**2 * weight) - len(steps)) / math.sqrt(2 * len(steps) * (1 + 1 / 2))
     return FromTurnToTurn(math.sqrt(max(excess, 0.0)), t)
