@@ -23,7 +23,7 @@ from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut, hidden_samples, shares_of_samples, without_samples
 from hdopt.diagnosis.orientation import turn_round
 from hdopt.diagnosis.search.high_order import subtract
-from hdopt.diagnosis.search.penalty import flexibility
+from hdopt.diagnosis.search.penalty import bends_to_anything
 from hdopt.diagnosis.settings import DiagnosisSettings
 from hdopt.diagnosis.stages import on_problem
 from hdopt.diagnosis.state import Guess, State
@@ -65,7 +65,7 @@ class Part:
         settings = best.problem.settings
         if best.problem.base is None or not best.terms or len(best.residual) != len(self.best.residual):
             return None
-        many_waves = {term.effect for term in best.terms if flexibility(term, settings.penalty) >= 1}
+        many_waves = {term.effect for term in best.terms if bends_to_anything(term, settings.penalty)}
         if not many_waves <= set(self.effects):
             return None
         problem = best.problem.with_noise(best.problem.noise.without(self.touched))

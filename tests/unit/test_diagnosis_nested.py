@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hdopt.diagnosis import diagnose, nested
+from hdopt.diagnosis import diagnose
 from hdopt.diagnosis.inference.cross_validation import held_out, turn_folds
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.hidden_turns import hidden_samples, uncut_blocks, without_samples
@@ -16,6 +16,7 @@ from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.nested import Part, as_seen, diagnosis_of_a_part, ripple_of
 from hdopt.diagnosis.orientation import AS_COUNTED, turn_round
 from hdopt.diagnosis.predict import predict
+from hdopt.diagnosis.search import penalty
 from hdopt.diagnosis.search.candidates import Candidate, joint_fit
 from hdopt.diagnosis.search.high_order import left_as_recorded
 from hdopt.diagnosis.search.subset_search import Selection
@@ -265,10 +266,10 @@ def test_many_waves_of_what_the_part_did_not_find_are_no_proposal(monkeypatch):
     """In which waves these are the hidden turns had a say. Of what it found they are one, and a few waves are. Faults
     caught: a tooth imitated by many waves that is named for what the hidden turns chose; a right name refused.
     """
-    monkeypatch.setattr(nested, "flexibility", lambda term, settings: 1.0)
+    monkeypatch.setattr(penalty, "flexibility", lambda term, settings: 1.0)
     assert proposed((2,), (2, 5))[1] is None
     assert proposed((2,), (2, 5), effects=("_sine_in_angle",))[1] is not None
-    monkeypatch.setattr(nested, "flexibility", lambda term, settings: 0.9)
+    monkeypatch.setattr(penalty, "flexibility", lambda term, settings: 0.9)
     assert proposed((2,), (2, 5))[1] is not None
 
 

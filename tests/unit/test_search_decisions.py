@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hdopt.diagnosis.search import candidates as weighing
 from hdopt.diagnosis.search import explore as exploring
 from hdopt.diagnosis.search import refinement, search_state, subset_search
 from hdopt.diagnosis.search.candidates import Candidate, RankedSubset
@@ -110,8 +111,12 @@ ROWS, SIGMA = 1000.0, 0.5
 def in_rows(monkeypatch):
     """Candidates of fits that leave so much above the noise over it, and explain the rest of three times the noise;
     each term pays 3, `sine` and `cosine` leave nothing."""
-    monkeypatch.setattr(search_state, "penalty_scale", lambda *about: SimpleNamespace(rows=ROWS))
-    monkeypatch.setattr(subset_search, "penalty", lambda terms, gain, scale: 3.0 * len(terms) + gain)
+
+    def scale(problem, inflation, subtracted):
+        return SimpleNamespace(rows=ROWS, inflation=inflation)
+
+    monkeypatch.setattr(search_state, "penalty_scale", scale)
+    monkeypatch.setattr(weighing, "penalty", lambda terms, gain, scale: 3.0 * len(terms) + gain)
     monkeypatch.setattr(subset_search, "leaves_nothing", lambda term: term.effect in ("sine", "cosine"))
     monkeypatch.setattr(subset_search, "kind_of", lambda term: "turning" if "lobes" in term.effect else "load")
     problem = SimpleNamespace(**vars(PROBLEM), noise=SimpleNamespace(sigma=SIGMA))

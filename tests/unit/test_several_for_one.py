@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hdopt.diagnosis.search import candidates, subset_search
 from hdopt.diagnosis.search import several_for_one as rooms
-from hdopt.diagnosis.search import subset_search
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.penalty import bends
 from hdopt.diagnosis.settings import DEFAULT
@@ -63,7 +63,7 @@ class Standing:
     inflation: float = 2.0
     top_gain: float = GAIN
     settings: object = SETTINGS
-    scale: object = field(default_factory=lambda: SimpleNamespace(rows=ROWS, settings=DEFAULT.penalty))
+    scale: object = field(default_factory=lambda: SimpleNamespace(rows=ROWS, inflation=2.0, settings=DEFAULT.penalty))
 
     def above_noise(self, fit):
         return fit.left
@@ -148,7 +148,7 @@ ONCE = Piece("encoder_input_eccentricity")
 @pytest.fixture
 def paid(monkeypatch):
     """Coefficients cost 5 each, in place of all that a set pays."""
-    monkeypatch.setattr(rooms, "penalty", lambda terms, gain, scale: 5.0 * sum(term.freedom for term in terms))
+    monkeypatch.setattr(candidates, "penalty", lambda terms, gain, scale: 5.0 * sum(term.freedom for term in terms))
 
 
 def gaining(evidence, gain, *terms, **more):

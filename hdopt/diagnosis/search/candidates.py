@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,6 +37,16 @@ class Candidate:
     def outside(self) -> bool:
         """Whether a description without physics takes part."""
         return any(is_outside(name) for name in self.effects)
+
+
+def in_order(candidates: Iterable[Candidate]) -> list[Candidate]:
+    """`candidates` in order of evidence, the best first."""
+    return sorted(candidates, key=lambda candidate: -candidate.log_bayes_factor)
+
+
+def paid_for_freedom(candidate: Candidate, scale: Scale) -> float:
+    """Log evidence of a `candidate` that pays for its freedom and its search by `scale`, and not for inexact shapes."""
+    return candidate.gain / scale.inflation / 2 - penalty(candidate.fit.terms, 0.0, scale)
 
 
 @dataclass(frozen=True)

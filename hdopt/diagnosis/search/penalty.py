@@ -138,11 +138,16 @@ def flexibility(term: Term, settings: PenaltySettings = DEFAULT.penalty) -> floa
     return min(max((term.width - few) / (many - few), 0.0), 1.0)
 
 
+def bends_to_anything(term: Term, settings: PenaltySettings = DEFAULT.penalty) -> bool:
+    """Whether `term` has so many coefficients that it bends to anything. `settings` are the thresholds."""
+    return flexibility(term, settings) >= 1
+
+
 def bends(term: Term, settings: PenaltySettings = DEFAULT.penalty) -> bool:
     """Whether `term` may take up whatever is not its own: a description without physics, or one of so many coefficients
     that it bends to anything. `settings` are the thresholds.
     """
-    return is_outside(term.effect) or flexibility(term, settings) >= 1
+    return is_outside(term.effect) or bends_to_anything(term, settings)
 
 
 def kind_of(term: Term) -> str:

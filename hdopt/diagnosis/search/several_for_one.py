@@ -9,13 +9,14 @@ that bend.
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from dataclasses import replace
 
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.search.acceptance import is_acceptable
-from hdopt.diagnosis.search.candidates import Candidate, joint_fit, search_terms
+from hdopt.diagnosis.search.candidates import Candidate, in_order, joint_fit, paid_for_freedom, search_terms
 from hdopt.diagnosis.search.explore import explore
-from hdopt.diagnosis.search.penalty import bends, discrepancy, penalty
+from hdopt.diagnosis.search.penalty import bends, discrepancy
 from hdopt.diagnosis.search.search_state import SearchState
 from hdopt.effects import HIGH_ORDER
 from hdopt.parallel.shared_memory import each
@@ -82,8 +83,7 @@ def several_first(state: SearchState, candidates: list[Candidate]) -> list[Candi
     freed = best.log_bayes_factor + share * state.top_gain / state.inflation / 2
     if first.log_bayes_factor > freed:
         return candidates
-    others = [candidate for candidate in candidates if candidate is not best]
-    return sorted([replace(best, log_bayes_factor=freed), *others], key=lambda c: -c.log_bayes_factor)
+    return with_evidence(candidates, best, freed)
 
 
 def fewest_first(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
@@ -98,7 +98,7 @@ def fewest_first(state: SearchState, candidates: list[Candidate]) -> list[Candid
         return sum(term.freedom for term in candidate.fit.terms)
 
     def paid(candidate: Candidate) -> float:
-        return candidate.gain / state.inflation / 2 - penalty(candidate.fit.terms, 0.0, state.scale)
+        return paid_for_freedom(candidate, state.scale)
 
     def pays(candidate: Candidate) -> bool:
         parts = (c for c in candidates if set(c.effects) < set(candidate.effects))
@@ -118,8 +118,13 @@ def fewest_first(state: SearchState, candidates: list[Candidate]) -> list[Candid
         return candidates
     best = max(found, key=paid)
     ahead = first.log_bayes_factor + paid(best) - paid(first)
-    others = [candidate for candidate in candidates if candidate is not best]
-    return sorted([replace(best, log_bayes_factor=ahead), *others], key=lambda c: -c.log_bayes_factor)
+    return with_evidence(candidates, best, ahead)
+
+
+def with_evidence(candidates: Sequence[Candidate], one: Candidate, log_bayes_factor: float) -> list[Candidate]:
+    """`candidates` in order of evidence, where `one` of them has another `log_bayes_factor`."""
+    others = (candidate for candidate in candidates if candidate is not one)
+    return in_order([replace(one, log_bayes_factor=log_bayes_factor), *others])
 
 
 def with_teeth_in_the_zones(state: SearchState) -> SearchState:

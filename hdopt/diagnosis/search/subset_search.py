@@ -20,9 +20,16 @@ from hdopt.diagnosis.inference.catalogue import is_outside
 from hdopt.diagnosis.inference.clean_base import drive_alone
 from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
 from hdopt.diagnosis.search.acceptance import is_acceptable
-from hdopt.diagnosis.search.candidates import Candidate, joint_fit, search_terms, without_each
+from hdopt.diagnosis.search.candidates import (
+    Candidate,
+    in_order,
+    joint_fit,
+    paid_for_freedom,
+    search_terms,
+    without_each,
+)
 from hdopt.diagnosis.search.explore import explore
-from hdopt.diagnosis.search.penalty import flexibility, kind_of, leaves_nothing, penalty
+from hdopt.diagnosis.search.penalty import flexibility, kind_of, leaves_nothing
 from hdopt.diagnosis.search.refinement import (
     otherwise_acceptable,
     shortened,
@@ -352,13 +359,13 @@ def ranked(state: SearchState) -> list[Candidate]:
     top = state.top_gain
     candidates = [state.weigh(fit, top) for fit in state.fits.values()]
     candidates.append(Candidate(state.base, 0.0, 0.0))
-    candidates.sort(key=lambda c: -c.log_bayes_factor)
+    candidates = in_order(candidates)
     for candidate in candidates[: state.settings.leaders]:
         if not candidate.fit.terms or is_acceptable(candidate.fit):
             break
         others = otherwise_acceptable(candidate.fit, state.plan.skip, state.order_range)
         candidates += [state.weigh(fit, top) for fit in others]
-    return sorted(candidates, key=lambda c: -c.log_bayes_factor)
+    return in_order(candidates)
 
 
 def completed(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
@@ -379,7 +386,7 @@ def completed(state: SearchState, candidates: list[Candidate]) -> list[Candidate
     if not found:
         return candidates
     best = max(found, key=lambda c: c.log_bayes_factor)
-    return sorted([best, *(c for c in candidates if c.fit is not best.fit)], key=lambda c: -c.log_bayes_factor)
+    return in_order([best, *(c for c in candidates if c.fit is not best.fit)])
 
 
 def may_complete(term: Term, narrow: int) -> bool:
@@ -392,9 +399,8 @@ def without_inexactness(state: SearchState, first: Candidate, more: Candidate) -
     """The candidate of `more` effects than the `first`, of which those beside it pay for their freedom alone. `state`
     is where the work stands.
     """
-    paid = [penalty(candidate.fit.terms, 0.0, state.scale) for candidate in (first, more)]
-    gained = (more.gain - first.gain) / state.inflation / 2
-    return replace(more, log_bayes_factor=first.log_bayes_factor + gained - (paid[1] - paid[0]))
+    gained = paid_for_freedom(more, state.scale) - paid_for_freedom(first, state.scale)
+    return replace(more, log_bayes_factor=first.log_bayes_factor + gained)
 
 
 def acceptable_first(candidates: Sequence[Candidate], close_behind: float) -> list[Candidate]:

@@ -58,6 +58,19 @@ def in_what_way(where: Where) -> str:
     return ""
 
 
+def place(domain: str, orders: list[float], rms: float, evidence: Evidence) -> Where:
+    """What lives in a `domain` in both directions, mostly at `orders`, with an `rms` (arcmin) whose share is of what the
+    base of the `evidence` leaves.
+    """
+    return {
+        "domain": domain,
+        "orders_per_input_turn": orders,
+        "direction": "both",
+        "share_of_residual": float(min(rms**2 / max(evidence.base_held_out.variance, TINY), 1.0)),
+        "rms_arcmin": rms,
+    }
+
+
 def comes_and_goes(evidence: Evidence) -> Where | None:
     """Where an effect of the best set lives that is the same each time it is met, but differs from turn to turn by more
     than noise and by a fair part of itself; None where none does. `evidence` is that of the diagnosis.
@@ -71,13 +84,7 @@ def comes_and_goes(evidence: Evidence) -> Where | None:
         if differs.t > settings.remainder_t_alone and differs.spread > settings.spread_over_turns:
             contribution = fit.contribution(index)
             rms = differs.spread * float(np.std(contribution))
-            return {
-                "domain": effect.domain,
-                "orders_per_input_turn": main_orders(fit, contribution),
-                "direction": "both",
-                "share_of_residual": float(min(rms**2 / max(evidence.base_held_out.variance, TINY), 1.0)),
-                "rms_arcmin": rms,
-            }
+            return place(effect.domain, main_orders(fit, contribution), rms, evidence)
     return None
 
 
@@ -94,13 +101,7 @@ def unsteady(evidence: Evidence) -> Where | None:
     rms = max(wave.rms if wave is not None else 0.0, steps.rms)
     if not (steps.any or wave is not None) or rms**2 <= max(least, floor):
         return None
-    where: Where = {
-        "domain": "time",
-        "orders_per_input_turn": [],
-        "direction": "both",
-        "share_of_residual": float(min(rms**2 / max(evidence.base_held_out.variance, TINY), 1.0)),
-        "rms_arcmin": rms,
-    }
+    where = place("time", [], rms, evidence)
     if wave is not None and wave.rms >= steps.rms:
         where["period_s"] = wave.period
     else:
@@ -225,10 +226,4 @@ def locate_repeated(evidence: Evidence) -> Where:
     the diagnosis.
     """
     fit, repeated = evidence.selection.best.fit, evidence.passes.repeated
-    return {
-        "domain": "angle",
-        "orders_per_input_turn": main_orders(fit, fit.residual),
-        "direction": "both",
-        "share_of_residual": float(min(repeated**2 / max(evidence.base_held_out.variance, TINY), 1.0)),
-        "rms_arcmin": repeated,
-    }
+    return place("angle", main_orders(fit, fit.residual), repeated, evidence)

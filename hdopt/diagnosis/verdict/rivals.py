@@ -10,9 +10,8 @@ from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding, confounded_with
 from hdopt.diagnosis.inference.catalogue import EXACT_TOLD, TOLD, is_effect
 from hdopt.diagnosis.inference.cross_validation import paired_t
-from hdopt.diagnosis.search.candidates import Candidate, penalty_scale
+from hdopt.diagnosis.search.candidates import Candidate, paid_for_freedom, penalty_scale
 from hdopt.diagnosis.search.high_order import ripple_orders
-from hdopt.diagnosis.search.penalty import penalty
 from hdopt.diagnosis.settings import VerdictSettings
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.diagnosis.verdict.residual_structure import effect_powers
@@ -61,11 +60,12 @@ def beside_told(evidence: Evidence) -> tuple[Candidate | None, float]:
     nothing is left. None and 0 where the `evidence` holds no such pair of sets, or nothing told that is there itself,
     or none that adds, or what adds is small beside the noise.
     """
-    candidates, scale = evidence.selection.candidates, penalty_scale(evidence.selection.base.problem)
+    candidates = evidence.selection.candidates
+    scale = penalty_scale(evidence.selection.base.problem, evidence.inflation)
     least = evidence.settings.verdict.unconfirmed_share * evidence.extended_held_out.variance
 
     def evidence_of(one: Candidate) -> float:
-        return one.gain / 2 / evidence.inflation - penalty(one.fit.terms, 0.0, scale)
+        return paid_for_freedom(one, scale)
 
     told = next((one for one in candidates if one.effects and EXACT_TOLD.issuperset(one.effects)), None)
     if told is None or told.log_bayes_factor <= 0:

@@ -11,7 +11,6 @@ import numpy as np
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding
 from hdopt.diagnosis.inference.catalogue import TOLD, properties_of
-from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.verdict.facts import Facts, Findings, sparse, unseen_rms
 from hdopt.diagnosis.verdict.named_effect import NamedEffect, main_orders
@@ -20,6 +19,7 @@ from hdopt.diagnosis.verdict.residual_structure import (
     in_what_way,
     locate_remainder,
     locate_repeated,
+    place,
     term_powers,
 )
 from hdopt.diagnosis.verdict.rivals import Sets, separating_measurement, tied_pairs
@@ -263,13 +263,8 @@ def where_largest(candidate: Candidate, power: float, evidence: Evidence) -> Whe
     """
     powers = [p * (name not in TOLD) for p, name in zip(term_powers(candidate.fit), candidate.effects, strict=True)]
     largest = int(np.argmax(powers))
-    return {
-        "domain": properties_of(candidate.effects[largest]).domain,
-        "orders_per_input_turn": main_orders(candidate.fit, candidate.fit.contribution(largest)),
-        "direction": "both",
-        "share_of_residual": float(min(power / max(evidence.base_held_out.variance, TINY), 1.0)),
-        "rms_arcmin": math.sqrt(power),
-    }
+    orders = main_orders(candidate.fit, candidate.fit.contribution(largest))
+    return place(properties_of(candidate.effects[largest]).domain, orders, math.sqrt(power), evidence)
 
 
 def likeness(candidate: Candidate) -> str:
