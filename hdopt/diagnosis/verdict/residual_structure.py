@@ -59,7 +59,7 @@ def in_what_way(where: Where) -> str:
 
 
 def place(domain: str, orders: list[float], rms: float, evidence: Evidence) -> Where:
-    """What lives in a `domain` in both directions, mostly at `orders`, with an `rms` (arcmin) whose share is of what the
+    """What lives in a `domain` in both directions, mostly at `orders`; the share of its `rms` (arcmin) is of what the
     base of the `evidence` leaves.
     """
     return {

@@ -166,6 +166,17 @@ def _raise(rows: Singles, start: int, left: End, right: End, out: Singles) -> No
 
 
 @compiled
+def _at_ends_on_fs(
+    rows: Singles, on_fs: Singles, begins: tuple[int, int, int], j: int, left: End, right: End
+) -> tuple[float, float, float, float]:
+    """The same as `_at_ends` with what is met on the FS: `begins` are the number of turns, where the effects' rows
+    begin, and where what is met at the piece's end does."""
+    size, at, then = begins
+    m0, m1, d0, d1 = _at_ends(rows, size, at, j, left, right)
+    return m0 + on_fs[j], m1 + on_fs[then + j], d0 + on_fs[size + j], d1 + on_fs[then + size + j]
+
+
+@compiled
 def _lower_on_fs(
     rows: Singles, start: int, on_fs: Singles, after: int, left: End, right: End, beyond: float, out: Singles
 ) -> None:
@@ -175,9 +186,7 @@ def _lower_on_fs(
     slack = at + unsigned(2) * size
     for lane in range(len(out)):
         j = unsigned(lane)
-        m0, m1, d0, d1 = _at_ends(rows, size, at, j, left, right)
-        m0, d0 = m0 + on_fs[j], d0 + on_fs[size + j]
-        m1, d1 = m1 + on_fs[then + j], d1 + on_fs[then + size + j]
+        m0, m1, d0, d1 = _at_ends_on_fs(rows, on_fs, (size, at, then), j, left, right)
         out[j] = min(out[j], _least(m0, m1, d0, d1) - rows[slack + j] - beyond)
 
 
@@ -190,9 +199,7 @@ def _raise_on_fs(
     slack = at + unsigned(3) * size
     for lane in range(len(out)):
         j = unsigned(lane)
-        m0, m1, d0, d1 = _at_ends(rows, size, at, j, left, right)
-        m0, d0 = m0 + on_fs[j], d0 + on_fs[size + j]
-        m1, d1 = m1 + on_fs[then + j], d1 + on_fs[then + size + j]
+        m0, m1, d0, d1 = _at_ends_on_fs(rows, on_fs, (size, at, then), j, left, right)
         out[j] = min(out[j], -max(m0 + abs(d0), m1 + abs(d1)) - rows[slack + j] - beyond)
 
 
