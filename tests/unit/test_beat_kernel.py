@@ -17,9 +17,10 @@ from hdopt.kinematics.lanes.motion import FS, FS_PHASE, LANES
 from hdopt.kinematics.peak_to_peak import matrix_peak_to_peak_arcmin as base_alone
 from hdopt.simulation import EffectValues, Operation, batch
 from hdopt.simulation.batch import matrix_peak_to_peak_arcmin, stacked_peak_to_peak_arcmin, tabulate
-from hdopt.simulation.beat.effects import beat_of
+from hdopt.simulation.beat.effects import KINDS, beat_of
 from hdopt.simulation.beat.gather import _most_on_fs
 from hdopt.simulation.beat.kernel import beat_block
+from hdopt.simulation.beat.turns import End, _lower_on_fs, _raise_on_fs
 from hdopt.simulation.turn.rows import BOUNDS
 from hdopt.study import load_study
 
@@ -157,6 +158,30 @@ def test_fs_teeth_and_effects_on_the_fs_are_granted_what_they_reach_together(lab
     slope = amplitude + np.abs(np.gradient(table.fs, grid[1], axis=1)).max()
     assert (granted >= reached - 1e-8).all()
     assert (granted <= reached + np.pi / 128 * slope + 1e-8).all()
+
+
+@numba.njit(**OPTIONS)
+def on_fs_alone(met, low, high):
+    """Lower `low` (turns,) to the least of a piece on which nothing stands but what is `met` on the FS, the mean and
+    half the difference of both zones at its start, then at its end, and `high` to the negative of the greatest."""
+    nothing, none = np.zeros((2 + 2 * KINDS) * len(low), np.float32), np.float32(0)
+    left = End(none, none, none, none, none, none, none, none, none)
+    right = End(none, none, none, none, none, none, none, none, np.float32(1))
+    _lower_on_fs(nothing, 2 * len(low), met, 2, left, right, none, low)
+    _raise_on_fs(nothing, 2 * len(low), met, 2, left, right, none, high)
+
+
+def test_a_piece_goes_from_what_is_met_on_the_fs_at_its_start_to_that_at_its_end():
+    """The larger of the two zones along straight lines, at a thousand places of the piece, for each turn. Fault caught:
+    the start's for the end's, in the mean or in the difference: an extreme that the bounds exclude is rarely missed."""
+    turns, share = 16, np.linspace(0, 1, 1001)[:, None]
+    met = np.random.default_rng(7).normal(0, 1e-3, (4, turns))
+    low, high = np.full((2, turns), 1.0, np.float32)
+    on_fs_alone(met.ravel().astype(np.float32), low, high)
+    mean, half = (met[row] + share * (met[row + 2] - met[row]) for row in (0, 1))
+    larger = mean + np.abs(half)
+    np.testing.assert_allclose(low, larger.min(axis=0), atol=5e-6)  # half a step of the places, by the lines' slope
+    np.testing.assert_allclose(-high, larger.max(axis=0), atol=1e-9)
 
 
 @pytest.mark.parametrize("on_fs", [False, True])
