@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hdopt.arrays import Array, Index
+from hdopt.effects._sine_cosine import sine_cosine
 from hdopt.effects.sines import sine_columns, sine_sum
 from hdopt.late import late
 
@@ -159,7 +160,8 @@ def _forms_at(angle: Array, teeth: int, skew: float, start: float) -> tuple[Inde
     tooth, form = np.empty(len(angle), np.int64), np.empty(len(angle))
     for i in range(len(angle)):
         tooth[i], part = _place(angle[i], teeth, start)
-        form[i] = (1 - math.cos(part)) / 2 + skew * math.sin(part)
+        sine, cosine = sine_cosine(part)
+        form[i] = (1 - cosine) / 2 + skew * sine
     return tooth, form
 
 
@@ -167,11 +169,15 @@ def _forms_at(angle: Array, teeth: int, skew: float, start: float) -> tuple[Inde
 def _forms_sum(angle: Array, heights: Array, skew: float, start: float) -> tuple[Array, Array]:
     """`ToothForms.added` of teeth of these `heights` (teeth,)."""
     value, slope = np.empty(len(angle)), np.empty(len(angle))
+    teeth = len(heights)
+    for i in range(len(angle)):  # In two loops, of which the second is worked out side by side.
+        tooth, part = _place(angle[i], teeth, start)
+        value[i], slope[i] = part, heights[tooth]
     for i in range(len(angle)):
-        tooth, part = _place(angle[i], len(heights), start)
-        sine, cosine = math.sin(part), math.cos(part)
-        value[i] = heights[tooth] * ((1 - cosine) / 2 + skew * sine)
-        slope[i] = heights[tooth] * len(heights) * (sine / 2 + skew * cosine)
+        height = slope[i]
+        sine, cosine = sine_cosine(value[i])
+        value[i] = height * ((1 - cosine) / 2 + skew * sine)
+        slope[i] = height * teeth * (sine / 2 + skew * cosine)
     return value, slope
 
 
@@ -189,7 +195,8 @@ def gaussian(off: Array, sigma: float, row: float = 0.0) -> Array:
 
 def off_centre(angle: Array, centre: float, period: float) -> Array:
     """How far `angle` (n,) lies from the nearest repetition of `centre`, in a `period`; all rad, (n,)."""
-    off: Array = np.mod(angle - centre + period / 2, period) - period / 2
+    apart = angle - centre
+    off: Array = apart - period * np.rint(apart / period)
     return off
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from hdopt.arrays import Array, Index
+from hdopt.effects._sine_cosine import sine_cosine
 from hdopt.late import late
 
 
@@ -52,8 +52,7 @@ def _sines(phase: Array, harmonics: Array) -> Array:
     columns = np.empty((2 * len(harmonics), len(phase)))
     for k in range(len(harmonics)):
         for i in range(len(phase)):
-            columns[2 * k, i] = math.sin(harmonics[k] * phase[i])
-            columns[2 * k + 1, i] = math.cos(harmonics[k] * phase[i])
+            columns[2 * k, i], columns[2 * k + 1, i] = sine_cosine(harmonics[k] * phase[i])
     return columns
 
 
@@ -68,7 +67,7 @@ def _whole_sines(phase: Array, place: Index, before: int, count: int) -> Array:
     for start in range(0, rows, LANES):
         here = min(LANES, rows - start)
         for i in range(here):
-            sine[i], cosine[i] = math.sin(phase[start + i]), math.cos(phase[start + i])
+            sine[i], cosine[i] = sine_cosine(phase[start + i])
         _begin(phase, start, here, before, s, c)
         for at in place:
             for i in range(LANES):
@@ -86,7 +85,7 @@ def _begin(phase: Array, start: int, here: int, before: int, s: Array, c: Array)
     s[:], c[:] = 0.0, 1.0
     if before:
         for i in range(here):
-            s[i], c[i] = math.sin(before * phase[start + i]), math.cos(before * phase[start + i])
+            s[i], c[i] = sine_cosine(before * phase[start + i])
 
 
 def sine_sum(phase: Array, harmonics: Sequence[float] | Array, coefficients: Array) -> tuple[Array, Array]:
@@ -105,12 +104,12 @@ def sine_sum(phase: Array, harmonics: Sequence[float] | Array, coefficients: Arr
 @late(calls=0)
 def _sum(phase: Array, harmonics: Array, coefficients: Array) -> tuple[Array, Array]:
     value, slope = np.zeros(len(phase)), np.zeros(len(phase))
-    for i in range(len(phase)):
-        for k in range(len(harmonics)):
-            sine, cosine = math.sin(harmonics[k] * phase[i]), math.cos(harmonics[k] * phase[i])
-            a, b = coefficients[2 * k], coefficients[2 * k + 1]
+    for k in range(len(harmonics)):
+        order, a, b = harmonics[k], coefficients[2 * k], coefficients[2 * k + 1]
+        for i in range(len(phase)):
+            sine, cosine = sine_cosine(order * phase[i])
             value[i] += a * sine + b * cosine
-            slope[i] += harmonics[k] * (a * cosine - b * sine)
+            slope[i] += order * (a * cosine - b * sine)
     return value, slope
 
 
@@ -124,7 +123,7 @@ def _whole_sum(phase: Array, by_order: Array, before: int) -> tuple[Array, Array
     for start in range(0, rows, LANES):
         here = min(LANES, rows - start)
         for i in range(here):
-            sine[i], cosine[i] = math.sin(phase[start + i]), math.cos(phase[start + i])
+            sine[i], cosine[i] = sine_cosine(phase[start + i])
         _begin(phase, start, here, before, s, c)
         total[:], rise[:] = 0.0, 0.0
         for h in range(by_order.shape[1]):
