@@ -10,6 +10,8 @@ import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
 
 from hdopt.diagnosis.inference.catalogue import is_outside, properties_of
 from hdopt.diagnosis.settings import DEFAULT, PenaltySettings
@@ -92,32 +94,55 @@ def is_cycle_of(term: Term, found: Sequence[Term]) -> bool:
     return any(other.effect == term.effect and effect.is_part_of(term.shape, other.shape) for other in found)
 
 
+class Nature(NamedTuple):
+    """What a term's misfit is like: whether it is a description without physics (`outside`), its `kind`, how far it
+    bends (`flexibility`), whether teeth meet it as `waves`, and whether it `leaves_nothing`."""
+
+    outside: bool
+    kind: str
+    flexibility: float
+    waves: bool
+    leaves_nothing: bool
+
+
+def nature_of(term: Term, settings: PenaltySettings = DEFAULT.penalty) -> Nature:
+    """The nature of `term`; `settings` are the thresholds."""
+    outside, bending = is_outside(term.effect), flexibility(term, settings)
+    return Nature(outside, kind_of(term), bending, isinstance(term.met, Waves), leaves_nothing(term))
+
+
 def discrepancy(terms: Sequence[Term], settings: PenaltySettings = DEFAULT.penalty) -> float:
     """Share of the explained power that a set of `terms` pays for the inexactness of its shapes; a description
     without physics could be the misfit of anything. Many waves of both splines' teeth pay for bending, each to the
     misfit of the other, and not for being alike too. `settings` are the thresholds.
     """
-    of_kinds: dict[str, list[Term]] = defaultdict(list)
+    return _share(tuple(nature_of(term, settings) for term in terms), settings)
+
+
+@cache
+def _share(terms: tuple[Nature, ...], settings: PenaltySettings) -> float:
+    """`discrepancy` of terms of such natures: of the thousands of subsets that a search weighs, many are alike."""
+    of_kinds: dict[str, list[Nature]] = defaultdict(list)
     for term in terms:
-        if not is_outside(term.effect):
-            of_kinds[kind_of(term)].append(term)
+        if not term.outside:
+            of_kinds[term.kind].append(term)
     share = sum(_among_alike(alike, settings) for alike in of_kinds.values())
     share += max(len(of_kinds) - 1, 0) * settings.other_kind
-    outside = sum(is_outside(term.effect) for term in terms)
+    outside = sum(term.outside for term in terms)
     share += max(outside - (not of_kinds), 0) * _each_alike(terms, settings)
-    return share + sum(flexibility(term, settings) for term in terms) * settings.discrepancy
+    return share + sum(term.flexibility for term in terms) * settings.discrepancy
 
 
-def _among_alike(alike: Sequence[Term], settings: PenaltySettings) -> float:
+def _among_alike(alike: Sequence[Nature], settings: PenaltySettings) -> float:
     """Share of the explained power that terms of one kind pay for being `alike`."""
-    of_teeth = sum(flexibility(term, settings) for term in alike if isinstance(term.met, Waves))
+    of_teeth = sum(term.flexibility for term in alike if term.waves)
     return max(len(alike) - 1 - max(of_teeth - 1, 0), 0) * _each_alike(alike, settings)
 
 
-def _each_alike(terms: Sequence[Term], settings: PenaltySettings) -> float:
+def _each_alike(terms: Sequence[Nature], settings: PenaltySettings) -> float:
     """What each of `terms` after the first pays. Sines of known orders leave nothing for each other, whatever other
     kind stands beside them."""
-    return settings.other_kind if all(leaves_nothing(term) for term in terms) else settings.discrepancy
+    return settings.other_kind if all(term.leaves_nothing for term in terms) else settings.discrepancy
 
 
 def has_exact_shape(term: Term) -> bool:
