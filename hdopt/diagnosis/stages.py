@@ -16,6 +16,7 @@ from hdopt.diagnosis.inference.clean_base import (
     beside_waves,
     drive_with_terms,
     fit_clean_base,
+    is_left_wavy,
     power_beside_smooth,
 )
 from hdopt.diagnosis.inference.common_slope import TakenSlope, common_slope, input_is_off
@@ -132,7 +133,9 @@ def fit_base_in_noise(state: State) -> State:
     problem = state.problem.with_noise(measured.noise)
     base = refine(fit_base(problem, rng, settings.starts_again, near=state.base), settings.measured_iterations)
     clean = fit_clean_base(problem, rng)
-    wavy = None if clean is None else beside_waves(beside_smooth(clean), copy.deepcopy(rng))
+    wavy = None
+    if clean is not None and is_left_wavy(base):
+        wavy = beside_waves(beside_smooth(clean), copy.deepcopy(rng))
     return replace(state, base=base, clean=clean, wavy=wavy, inflation=measured.inflation, rng=rng)
 
 

@@ -278,8 +278,9 @@ def test_the_noise_comes_with_its_roughness(monkeypatch):
 
 
 def test_a_base_beside_waves_is_made_from_the_clean_one(monkeypatch):
-    """With draws of its own: what comes after goes on as without it. Faults caught: no such base; none of its draws
-    kept apart.
+    """With draws of its own: what comes after goes on as without it; and none where the base alone leaves no more than
+    noise, whatever the smooth columns came to. Faults caught: no such base; none of its draws kept apart; six fits of
+    waves on a record that holds none.
     """
 
     def beside_waves(smooth, rng):
@@ -292,7 +293,10 @@ def test_a_base_beside_waves_is_made_from_the_clean_one(monkeypatch):
     monkeypatch.setattr(stages, "fit_clean_base", lambda problem, rng: "the clean base")
     monkeypatch.setattr(stages, "beside_smooth", lambda clean: f"smooth columns of {clean}")
     monkeypatch.setattr(stages, "beside_waves", beside_waves)
-    after = stages.fit_base_in_noise(state_of(Told("")))
+    monkeypatch.setattr(stages, "is_left_wavy", lambda fit: False)
+    assert stages.fit_base_in_noise(state_of(Told(""))).wavy is None
+    monkeypatch.setattr(stages, "is_left_wavy", lambda fit: fit.name == "the base")
+    after = stages.fit_base_in_noise(state_of(Told("the base")))
     assert after.wavy == "waves beside smooth columns of the clean base"
     assert after.draws().normal() == np.random.default_rng(5).normal()
     plan = replace(after, wavy=Told("wavy"))

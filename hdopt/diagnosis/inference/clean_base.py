@@ -19,6 +19,7 @@ from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.generic_basis import generic_columns
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Term
+from hdopt.parallel.shared_memory import each
 
 ORDER_DOMAINS = ("integer order", "output-synchronous order", "asynchronous order")
 """Domains of the generic basis in which the base itself lives."""
@@ -79,6 +80,16 @@ def power_beside_smooth(problem: FitProblem, rng: np.random.Generator) -> float:
     return math.inf if clean is None else beside_smooth(clean).objective
 
 
+def is_left_wavy(fit: Fit) -> bool:
+    """Whether `fit` leaves so much more than noise that waves of the teeth may be among it."""
+    return fit.objective >= fit.problem.settings.base.wavy * _of_noise(fit.problem)
+
+
+def _of_noise(problem: FitProblem) -> float:
+    """The whitened sum of squares that noise alone makes in the rows of `problem`, arcmin^2."""
+    return problem.weighed_rows * problem.noise.sigma**2
+
+
 def beside_waves(smooth: Fit, rng: np.random.Generator) -> Fit | None:
     """The base of `smooth`, its fit beside smooth columns, with those waves of the teeth beside these that pay best for
     their freedom, from drives drawn by `rng`; None where it leaves no more than noise, or where waves take up little of
@@ -87,22 +98,24 @@ def beside_waves(smooth: Fit, rng: np.random.Generator) -> Fit | None:
     problem, settings = smooth.problem, smooth.problem.settings.base
     if problem.base is None:
         return None
-    variance = problem.noise.sigma**2
-    of_noise = problem.weighed_rows * variance
-    if smooth.objective < settings.wavy * of_noise:
+    variance, of_noise = problem.noise.sigma**2, _of_noise(problem)
+    if not is_left_wavy(smooth):
         return None
 
     def cost(fit: Fit) -> float:
         return fit.objective / variance + sum(term.width for term in fit.terms) * math.log(problem.weighed_rows)
 
-    fits = [smooth]
-    for members in WAVES_OF_TEETH:
-        runs = [(effect, {"members": tuple(range(2, last + 1))}) for effect, last in members]
-        able = all(problem.explanations[effect].lacks(problem.rows) is None for effect, _ in runs)
-        if able and 2 * members[0][1] < problem.rows.rows_per_turn:
-            terms = tuple(
-                problem.explanations[effect].term(problem.rows, shape, smooth.motion) for effect, shape in runs
-            )
-            fits.append(fit_base(problem, rng, settings.starts_clean, terms=terms))
+    def able(members: Sequence[tuple[str, int]]) -> bool:
+        effects = [problem.explanations[effect] for effect, _ in members]
+        return 2 * members[0][1] < problem.rows.rows_per_turn and all(e.lacks(problem.rows) is None for e in effects)
+
+    def fitted(numbered: tuple[Sequence[tuple[str, int]], np.random.Generator]) -> Fit:
+        members, own_rng = numbered
+        waves = ((problem.explanations[effect], tuple(range(2, last + 1))) for effect, last in members)
+        terms = tuple(effect.term(problem.rows, {"members": run}, smooth.motion) for effect, run in waves)
+        return fit_base(problem, own_rng, settings.starts_clean, terms=terms)
+
+    sets = [members for members in WAVES_OF_TEETH if able(members)]
+    fits = [smooth, *each(fitted, zip(sets, rng.spawn(len(sets)), strict=True))]
     best = min(fits, key=cost)
     return best if best.objective - of_noise < settings.wavy_share * (smooth.objective - of_noise) else None
