@@ -456,6 +456,61 @@ def test_a_wider_variant_must_pay_for_its_coefficients_and_more(monkeypatch, mor
     assert found.terms[0].width == taken
 
 
+@pytest.fixture
+def by_schwarz(monkeypatch):
+    """Fits are weighed by the gain that was written down, on 1000 rows."""
+    monkeypatch.setattr(refinement, "penalty_scale", lambda *about: SimpleNamespace(rows=1000.0))
+    monkeypatch.setattr(refinement, "weigh", lambda fit, base, scale: fit)
+
+
+def test_what_pays_for_its_coefficients_no_more_is_left_out(monkeypatch, by_schwarz):
+    """Of a set whose gain is 100, 14 for a sine's two coefficients on 1000 rows: first what takes 5 with it, then what
+    takes 10, not what takes 40."""
+    fits = {
+        "abc": [of(0.0, "b", "c", gain=50.0), of(0.0, "a", "c", gain=90.0), of(0.0, "a", "b", gain=95.0)],
+        "ab": [of(0.0, "b", gain=40.0), of(0.0, "a", gain=85.0)],
+    }
+    monkeypatch.setattr(refinement, "without_each", lambda fit: fits["".join(t.effect for t in fit.terms)])
+    found = refinement.without_idle_terms(of(0.0, "a", "b", "c", gain=100.0), Told(0.0), 1.0)
+    assert [term.effect for term in found.terms] == ["a"]
+    fits["ab"][1] = of(0.0, "a", gain=55.0)
+    found = refinement.without_idle_terms(of(0.0, "a", "b", "c", gain=100.0), Told(0.0), 1.0)
+    assert [term.effect for term in found.terms] == ["a", "b"]
+
+
+def test_effects_that_a_wider_variant_took_over_are_left_out(monkeypatch, by_schwarz):
+    """Few waves, a lobe and a tooth led; many waves hold the lobe and the tooth as well. Where no wider variant pays,
+    nothing is asked again."""
+    monkeypatch.setattr(refinement, "FitProbe", lambda *about, **limits: None)
+    monkeypatch.setattr(refinement, "is_acceptable", lambda fit: True)
+    monkeypatch.setattr(refinement, "search_terms", lambda probe, only: [Effect(*only, width=20, freedom=20.0)])
+    monkeypatch.setattr(refinement, "joint_fit", lambda fit, terms: Told(0.0, tuple(terms), 1000.0))
+    monkeypatch.setattr(
+        refinement, "without_each", lambda fit: [replace(fit, terms=fit.terms[:i] + fit.terms[i + 1 :]) for i in (0, 1)]
+    )
+    led = of(0.0, "waves", "lobe", gain=500.0)
+    wide = refinement.widened_where_it_pays(led, Told(0.0), 1.0, (0.0, 20.0))
+    assert len(wide.terms) == 1
+    monkeypatch.setattr(refinement, "search_terms", lambda probe, only: [])
+    assert refinement.widened_where_it_pays(led, Told(0.0), 1.0, (0.0, 20.0)) is led
+
+
+@pytest.mark.parametrize(("known", "gain"), [(900.0, 900.0), (700.0, 800.0)])
+def test_a_set_that_lost_effects_stands_once_and_by_its_better_fit(monkeypatch, by_schwarz, known, gain):
+    """The set without them may be known already, from another drive: the better of both leads, with the evidence of the
+    one that led; the rest stay in order."""
+    monkeypatch.setattr(subset_search, "widened_where_it_pays", lambda *about: of(0.0, "waves", gain=800.0))
+    alone, other = of(70.0, "waves", gain=known), of(60.0, "other", gain=10.0)
+    state = state_of(alone, other)
+    first = Candidate(of(80.0, "waves", "lobe", gain=500.0), 80.0, 500.0)
+    rest = [Candidate(alone, 70.0, known), Candidate(other, 60.0, 10.0)]
+    found = subset_search.widened(state, [first, *rest])
+    assert [c.effects for c in found] == [("waves",), ("other",)]
+    assert found[0].log_bayes_factor == 80.0 and found[0].fit.gain == gain
+    monkeypatch.setattr(subset_search, "widened_where_it_pays", lambda fit, *about: fit)
+    assert subset_search.widened(state, [first, *rest]) == [first, *rest]
+
+
 def test_a_plain_term_takes_the_place_of_a_wide_one_that_turns(monkeypatch):
     """The three that gain most of what turns, is narrow and not doubtful; neither of what is skipped nor there."""
     asked = []

@@ -10,7 +10,7 @@ import numpy as np
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.search.acceptance import is_acceptable
-from hdopt.diagnosis.search.candidates import joint_fit, penalty_scale, search_terms, weigh
+from hdopt.diagnosis.search.candidates import joint_fit, penalty_scale, search_terms, weigh, without_each
 from hdopt.diagnosis.search.penalty import kind_of
 from hdopt.effects.term import Term
 
@@ -56,23 +56,40 @@ def otherwise_acceptable(fit: Fit, skip: Sequence[str], order_range: tuple[float
 def widened_where_it_pays(fit: Fit, base: Fit, inflation: float, order_range: tuple[float, float]) -> Fit:
     """`fit`, or the same effects in wider variants where these pay for their coefficients against the `base` in noise
     rougher by `inflation`, at orders in `order_range`: what a name has to pay for bending to anything, it need not pay
-    any more once it stands.
+    any more once it stands. What a wider variant took over from other effects is left out.
     """
-    scale, settings = penalty_scale(fit.problem, inflation), fit.problem.settings.search
-
-    def paid(candidate: Fit) -> float:
-        freedom = sum(term.freedom for term in candidate.terms)
-        trials = sum(math.log(max(term.trials, 1.0)) for term in candidate.terms)
-        return weigh(candidate, base, scale).gain / inflation / 2 - freedom * math.log(scale.rows) / 2 - trials
-
+    narrow, settings = fit, fit.problem.settings.search
     for i, term in enumerate(fit.terms):
         probe = FitProbe(fit, keep=fit.all_but(i), order_range=order_range)
         wider = [t for t in search_terms(probe, only=[term.effect]) if t.width > term.width]
         for other in wider:
             candidate = joint_fit(fit, [other if j == i else t for j, t in enumerate(fit.terms)])
-            if paid(candidate) > paid(fit) + settings.tie_of_variants and is_acceptable(candidate):
+            more = for_freedom_alone(candidate, base, inflation) - for_freedom_alone(fit, base, inflation)
+            if more > settings.tie_of_variants and is_acceptable(candidate):
                 fit = candidate
+    return fit if fit is narrow else without_idle_terms(fit, base, inflation)
+
+
+def without_idle_terms(fit: Fit, base: Fit, inflation: float) -> Fit:
+    """`fit` without those of its terms that do not pay for their own coefficients against the `base` in noise rougher
+    by `inflation`.
+    """
+    while len(fit.terms) > 1:
+        fewer = max(without_each(fit), key=lambda one: for_freedom_alone(one, base, inflation))
+        if for_freedom_alone(fewer, base, inflation) < for_freedom_alone(fit, base, inflation):
+            break
+        fit = fewer
     return fit
+
+
+def for_freedom_alone(fit: Fit, base: Fit, inflation: float) -> float:
+    """Log evidence of `fit` against the `base`, in noise rougher by `inflation`, that pays for its coefficients and
+    trials alone.
+    """
+    scale = penalty_scale(fit.problem, inflation)
+    freedom = sum(term.freedom for term in fit.terms)
+    trials = sum(math.log(max(term.trials, 1.0)) for term in fit.terms)
+    return weigh(fit, base, scale).gain / inflation / 2 - freedom * math.log(scale.rows) / 2 - trials
 
 
 def with_a_plain_term(fit: Fit, skip: Sequence[str], order_range: tuple[float, float]) -> list[list[Term]]:

@@ -31,13 +31,14 @@ from hdopt.diagnosis.search.candidates import (
 from hdopt.diagnosis.search.explore import explore
 from hdopt.diagnosis.search.penalty import flexibility, kind_of, leaves_nothing
 from hdopt.diagnosis.search.refinement import (
+    for_freedom_alone,
     otherwise_acceptable,
     shortened,
     trimmed,
     widened_where_it_pays,
     with_a_plain_term,
 )
-from hdopt.diagnosis.search.search_state import SearchPlan, SearchState
+from hdopt.diagnosis.search.search_state import SearchPlan, SearchState, names_of
 from hdopt.diagnosis.search.several_for_one import fewest_first, several_first, several_for_one, with_teeth_in_the_zones
 from hdopt.effects.met import Waves
 from hdopt.effects.term import Term
@@ -82,11 +83,8 @@ def select_from(state: SearchState) -> Selection:
     for stage in STAGES:
         state = stage(state)
     candidates = acceptable_first(ranked(state), state.settings.close_behind)
-    candidates = fewest_first(state, several_first(state, completed(state, candidates)))
-    best = candidates[0]
-    if best.fit.terms:
-        best = replace(best, fit=widened_where_it_pays(best.fit, state.base, state.inflation, state.order_range))
-    return Selection(state.base, (best, *candidates[1:]), state.inflation)
+    candidates = widened(state, fewest_first(state, several_first(state, completed(state, candidates))))
+    return Selection(state.base, tuple(candidates), state.inflation)
 
 
 def first_look(base: Fit, inflation: float, rng: np.random.Generator, plan: SearchPlan) -> SearchState:
@@ -387,6 +385,22 @@ def completed(state: SearchState, candidates: list[Candidate]) -> list[Candidate
         return candidates
     best = max(found, key=lambda c: c.log_bayes_factor)
     return in_order([best, *(c for c in candidates if c.fit is not best.fit)])
+
+
+def widened(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
+    """`candidates` in order of evidence, the first with its effects in wider variants where these pay; effects that it
+    lost to these stand for the set without them. `state` is where the work stands.
+    """
+    first = candidates[0]
+    if not first.fit.terms:
+        return candidates
+    fit = widened_where_it_pays(first.fit, state.base, state.inflation, state.order_range)
+    names = names_of(fit)
+    if names == names_of(first.fit):
+        return [replace(first, fit=fit), *candidates[1:]]
+    same = [fit, *([state.fits[names]] if names in state.fits else [])]
+    fit = max(same, key=lambda one: for_freedom_alone(one, state.base, state.inflation))
+    return [replace(first, fit=fit), *(one for one in candidates[1:] if names_of(one.fit) != names)]
 
 
 def may_complete(term: Term, narrow: int) -> bool:
