@@ -99,6 +99,9 @@ def test_pulses_that_come_and_go_are_unsteady():
     assert where["domain"] == "angle"
     assert where["rms_arcmin"] > 0.01
     assert residual_structure.unsteady(evidence(fitted(at_random(0.4)))) == where
+    spread = from_turn_to_turn(fitted(at_random(0.4)), 0).spread
+    assert where["spread_over_turns"] == spread
+    assert f"comes and goes: its size differs by {spread:.2g} of its mean" in residual_structure.in_what_way(where)
     assert residual_structure.comes_and_goes(evidence(fitted(lambda turn: 0.3))) is None
 
 

@@ -50,11 +50,14 @@ def momentary(evidence: Evidence) -> bool:
 
 
 def in_what_way(where: Where) -> str:
-    """How something that lives in time (`where`) shows, for the sentence."""
+    """How something that changes in time (`where`) shows, for the sentence."""
     if "period_s" in where:
         return f", a wave of {where['period_s']:.3g} s"
     if "sudden_steps" in where:
         return f", {where['sudden_steps']} sudden steps and what creeps back between them"
+    if "spread_over_turns" in where:
+        spread = where["spread_over_turns"]
+        return f", and it comes and goes: its size differs by {spread:.2g} of its mean from one input turn to the next"
     return ""
 
 
@@ -84,7 +87,8 @@ def comes_and_goes(evidence: Evidence) -> Where | None:
         if differs.t > settings.remainder_t_alone and differs.spread > settings.spread_over_turns:
             contribution = fit.contribution(index)
             rms = differs.spread * float(np.std(contribution))
-            return place(effect.domain, main_orders(fit, contribution), rms, evidence)
+            where = place(effect.domain, main_orders(fit, contribution), rms, evidence)
+            return where | {"spread_over_turns": differs.spread}
     return None
 
 

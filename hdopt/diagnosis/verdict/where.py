@@ -7,7 +7,8 @@ from typing import NotRequired, TypedDict
 
 class Where(TypedDict):
     """Domain, orders (cycles an input turn), direction, share of the residual's power (0 to 1) and rms; of what changes
-    in time also its period (s), or how many sudden steps there are.
+    in time also its period (s), or how many sudden steps there are; of what comes and goes the spread of its size from
+    one input turn to the next, over its mean.
     """
 
     domain: str
@@ -17,3 +18,4 @@ class Where(TypedDict):
     rms_arcmin: float
     period_s: NotRequired[float]
     sudden_steps: NotRequired[int]
+    spread_over_turns: NotRequired[float]
