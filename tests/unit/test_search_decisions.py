@@ -424,7 +424,7 @@ def chosen(monkeypatch):
         monkeypatch.setattr(exploring, "rank_subsets", lambda *about: ranked)
         monkeypatch.setattr(exploring, "behind_a_resonance", lambda *about: [])
         monkeypatch.setattr(exploring, "has_exact_shape", lambda term: term.effect in exact)
-        sets = exploring._worth_a_fit(state_of(), Told(0.0), pool, afresh)
+        sets = exploring._worth_a_fit(state_of(), Told(0.0), pool, afresh, "scale")
         return [tuple(term.effect for term in terms) for terms in sets]
 
     return of_gains

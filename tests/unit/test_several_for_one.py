@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hdopt.diagnosis.search import candidates, subset_search
+from hdopt.diagnosis.search import explore as exploring
 from hdopt.diagnosis.search import several_for_one as rooms
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.penalty import bends
@@ -365,7 +366,7 @@ def test_a_look_keeps_what_does_not_bend_and_asks_in_the_place_of_each(monkeypat
         asked.append((probe, skip))
         return [Piece("found"), WIDE, OUTSIDE]
 
-    monkeypatch.setattr(rooms, "search_terms", search_terms)
+    monkeypatch.setattr(exploring, "search_terms", search_terms)
     monkeypatch.setattr(rooms, "explore", lambda state, centre, pool: pools.append(pool) or state)
     rooms.about(state, centre)
     names = [PULSE.effect, LINES.effect]

@@ -14,8 +14,8 @@ from dataclasses import replace
 
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.search.acceptance import is_acceptable
-from hdopt.diagnosis.search.candidates import Candidate, in_order, joint_fit, paid_for_freedom, search_terms
-from hdopt.diagnosis.search.explore import explore
+from hdopt.diagnosis.search.candidates import Candidate, in_order, joint_fit, paid_for_freedom
+from hdopt.diagnosis.search.explore import explore, pool_among
 from hdopt.diagnosis.search.penalty import bends, discrepancy
 from hdopt.diagnosis.search.search_state import SearchState
 from hdopt.effects import HIGH_ORDER
@@ -56,13 +56,7 @@ def about(state: SearchState, centre: Fit) -> SearchState:
     its terms that bend, beside the others, and in place of each of the others.
     """
     penalties = centre.problem.settings.penalty
-    kept = [i for i, term in enumerate(centre.terms) if not bends(term, penalties)]
-    pool = [centre.terms[i] for i in kept]
-    for beside in (kept, *([j for j in kept if j != i] for i in kept)):
-        skip = [*state.plan.skip, *(centre.terms[i].effect for i in beside)]
-        found = search_terms(state.probe(centre, keep=beside), skip)
-        pool += [term for term in found if not bends(term, penalties)]
-    return explore(state, centre, pool)
+    return explore(state, centre, pool_among(state, centre, lambda term: not bends(term, penalties)))
 
 
 def several_first(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:

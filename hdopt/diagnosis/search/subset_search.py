@@ -30,6 +30,7 @@ from hdopt.diagnosis.search.candidates import (
 )
 from hdopt.diagnosis.search.explore import explore
 from hdopt.diagnosis.search.penalty import flexibility, kind_of, leaves_nothing
+from hdopt.diagnosis.search.plain_for_waves import plain_for_waves
 from hdopt.diagnosis.search.refinement import (
     for_freedom_alone,
     otherwise_acceptable,
@@ -340,6 +341,7 @@ STAGES: tuple[Callable[[SearchState], SearchState], ...] = (
     beside_a_far_drive,
     with_teeth_in_the_zones,
     several_for_one,
+    plain_for_waves,
     refit_close_rivals,
     beside_what_is_told,
     leave_out_hidden_parts,
