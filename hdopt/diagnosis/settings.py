@@ -540,9 +540,16 @@ class VerdictSettings:
     )
     imitated: float = threshold(0.99, "1", "choice: share of an effect's power from which it is imitated wholly")
     noise_over_neighbours: float = threshold(
-        5.0,
+        3.0,
         "1",
-        "choice: of what neighbouring samples show; above it noise must be a walk (9.5 times on the simulated bench)",
+        "choice: of what neighbouring samples and rounding show; above it noise must be a walk: up to 2.2 in 27 clean "
+        "recordings of run-012, 3.2 to 14 in eight in which something was that is none",
+    )
+    other_law: float = threshold(
+        10.0,
+        "1",
+        "choice: log evidence by which another law must explain better; a power of the speed gained 0 to 1 over that "
+        "of six delays, 15 over that of a delay which was drag",
     )
     left_over_passes: float = threshold(
         2.0,

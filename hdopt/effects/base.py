@@ -97,6 +97,11 @@ class Explanation(ABC):
         """Shapes of the same inside the meshing zones, to be tried in its place; none for most."""
         return ()
 
+    def other_laws(self, conditions: Conditions, shape: Shape) -> Sequence[Array]:
+        """Columns like those of its term at this `shape`, each (n, p), by other laws of what it depends on; none for
+        most. Where one of these explains better, it is not this effect that is there."""
+        return ()
+
     def tooth_by_tooth(self, term: Term, coefficients: Array, ratio: float) -> Sequence[Shape]:
         """Shapes of the same with a height of every tooth's own, all alike, from which a fit of them begins: those of
         `term` in the zones with these `coefficients`, on a drive of this `ratio`. None for most."""

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+import numpy as np
+
 from hdopt.arrays import Array
 from hdopt.drive.geometry import ARCMIN
 from hdopt.effects.base import Effect
@@ -21,6 +23,8 @@ from hdopt.effects.term import Shape, Term
 
 MS = 1e-3
 """s that a coefficient of one stands for."""
+OTHER_POWERS = (0.5, 2.0, 3.0)
+"""Powers of the speed by which drag grows, of oil and of air: a delay's is 1."""
 
 
 class ChannelDelay(Effect):
@@ -41,6 +45,12 @@ class ChannelDelay(Effect):
 
     def search(self, probe: Probe) -> Sequence[Term]:
         return [self.term(probe.samples, {})]
+
+    def other_laws(self, conditions: Conditions, shape: Shape) -> Sequence[Array]:
+        speed = conditions.known_speed
+        largest = float(np.max(np.abs(speed)))
+        part = speed / largest if largest > 0 else speed
+        return [(np.sign(part) * np.abs(part) ** power)[:, None] for power in OTHER_POWERS]
 
     def sentence(self, shape: Shape, parameters: Mapping[str, Parameter], rms_arcmin: float) -> str:
         delay = parameters["delay_s"].value

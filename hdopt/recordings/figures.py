@@ -14,7 +14,7 @@ import numpy as np
 
 from hdopt.arrays import Array, Index
 from hdopt.recordings.passes import find_passes
-from hdopt.recordings.recording import TURN, Recording
+from hdopt.recordings.recording import OF_ROUNDING, TURN, Recording
 
 CELLS_PER_TURN = 180
 """Cells an input turn: 2 deg, finer than the width of one tooth (2.2 deg for 162 teeth)."""
@@ -73,7 +73,7 @@ def cells_of(recording: Recording, per_turn: int = CELLS_PER_TURN) -> Cells:
     count = np.diff(np.r_[starts, len(place)]).astype(float)
     error = np.add.reduceat(recording.error_arcmin, starts) / count
     noise = neighbour_noise(recording.error_arcmin)
-    step = recording.quantum_arcmin / math.sqrt(12)
+    step = recording.quantum_arcmin * OF_ROUNDING
     sigma = np.sqrt((noise**2 + step**2) / count)
     return Cells(
         np.asarray(np.add.reduceat(recording.input_angle, starts) / count, float),

@@ -10,6 +10,8 @@ import numpy as np
 from hdopt.arrays import Array, Index
 
 TURN = 2 * math.pi
+OF_ROUNDING = 1 / math.sqrt(12)
+"""Standard deviation of what rounding leaves, over the step that is rounded to."""
 LOCKED_TURNS = 0.02
 """Input turns below which the input counts as locked: only torque or time moved."""
 

@@ -113,8 +113,10 @@ def test_the_chance_is_that_of_a_whole_search_made_anew(monkeypatch):
 
 
 def test_noise_is_held_against_the_larger_of_neighbours_and_sensors(hidden):
+    """Of the sensors' steps by what rounding to them makes. Fault caught: the whole step, under which eleven times the
+    noise was adequate."""
     rms = hidden.extended_held_out.rms
-    for neighbours, sensors in ((0.01, 0.5), (0.5, 0.01)):
+    for neighbours, sensors in ((0.01, 0.5 * 12**0.5), (0.5, 0.01), (0.5, 1.7)):
         facts = find(replace(hidden, neighbours_arcmin=neighbours, sensor_arcmin=sensors)).facts
         assert facts.noise_over_neighbours == pytest.approx(rms / 0.5)
 

@@ -107,13 +107,11 @@ def test_numbers_without_a_prior_are_outside_of_none():
         assert ["height_um" in note for note in notes] == [True] * ((low, high) in beyond)
 
 
-@pytest.mark.parametrize(("neighbours", "sensor", "rms"), [(3.0, 2.0, 4.0), (2.0, 3.0, 4.0), (6.0, 0.0, 0.0)])
-def test_what_is_no_noise_is_told_without_the_sensors_own(monkeypatch, neighbours, sensor, rms):
-    """Of 5 arcmin rms, 3 are what neighbouring samples or the bench's sensors show: 4 are something else."""
+@pytest.mark.parametrize(("sensors", "rms"), [(3.0, 4.0), (6.0, 0.0)])
+def test_what_is_no_noise_is_told_without_the_sensors_own(monkeypatch, sensors, rms):
+    """Of 5 arcmin rms, 3 are the bench's sensors': 4 are something else."""
     monkeypatch.setattr(rules, "locate_remainder", lambda evidence: {"rms_arcmin": 5.0, "domain": "torque"})
-    evidence = SimpleNamespace(
-        neighbours_arcmin=neighbours, sensor_arcmin=sensor, extended_held_out=SimpleNamespace(variance=25.0, rms=5.0)
-    )
+    evidence = SimpleNamespace(sensors_noise=sensors, extended_held_out=SimpleNamespace(variance=25.0, rms=5.0))
     findings = SimpleNamespace(
         evidence=evidence, facts=SimpleNamespace(carry_most=False, noise_over_neighbours=9.0), effects=()
     )

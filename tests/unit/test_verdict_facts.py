@@ -9,6 +9,7 @@ import pytest
 from test_verdict_rules import CLEAN, FIRED, NAMED, held
 
 from hdopt.diagnosis.checks.assessment import Evidence
+from hdopt.diagnosis.checks.other_laws import OtherLaw
 from hdopt.diagnosis.checks.repeated_passes import NOTHING_REPEATED, RepeatedPasses
 from hdopt.diagnosis.inference.catalogue import SCALE, SKEW, VARYING_CONTACT
 from hdopt.diagnosis.inference.cross_validation import HeldOut
@@ -62,6 +63,8 @@ def evidence(*candidates, base=3.0, extended=1.0, **more):
         "rows": rows,
         "neighbours_arcmin": 0.0,
         "sensor_arcmin": 0.0,
+        "sensors_noise": 0.0,
+        "other_law": OtherLaw(),
         "passes": NOTHING_REPEATED,
         "nested": None,
         "unseen": more.get("nested"),

@@ -70,6 +70,8 @@ FIRED = [
     ("more than noise is left", replace(NAMED, heldout_over_floor=2.0, generic_t=8.0), {"generic_t": 1.0}),
     ("beaten without physics", replace(CLEAN, beaten_by_generic=True), {"beaten_by_generic": False}),
     ("beaten without physics", replace(NAMED, beaten_by_generic=True), {"turns_suffice": False}),
+    ("another law explains", replace(NAMED, other_law=12.0), {"other_law": 8.0}),
+    ("another law explains", replace(NAMED, other_law=12.0), {"false_alarm_p": 0.3}),
     ("not found again", replace(NAMED, found_again=False, heldout_over_floor=1.5), {"found_again": True}),
     ("not found again", replace(NAMED, found_again=False, heldout_over_floor=1.5), {"heldout_over_floor": 1.3}),
     ("not found again", replace(NAMED, found_again=False, heldout_over_floor=1.5), {"own_gain": 0.0}),
@@ -219,9 +221,7 @@ def test_effects_that_carry_most_are_said_beside_what_is_no_noise(monkeypatch, o
     from hdopt.diagnosis.verdict import rules
 
     monkeypatch.setattr(rules, "locate_remainder", lambda evidence: {"rms_arcmin": 80.0, "domain": "torque"})
-    evidence = SimpleNamespace(
-        neighbours_arcmin=1.0, sensor_arcmin=0.5, extended_held_out=SimpleNamespace(variance=87.0**2, rms=87.0)
-    )
+    evidence = SimpleNamespace(sensors_noise=1.0, extended_held_out=SimpleNamespace(variance=87.0**2, rms=87.0))
     facts = replace(NAMED, own_gain=own_gain, noise_over_neighbours=82.0)
     windup = SimpleNamespace(id="torsional_windup", says="The gear winds up.")
     findings = SimpleNamespace(evidence=evidence, facts=facts, effects=(windup,), pairs=())

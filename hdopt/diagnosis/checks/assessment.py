@@ -10,6 +10,7 @@ import numpy as np
 
 from hdopt.arrays import Array, Index
 from hdopt.diagnosis.checks.false_alarm import best_score, false_alarm_chance
+from hdopt.diagnosis.checks.other_laws import OtherLaw, other_law
 from hdopt.diagnosis.checks.repeated_passes import RepeatedPasses, repeated_passes
 from hdopt.diagnosis.checks.scale import Scale, fitted_scale
 from hdopt.diagnosis.checks.slow_wander import SlowWave, slow_wave
@@ -37,7 +38,7 @@ from hdopt.diagnosis.state import State
 from hdopt.effects import EFFECTS, HIGH_ORDER
 from hdopt.effects.probe import strongest_orders
 from hdopt.effects.term import Term
-from hdopt.recordings.recording import Recording
+from hdopt.recordings.recording import OF_ROUNDING, Recording
 from hdopt.recordings.rows import Rows
 
 
@@ -79,8 +80,15 @@ class Evidence:
     sensor_arcmin: float
     scale: Scale | None
     passes: RepeatedPasses
+    other_law: OtherLaw
     nested: NestedHeldOut | None = None
     proposed: NestedHeldOut | None = None
+
+    @property
+    def sensors_noise(self) -> float:
+        """Standard deviation that the sensors give a single sample, arcmin: what neighbouring samples show, or what
+        rounding to the sensors' steps makes, if that is more."""
+        return max(self.neighbours_arcmin, self.sensor_arcmin * OF_ROUNDING)
 
     @property
     def unseen(self) -> NestedHeldOut | None:
@@ -141,6 +149,7 @@ def assess(state: State) -> Evidence:
         sensor_arcmin=max(one.quantum_arcmin for one in state.recordings),
         scale=fitted_scale(best, state.nuisances),
         passes=repeated_passes(best),
+        other_law=other_law(best, inflation),
     )
 
 

@@ -24,10 +24,11 @@ from hdopt.parallel.shared_memory import each
 ORDER_DOMAINS = ("integer order", "output-synchronous order", "asynchronous order")
 """Domains of the generic basis in which the base itself lives."""
 
+FS_TEETH, CS_TEETH = "fs_tooth_harmonics", "cs_tooth_harmonics"
 WAVES_OF_TEETH = tuple(
-    tuple((f"{spline}_tooth_harmonics", last) for spline in splines)
+    tuple((effect, last) for effect in effects)
     for last in (8, 24)
-    for splines in (("fs",), ("cs",), ("fs", "cs"))
+    for effects in ((FS_TEETH,), (CS_TEETH,), (FS_TEETH, CS_TEETH))
 )
 """Sets of waves of the teeth by effect, from the second wave to the last: long ones of either spline and of both."""
 

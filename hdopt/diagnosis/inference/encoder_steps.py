@@ -19,11 +19,8 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.diagnosis.inference.neighbour_noise import noise_between_neighbours
 from hdopt.diagnosis.settings import EncoderStepSettings
-from hdopt.recordings.read import Recording
+from hdopt.recordings.recording import OF_ROUNDING, Recording
 from hdopt.recordings.rows import gather, neighbours_for
-
-EVEN = 1 / math.sqrt(12)
-"""Standard deviation of what is evenly spread over one."""
 
 Smooth = Callable[[Sequence[Recording]], Array]
 """A smooth model of recordings: its errors (arcmin) on their averaged rows, (n,)."""
@@ -59,7 +56,7 @@ def without_output_steps(
 
 def _is_most(step: float, scatter: float, settings: EncoderStepSettings) -> bool:
     """Whether what a `step` adds is there and most of a `scatter`, both arcmin."""
-    added = EVEN * step
+    added = OF_ROUNDING * step
     return settings.share_of_scatter * scatter < added < scatter / settings.share_of_scatter
 
 

@@ -58,7 +58,8 @@ class Facts:
     error over the noise that neighbouring samples and the sensors' steps show; `walk`: what is left is as rough at
     every scale as a walk, which noise may be; `left_over_passes`: what is left over what differs
     from pass to pass of one angle; `left_over_floor`: cross-validated error over what a generic basis leaves, 1 where
-    what is between is less than sensors and model resolve. `above_resolution`: some effect is larger than what sensors
+    what is between is less than sensors and model resolve; `other_law`: log evidence by which another law than an
+    effect's own explains better. `above_resolution`: some effect is larger than what sensors
     and model resolve.
     """
 
@@ -88,6 +89,7 @@ class Facts:
     beaten_by_generic: bool = False
     beside_told: float = 0.0
     left_over_floor: float = 1.0
+    other_law: float = 0.0
 
     @property
     def significant(self) -> bool:
@@ -183,14 +185,14 @@ def find(evidence: Evidence) -> Findings:
         log_evidence=best.log_bayes_factor,
         unseen_gain=unseen_gain(evidence),
         heldout_over_floor=unseen_rms(evidence) / evidence.noise_floor,
-        noise_over_neighbours=evidence.extended_held_out.rms
-        / max(evidence.neighbours_arcmin, evidence.sensor_arcmin, TINY),
+        noise_over_neighbours=evidence.extended_held_out.rms / max(evidence.sensors_noise, TINY),
         walk=is_a_walk(evidence.rows, best.fit.residual, evidence.settings.walk),
         left_over_passes=left_over_passes(evidence),
         above_resolution=above_resolution(evidence),
         beaten_by_generic=beaten_by_generic(evidence),
         beside_told=adding,
         left_over_floor=left_over_floor(evidence),
+        other_law=evidence.other_law.log_evidence,
     )
     pairs = confounded_pairs(evidence, facts.named, high) if facts.said else ()
     effects = effects_said(evidence, facts, high)

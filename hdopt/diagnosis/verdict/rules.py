@@ -147,6 +147,11 @@ def something_is_left(facts: Facts) -> bool:
     return facts.turns_suffice and not facts.said and much
 
 
+def another_law_explains(facts: Facts) -> bool:
+    """Effects are named, and one of them follows another law than its own. `facts` are those of the recording."""
+    return facts.named and facts.other_law > facts.settings.other_law
+
+
 def others_are_as_good(facts: Facts) -> bool:
     """Effects are named, and another set explains as well. `facts` are those of the recording."""
     return facts.said and bool(facts.rivals)
@@ -173,8 +178,7 @@ def no_noise(findings: Findings) -> Conclusion:
     """
     evidence = findings.evidence
     effects = findings.effects if findings.facts.carry_most else ()
-    sensors = max(evidence.neighbours_arcmin, evidence.sensor_arcmin)
-    rms = math.sqrt(max(evidence.extended_held_out.variance - sensors**2, 0.0))
+    rms = math.sqrt(max(evidence.extended_held_out.variance - evidence.sensors_noise**2, 0.0))
     where = locate_remainder(evidence) | {"rms_arcmin": rms, "share_of_residual": 1.0}
     says = "".join(f"{found.says} " for found in effects)
     says += (
@@ -221,6 +225,24 @@ def named_and_beaten(findings: Findings) -> Conclusion:
     facts and the evidence behind them.
     """
     return named_and_more(findings) if findings.facts.said else unknown(findings)
+
+
+def not_by_its_law(findings: Findings) -> Conclusion:
+    """What is there resembles an effect, but follows another law. `findings` hold the facts and the evidence behind
+    them.
+    """
+    evidence = findings.evidence
+    best, index = evidence.selection.best, evidence.other_law.index
+    name, contribution = best.effects[index], best.fit.contribution(index)
+    domain = properties_of(name).domain
+    where = place(domain, main_orders(best.fit, contribution), float(np.std(contribution)), evidence)
+    return Conclusion(
+        "unknown",
+        f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that looks like {name} but grows with the {domain} "
+        "by another law: what it is, is not known.",
+        separating_test=EFFECTS[name].separating,
+        where=where,
+    )
 
 
 def unstable(findings: Findings) -> Conclusion:
@@ -368,6 +390,7 @@ RULES = (
     Rule("not confirmed", not_confirmed, unconfirmed),
     Rule("more than noise is left", more_than_noise_is_left, named_and_more),
     Rule("beaten without physics", beaten_without_physics, named_and_beaten),
+    Rule("another law explains", another_law_explains, not_by_its_law),
     Rule("not found again", not_found_again, unstable),
     Rule("misses unseen turns", misses_unseen, unstable),
     Rule("others are as good", others_are_as_good, ambiguous),

@@ -1,0 +1,79 @@
+"""Whether what looks like a delay grows with the speed itself, or with another power of it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hdopt.diagnosis.checks.other_laws import OtherLaw, other_law
+from hdopt.diagnosis.search.candidates import joint_fit
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.diagnosis.stages import begin
+from hdopt.diagnosis.verdict import rules
+from hdopt.effects import EFFECTS
+from hdopt.kinematics.cartesian import CartesianModel
+from hdopt.study import load_study
+from tests.unit.test_diagnosis import bench
+
+DELAY = EFFECTS["channel_delay"]
+
+
+def recorded(power, speeds=(0.5, 1.0), size=0.15):
+    """The fit of a delay to a record forward and back at each of the `speeds`, rad/s, in which an offset of `size`
+    (arcmin at 1 rad/s), odd in direction, grows with a `power` of the speed.
+    """
+    study = load_study(drive="csf-25-80")
+    records = bench(
+        study,
+        lambda motion: size * np.sign(motion["speed"]) * np.abs(motion["speed"]) ** power,
+        turns=20,
+        rate=60,
+        speeds=speeds,
+    )
+    state = begin(records, CartesianModel.of(study.drive), 1, DEFAULT)
+    return joint_fit(state.base, [DELAY.term(state.problem.rows, {})])
+
+
+@pytest.mark.parametrize("power", [0.5, 2.0])
+def test_another_power_of_the_speed_is_another_law(power):
+    """At half the speed a delay makes half the offset, a root 0.71 of it, a square 0.25: by 2,400 rows of noise of
+    0.02 arcmin that is hundreds in log evidence. Faults caught: not asked; asked of the residual alone, in which a
+    delay was fitted already."""
+    found = other_law(recorded(power), 1.0)
+    assert found.index == 0
+    assert found.log_evidence > 5 * DEFAULT.verdict.other_law
+
+
+def test_a_delay_follows_its_own_law():
+    """And of one speed every power is the same, so that none is better; rounding and the turns at a reversal leave less
+    than one in log evidence."""
+    assert other_law(recorded(1.0), 1.0).log_evidence < 1.0
+    assert other_law(recorded(0.5, speeds=(1.0,)), 1.0).log_evidence < 1.0
+
+
+def test_rough_noise_and_each_law_cost_evidence(monkeypatch):
+    """Faults caught: the noise's roughness forgotten; three laws tried for nothing."""
+    fit = recorded(0.5)
+    once, rough = other_law(fit, 1.0).log_evidence, other_law(fit, 2.0).log_evidence
+    assert once + np.log(3) == pytest.approx(2 * (rough + np.log(3)))
+
+
+def test_effects_without_other_laws_are_not_asked(monkeypatch):
+    fit = recorded(0.5)
+    monkeypatch.setattr(type(DELAY), "other_laws", lambda self, conditions, shape: ())
+    assert other_law(fit, 1.0) == OtherLaw()
+
+
+def test_the_verdict_says_that_the_law_is_another():
+    """Where it lives and what it looks like. Fault caught: the effect is named all the same."""
+    fit = recorded(0.5)
+    best = SimpleNamespace(fit=fit, effects=("channel_delay",))
+    evidence = SimpleNamespace(
+        selection=SimpleNamespace(best=best), other_law=OtherLaw(0, 99.0), base_held_out=SimpleNamespace(variance=0.02)
+    )
+    said = rules.not_by_its_law(SimpleNamespace(evidence=evidence))
+    assert (said.verdict, said.effects, said.where["domain"]) == ("unknown", (), "speed")
+    assert said.where["rms_arcmin"] == pytest.approx(np.std(fit.contribution(0)))
+    assert "looks like channel_delay but grows with the speed by another law" in said.says
