@@ -10,6 +10,7 @@ from test_diagnosis_evidence import state
 
 from hdopt.diagnosis.checks import assessment
 from hdopt.diagnosis.checks.assessment import assess, best_placebo, detection_limits, look_at_remainder
+from hdopt.diagnosis.checks.other_laws import OtherLaw
 from hdopt.diagnosis.inference.catalogue import SCALE
 from hdopt.diagnosis.inference.fit import extend
 from hdopt.diagnosis.inference.neighbour_noise import noise_between_neighbours
@@ -119,6 +120,10 @@ def test_noise_is_held_against_the_larger_of_neighbours_and_sensors(hidden):
     for neighbours, sensors in ((0.01, 0.5 * 12**0.5), (0.5, 0.01), (0.5, 1.7)):
         facts = find(replace(hidden, neighbours_arcmin=neighbours, sensor_arcmin=sensors)).facts
         assert facts.noise_over_neighbours == pytest.approx(rms / 0.5)
+
+
+def test_the_evidence_for_another_law_is_a_fact(hidden):
+    assert find(replace(hidden, other_law=OtherLaw(0, 12.5))).facts.other_law == 12.5
 
 
 def test_a_scale_alone_explains_nothing(hidden):

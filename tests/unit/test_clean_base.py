@@ -14,6 +14,7 @@ from hdopt.diagnosis.inference.clean_base import (
     beside_waves,
     drive_alone,
     fit_clean_base,
+    is_left_wavy,
 )
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
@@ -98,6 +99,13 @@ def test_where_smooth_columns_leave_noise_no_waves_are_asked():
     assert beside_waves(smooth, None) is None
     no_base = SimpleNamespace(base=None, settings=DEFAULT, noise=smooth.problem.noise)
     assert beside_waves(SimpleNamespace(problem=no_base), None) is None
+
+
+@pytest.mark.parametrize(("left", "wavy"), [(1.2, False), (1.3, True), (2.0, True)])
+def test_a_base_that_leaves_a_quarter_more_than_noise_may_be_wavy(left, wavy):
+    """Fault caught: a limit of another size."""
+    problem = SimpleNamespace(weighed_rows=100.0, noise=SimpleNamespace(sigma=0.5), settings=DEFAULT)
+    assert is_left_wavy(SimpleNamespace(objective=left * 25.0, problem=problem)) is wavy
 
 
 def test_waves_that_take_up_little_are_not_the_teeths():

@@ -53,6 +53,12 @@ def test_a_delay_follows_its_own_law():
     assert other_law(recorded(0.5, speeds=(1.0,)), 1.0).log_evidence < 1.0
 
 
+def test_a_law_is_asked_in_place_of_the_effects_own():
+    """A power of 1.4 lies nearer to a delay's than to a square: in place of the delay the square is no better. Fault
+    caught: asked beside the delay, where it takes up what the delay leaves."""
+    assert other_law(recorded(1.4), 1.0).log_evidence < 1.0
+
+
 def test_rough_noise_and_each_law_cost_evidence(monkeypatch):
     """Faults caught: the noise's roughness forgotten; three laws tried for nothing."""
     fit = recorded(0.5)
