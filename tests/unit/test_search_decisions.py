@@ -253,8 +253,8 @@ def refitted(monkeypatch):
         seen.append(tuple(term.effect for term in terms))
         return Told(1.0, tuple(terms))
 
-    monkeypatch.setattr(subset_search, "joint_fit", joint_fit)
-    monkeypatch.setattr(subset_search, "each", lambda work, items: [work(item) for item in items])
+    monkeypatch.setattr(weighing, "joint_fit", joint_fit)
+    monkeypatch.setattr(weighing, "each", lambda work, items: [work(item) for item in items])
     monkeypatch.setattr(subset_search, "with_a_plain_term", lambda *about: [[Effect("plain")]])
     return seen
 
@@ -289,7 +289,7 @@ def beside(monkeypatch, refitted):
         about.append(state.leader.effects)
         return state
 
-    monkeypatch.setattr(subset_search, "joint_fit", joint_fit)
+    monkeypatch.setattr(weighing, "joint_fit", joint_fit)
     monkeypatch.setattr(subset_search, "is_far", lambda fit: np.array([False, fit.far]))
     monkeypatch.setattr(subset_search, "leaves_nothing", lambda term: "sine" in term.effect)
     monkeypatch.setattr(subset_search, "search_about_leader", on)
@@ -351,7 +351,7 @@ def teeth_beside(monkeypatch, refitted, far):
         refitted.append(tuple((term.effect, term.width) for term in terms))
         return Told(50.0, tuple(terms))
 
-    monkeypatch.setattr(subset_search, "joint_fit", joint_fit)
+    monkeypatch.setattr(weighing, "joint_fit", joint_fit)
     monkeypatch.setattr(subset_search, "is_far", lambda fit: np.array([False, far]))
     monkeypatch.setattr(search_state, "search_terms", lambda probe, skip: pool)
     monkeypatch.setattr(subset_search, "explore", lambda state, centre, terms, afresh: state)

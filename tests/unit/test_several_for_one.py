@@ -235,8 +235,8 @@ def test_a_tooth_is_tried_in_the_zones_from_new_drives(monkeypatch, rows):
     """In its own place in the set, with draws of their own. Faults caught: from the drive that stands (a tooth that
     takes the load is not found from it); the others of the set lost."""
     asked = []
-    monkeypatch.setattr(rooms, "each", lambda work, items: [work(item) for item in items])
-    monkeypatch.setattr(rooms, "joint_fit", lambda start, terms, rng: asked.append((terms, rng)) or terms)
+    monkeypatch.setattr(candidates, "each", lambda work, items: [work(item) for item in items])
+    monkeypatch.setattr(candidates, "joint_fit", lambda start, terms, rng: asked.append((terms, rng)) or terms)
     leader = leading(rows, COUPLING, TWICE)
     of_high_order = Piece("tooth_mesh")  # with a search of its own in the zones
     leader = replace(leader, fit=replace(leader.fit, terms=(*leader.fit.terms, of_high_order)))

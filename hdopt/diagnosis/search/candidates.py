@@ -161,6 +161,13 @@ def joint_fit(start: Fit, terms: Sequence[Term], rng: np.random.Generator | None
     return best
 
 
+def from_new_drives(start: Fit, sets: Sequence[Sequence[Term]], rng: np.random.Generator) -> list[Fit]:
+    """Each of the `sets` of terms fitted together with the base, from `start` on and from new random drives, each set
+    with a stream of its own that `rng` spawns.
+    """
+    return each(lambda numbered: joint_fit(start, *numbered), zip(sets, rng.spawn(len(sets)), strict=True))
+
+
 def replace_terms(fit: Fit, terms: Sequence[Term]) -> Fit:
     """`fit` with `terms` in place of its own, at coefficients of zero."""
     return evaluate(fit.problem, fit.errors, fit.offsets, terms, [np.zeros(t.width) for t in terms])

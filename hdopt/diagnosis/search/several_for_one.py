@@ -14,12 +14,11 @@ from dataclasses import replace
 
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.search.acceptance import is_acceptable
-from hdopt.diagnosis.search.candidates import Candidate, in_order, joint_fit, paid_for_freedom
+from hdopt.diagnosis.search.candidates import Candidate, from_new_drives, in_order, joint_fit, paid_for_freedom
 from hdopt.diagnosis.search.explore import explore, pool_among
 from hdopt.diagnosis.search.penalty import bends, discrepancy
 from hdopt.diagnosis.search.search_state import SearchState
 from hdopt.effects import HIGH_ORDER
-from hdopt.parallel.shared_memory import each
 
 
 def several_for_one(state: SearchState) -> SearchState:
@@ -137,5 +136,4 @@ def with_teeth_in_the_zones(state: SearchState) -> SearchState:
         effect = fit.problem.explanations[term.effect]
         moved = (effect.term(rows, shape, fit.motion) for shape in effect.in_zones(term.shape))
         sets += [[*fit.terms[:i], one, *fit.terms[i + 1 :]] for one in moved if not bends(one, penalties)]
-    draws = copy.deepcopy(state.rng).spawn(len(sets))
-    return state.taking(each(lambda numbered: joint_fit(fit, *numbered), zip(sets, draws, strict=True)))
+    return state.taking(from_new_drives(fit, sets, copy.deepcopy(state.rng)))

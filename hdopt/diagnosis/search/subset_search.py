@@ -22,6 +22,7 @@ from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import (
     Candidate,
+    from_new_drives,
     in_order,
     joint_fit,
     paid_for_freedom,
@@ -141,12 +142,7 @@ def teeth_from_new_drives(state: SearchState, pool: Sequence[Term]) -> SearchSta
     penalties = state.base.problem.settings.penalty
     stiff = [term for term in pool if isinstance(term.met, Waves) and flexibility(term, penalties) < 1]
     widest = {term.effect: term for term in sorted(stiff, key=lambda term: term.width)}
-
-    def fitted(numbered: tuple[Term, np.random.Generator]) -> Fit:
-        term, own_rng = numbered
-        return joint_fit(state.base, [term], own_rng)
-
-    return state.taking(each(fitted, zip(widest.values(), copy.deepcopy(state.rng).spawn(len(widest)), strict=True)))
+    return state.taking(from_new_drives(state.base, [[term] for term in widest.values()], copy.deepcopy(state.rng)))
 
 
 def explore_clean_base(state: SearchState) -> SearchState:
@@ -231,12 +227,7 @@ def refit_close_rivals(state: SearchState) -> SearchState:
     least = settings.close * leader.log_bayes_factor
     sets: list[Sequence[Term]] = [fit.terms for fit in behind if state.log_bayes_factor(fit) > least]
     sets += with_a_plain_term(leader.fit, state.plan.skip, state.order_range)
-    start = leader.fit
-
-    def fitted(numbered: tuple[Sequence[Term], np.random.Generator]) -> Fit:
-        return joint_fit(start, *numbered)
-
-    return state.taking(each(fitted, zip(sets, state.rng.spawn(len(sets)), strict=True)))
+    return state.taking(from_new_drives(leader.fit, sets, state.rng))
 
 
 def beside_a_far_drive(state: SearchState) -> SearchState:
@@ -249,12 +240,7 @@ def beside_a_far_drive(state: SearchState) -> SearchState:
         return state
     start = before.fit
     found = [term for term in state.terms_for(state.probe(start), *before.effects) if leaves_nothing(term)]
-
-    def fitted(numbered: tuple[Term, np.random.Generator]) -> Fit:
-        term, own_rng = numbered
-        return joint_fit(start, [*start.terms, term], own_rng)
-
-    fits = each(fitted, zip(found, copy.deepcopy(state.rng).spawn(len(found)), strict=True))
+    fits = from_new_drives(start, [[*start.terms, term] for term in found], copy.deepcopy(state.rng))
     return about_a_new_leader(state.taking(fits), before)
 
 
