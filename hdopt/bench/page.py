@@ -45,16 +45,15 @@ def page(folder: Path) -> str:
 
 
 def _overview(runs: list[dict[str, Any]]) -> str:
-    rows = ["## All runs", "", "| run | cases | seed | program | false alarms | exact: one, two, three | gate | note |"]
-    rows.append("|---|---|---|---|---|---|---|---|")
+    rows = ["## All runs", "", "| run | cases | false alarms | exact: one, two, three | gate | note |"]
+    rows.append("|---|---|---|---|---|---|")
     for run in runs:
         found = run.get("figures", {}).get("")
         state = "not answered" if not found else "passed" if found["passed"] else f"missed {len(found['missed'])}"
         exact = ", ".join(_of(found["right_by_count"].get(str(n))) for n in thresholds.EXACT_SET) if found else ""
         alarms = _of(found["false_alarms"]) if found else ""
         cases = f"{run['begun']} of {run['cases']}" if "begun" in run else f"{run['cases']}"
-        seed, program = run.get("seed", ""), run["program"][:12]
-        cells = (f"{run['name']}, {run['date']}", cases, seed, f"`{program}`", alarms, exact, state, run["note"])
+        cells = (f"{run['name']}, {run['date']}", cases, alarms, exact, state, run["note"])
         rows.append("| " + " | ".join(map(str, cells)) + " |")
     return "\n".join(rows) + "\n"
 
@@ -67,7 +66,8 @@ def _of_run(run: dict[str, Any]) -> str:
         f"## {run['name']}",
         "",
         f"{run['begun']} of {run['cases']} cases in {run['seconds']} s, {each:.0f} s a case on a shared machine. "
-        f"Opened by commit `{commit}`, keys `{keys}`, settings `{run['settings'][:12]}`.",
+        f"Seed {run['seed']}, opened by commit `{commit}`; program `{run['program'][:12]}`, "
+        f"settings `{run['settings'][:12]}`, keys `{keys}`.",
         f"{_of(own['undecidable'])} cases cannot be told apart; {own['redrawn']} draws were repeated because physics "
         "could not be so large.",
         "",

@@ -128,9 +128,11 @@ class Resonance(Effect):
 
     def every_part_shows(self, term: Term, estimate: FitEstimate) -> bool:
         """Whether its numbers may be those of an inertia on a spring: with a gain of nothing and a drag instead, or a
-        damping that lets nothing swing, it bends to a delay, a drift or a loop.
+        damping that lets nothing swing, it bends to a delay, a drift or a loop. A damping need not be so certainly:
+        what does not swing shows no damping either, and its interval holds every one.
         """
-        return not any(one.certainly for one in outside_prior(self, self.parameters(term, estimate)))
+        outside = outside_prior(self, self.parameters(term, estimate))
+        return not any(one.certainly or one.name == "damping_ratio" for one in outside)
 
     def may_imitate(self, term: Term, estimate: FitEstimate) -> bool:
         """Whether what drags is besides a part of its damping, of 0 to 1, and of an inertia of a gain that drives

@@ -141,6 +141,18 @@ def confounded_items(diagnosis: Diagnosis) -> list[Table | Text]:
     return [table, *(Text(f"To tell {in_sentence(name)} apart: {test}.") for name, test in separating.items())]
 
 
+HELD_OUT_BARS = {
+    "chosen without these turns": "Chosen without these turns: a fifth of them, hidden from every stage, predicted by "
+    "what the others alone led to.",
+    "fitted without these turns": "Fitted without these turns: what the search on all turns found, where the others "
+    "alone prefer it to that.",
+    "placebo": "Placebo: the best other effect of the catalogue.",
+    "generic basis": "Generic basis: smooth curves and sines without physics.",
+    "noise floor": "Noise floor: what is left with a generic basis beside the best explanation.",
+}
+"""What a bar of the held-out errors means, by its name; the others say it themselves."""
+
+
 def proof_section(diagnosis: Diagnosis) -> Section:
     """Held-out error (arcmin rms) of base, placebo, generic basis and explanation in a `diagnosis`, over turns and over
     whole conditions."""
@@ -177,13 +189,8 @@ def proof_section(diagnosis: Diagnosis) -> Section:
         )
     )
     chart.update_xaxes(range=[0, 1.15 * max(lengths)], exponentformat="none")
-    note = (
-        "Every bar is the error on whole input turns that the last fit did not see. Chosen without these turns: "
-        "a fifth of them, hidden from every stage, predicted by what the others alone led to. Fitted without these "
-        "turns: what the search on all turns found, where the others alone prefer it to that. Placebo: the best "
-        "other effect of the catalogue. Generic basis: smooth curves and sines without physics. Noise floor: what "
-        "is left with a generic basis beside the best explanation."
-    )
+    meanings = [meaning for name, meaning in HELD_OUT_BARS.items() if name in bars]
+    note = " ".join(["Every bar is the error on whole input turns that the last fit did not see.", *meanings])
     items: list[Item] = [Figure("diagnosis-heldout", "Held-out error", chart, note)]
     if diagnosis.each_condition:
         items.append(conditions_figure(diagnosis))
