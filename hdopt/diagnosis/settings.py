@@ -548,8 +548,8 @@ class VerdictSettings:
     other_law: float = threshold(
         10.0,
         "1",
-        "choice: log evidence by which another law must explain better; a power of the speed gained 0 to 1 over that "
-        "of six delays, 15 over that of a delay which was drag",
+        "choice: log evidence by which another law of the speed must explain better: 0 to 1 over that of six delays "
+        "and of 45 plays and frictions, 15 and 682 over that of a delay and a play which were drag",
     )
     left_over_passes: float = threshold(
         2.0,

@@ -98,8 +98,8 @@ class Explanation(ABC):
         return ()
 
     def other_laws(self, conditions: Conditions, shape: Shape) -> Sequence[Array]:
-        """Columns like those of its term at this `shape`, each (n, p), by other laws of what it depends on; none for
-        most. Where one of these explains better, it is not this effect that is there."""
+        """Columns like those of its term at this `shape`, each (n, p), by other laws of the speed than its own; none
+        for most. Where one of these explains better, it is not this effect that is there."""
         return ()
 
     def tooth_by_tooth(self, term: Term, coefficients: Array, ratio: float) -> Sequence[Shape]:

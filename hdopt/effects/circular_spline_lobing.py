@@ -21,8 +21,8 @@ from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.term import Shape, Term
 
 LOBES = range(2, 17)
-BOLT_CIRCLE, FEW_LOBES_ODDS = 4, -2.0
-"""Two or three lobes are also what a cumulative pitch error makes first; bolt circles start at four. Log odds."""
+JAWS, FEW_LOBES_ODDS = 3, -2.0
+"""Two lobes are also what a cumulative pitch error makes first; clamping begins with three jaws or bolts. Log odds."""
 SINE = Sines({1: ("radial_amplitude_um", "phase_deg")}, "um", "of radius, sin(lobes θ + phase)", prior=(0.0, 50.0))
 
 
@@ -64,7 +64,7 @@ class CircularSplineLobing(Effect):
             {"lobes": n},
             met=Waves(Spline.CIRCULAR, (n,)),
             trials=float(len(LOBES)),
-            odds=FEW_LOBES_ODDS if n < BOLT_CIRCLE else 0.0,
+            odds=FEW_LOBES_ODDS if n < JAWS else 0.0,
         )
 
     def orders(self, shape: Shape, ratio: float) -> list[float]:

@@ -16,6 +16,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.effects._friction_law import LAWS, NAMES, Law
 from hdopt.effects._friction_torque import friction_columns, half_loop, passes_of
+from hdopt.effects._speed_laws import weights_by_speed
 from hdopt.effects.base import Effect, terms_at
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Category, Quantity
@@ -96,6 +97,10 @@ class Hysteresis(Effect):
             steps={"transition_deg": 0.02 * delta},
             trials=14.0 * len(LAWS),
         )
+
+    def other_laws(self, conditions: Conditions, shape: Shape) -> Sequence[Array]:
+        columns = self.term(conditions, shape).columns
+        return [] if columns is None else [columns * weight[:, None] for weight in weights_by_speed(conditions)]
 
     def predict(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
         """The term of a drive that has run in: no limits by a record, no unknown start."""

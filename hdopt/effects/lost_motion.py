@@ -16,6 +16,7 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
+from hdopt.effects._speed_laws import weights_by_speed
 from hdopt.effects.base import Effect, Keys
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Quantity, needed, number, polar, sine_and_cosine
@@ -87,6 +88,10 @@ class LostMotion(Effect):
             angle = shape["order"] * conditions.theta
             parts += [step * np.sin(angle), step * np.cos(angle)]
         return Term(self.id, dict(shape), columns=np.column_stack(parts), trials=3.0 if "order" in shape else 1.0)
+
+    def other_laws(self, conditions: Conditions, shape: Shape) -> Sequence[Array]:
+        columns = self.term(conditions, shape).columns
+        return [] if columns is None else [columns * weight[:, None] for weight in weights_by_speed(conditions)]
 
     def highest_order(self, shape: Shape, ratio: float) -> float:
         return float(shape.get("order", 0))

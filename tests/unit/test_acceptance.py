@@ -248,8 +248,8 @@ def test_a_term_that_slow_wander_could_be_is_not_named(lost, said, monkeypatch):
 def test_a_resonance_has_the_numbers_of_what_swings(values, spread, said):
     """Gain, drag, Hz and damping ratio with their standard deviations: as drives have them, or as far as the interval
     reaches, but for the damping, whose interval holds every one where nothing swings: of seven names with a damping
-    above 0.3 in the registered runs six were wrong. The second row is what a delay of 1 ms was named as in case 20 of seed 90210 of the simulated bench. Fault
-    caught: a warning alone where the gain is nothing.
+    above 0.3 in the registered runs six were wrong. The second row is what a delay of 1 ms was named as in case 20 of
+    seed 90210 of the simulated bench. Fault caught: a warning alone where the gain is nothing.
     """
     resonance = EFFECTS["resonance"]
     shape = {"frequency_hz": values[2], "damping_ratio": values[3], "foot": Foot.WHOLE_MOTION}

@@ -13,6 +13,8 @@ from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.stages import begin
 from hdopt.diagnosis.verdict import rules
 from hdopt.effects import EFFECTS
+from hdopt.effects._friction_law import Law
+from hdopt.effects._speed_laws import weights_by_speed
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.study import load_study
 from tests.unit.test_diagnosis import bench
@@ -59,6 +61,38 @@ def test_a_law_is_asked_in_place_of_the_effects_own():
     assert other_law(recorded(1.4), 1.0).log_evidence < 1.0
 
 
+def shifted(effect, shape, law, speeds=(0.5, 1.0)):
+    """The fit of `effect` at `shape` to records in which the two directions lie apart by a `law` of the speed."""
+    study = load_study(drive="csf-25-80")
+    records = bench(
+        study, lambda motion: 0.15 * motion["direction"] * law(abs(motion["speed"])), turns=20, rate=60, speeds=speeds
+    )
+    state = begin(records, CartesianModel.of(study.drive), 1, DEFAULT)
+    return joint_fit(state.base, [EFFECTS[effect].term(state.problem.rows, shape)])
+
+
+def test_the_laws_of_drag_at_half_the_largest_speed():
+    """One over its root, its root, and what fades within a quarter and a half of it; by the size of the speed alone."""
+    speed = np.tile([2.0, -1.0, 1.0, -2.0], 10)
+    half = [float(weight[1]) for weight in weights_by_speed(SimpleNamespace(locked=False, speed=speed))]
+    assert half == pytest.approx([2**0.5, 0.5**0.5, np.exp(-2.0), np.exp(-1.0)])
+    assert weights_by_speed(SimpleNamespace(locked=True, speed=speed)) == []
+    assert weights_by_speed(SimpleNamespace(locked=False, speed=None)) == []
+
+
+SHIFTS = (("lost_motion", {"ramp_arcmin": 0.05}), ("hysteresis", {"transition_deg": 0.02, "model": Law.DAHL}))
+
+
+@pytest.mark.parametrize(("effect", "shape"), SHIFTS)
+def test_play_and_friction_are_alike_at_all_speeds(effect, shape):
+    """Drag that fades with the speed, or goes with a root of it, is another law; of one speed all are the same. Faults
+    caught: a law left out; one asked where the speed hardly varies."""
+    for law in (lambda v: np.exp(-v / 0.4), lambda v: v**-0.5, lambda v: v**0.5):
+        assert other_law(shifted(effect, shape, law), 1.0).log_evidence > 2 * DEFAULT.verdict.other_law
+    assert other_law(shifted(effect, shape, np.ones_like), 1.0).log_evidence < 1.0
+    assert other_law(shifted(effect, shape, np.sqrt, speeds=(1.0, 1.1)), 1.0) == OtherLaw()
+
+
 def test_rough_noise_and_each_law_cost_evidence(monkeypatch):
     """Faults caught: the noise's roughness forgotten; three laws tried for nothing."""
     fit = recorded(0.5)
@@ -82,4 +116,4 @@ def test_the_verdict_says_that_the_law_is_another():
     said = rules.not_by_its_law(SimpleNamespace(evidence=evidence))
     assert (said.verdict, said.effects, said.where["domain"]) == ("unknown", (), "speed")
     assert said.where["rms_arcmin"] == pytest.approx(np.std(fit.contribution(0)))
-    assert "looks like channel_delay but grows with the speed by another law" in said.says
+    assert "looks like channel_delay, but another law of the speed explains it better" in said.says

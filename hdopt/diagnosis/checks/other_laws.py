@@ -1,9 +1,10 @@
-"""Whether what is named follows the law of its effect, or another of the same quantity.
+"""Whether what is named depends on the speed as its effect does, or by another law.
 
-Drag that grows with the root of the speed looks much like a delay, whose offset grows with the speed itself. What is
-left of the one by the other is small, far less than an inexact shape may leave, so that no description without physics
-wins against the catalogue. But a delay fits a delay to the last digit: of two laws with the same freedom the right one
-explains more, clearly, as soon as there are two speeds.
+Drag that grows with the root of the speed looks much like a delay, whose offset grows with the speed itself, and one
+that fades with it like play, which is alike at all speeds. What is left of the one by the other is small, far less than
+an inexact shape may leave, so that no description without physics wins against the catalogue. But a delay fits a delay
+to the last digit: of two laws with the same freedom the right one explains more, clearly, as soon as there are two
+speeds.
 """
 
 from __future__ import annotations
