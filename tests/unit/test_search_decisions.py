@@ -495,6 +495,20 @@ def test_effects_that_a_wider_variant_took_over_are_left_out(monkeypatch, by_sch
     assert refinement.widened_where_it_pays(led, Told(0.0), 1.0, (0.0, 20.0)) is led
 
 
+@pytest.mark.parametrize(("bends", "first"), [(True, "waves"), (False, "few")])
+def test_what_came_first_for_not_bending_must_not_bend_in_the_end(monkeypatch, bends, first):
+    """Few waves and lines came before many waves, and were widened to these. Fault caught: a companion stays beside
+    many waves that explain all alone."""
+    many, few = (Candidate(of(9.0, name), evidence, 0.0) for name, evidence in (("waves", 9.0), ("few", 5.0)))
+    monkeypatch.setattr(subset_search, "several_first", lambda state, candidates: [few, many])
+    monkeypatch.setattr(subset_search, "fewest_first", lambda state, candidates: candidates)
+    monkeypatch.setattr(subset_search, "widened", lambda state, candidates: candidates)
+    monkeypatch.setattr(subset_search, "has_bending", lambda fit: bends)
+    assert subset_search.in_last_order(None, [many, few])[0].effects == (first,)
+    monkeypatch.setattr(subset_search, "several_first", lambda state, candidates: candidates)
+    assert subset_search.in_last_order(None, [many, few])[0].effects == ("waves",)
+
+
 @pytest.mark.parametrize(("known", "gain"), [(900.0, 900.0), (700.0, 800.0)])
 def test_a_set_that_lost_effects_stands_once_and_by_its_better_fit(monkeypatch, by_schwarz, known, gain):
     """The set without them may be known already, from another drive: the better of both leads, with the evidence of the

@@ -41,7 +41,13 @@ from hdopt.diagnosis.search.refinement import (
     with_a_plain_term,
 )
 from hdopt.diagnosis.search.search_state import SearchPlan, SearchState, names_of
-from hdopt.diagnosis.search.several_for_one import fewest_first, several_first, several_for_one, with_teeth_in_the_zones
+from hdopt.diagnosis.search.several_for_one import (
+    fewest_first,
+    has_bending,
+    several_first,
+    several_for_one,
+    with_teeth_in_the_zones,
+)
 from hdopt.effects.met import Waves
 from hdopt.effects.term import Term
 from hdopt.parallel.shared_memory import each
@@ -85,8 +91,7 @@ def select_from(state: SearchState) -> Selection:
     for stage in STAGES:
         state = stage(state)
     candidates = acceptable_first(ranked(state), state.settings.close_behind)
-    candidates = widened(state, fewest_first(state, several_first(state, completed(state, candidates))))
-    return Selection(state.base, tuple(candidates), state.inflation)
+    return Selection(state.base, tuple(in_last_order(state, completed(state, candidates))), state.inflation)
 
 
 def first_look(base: Fit, inflation: float, rng: np.random.Generator, plan: SearchPlan) -> SearchState:
@@ -373,6 +378,18 @@ def completed(state: SearchState, candidates: list[Candidate]) -> list[Candidate
         return candidates
     best = max(found, key=lambda c: c.log_bayes_factor)
     return in_order([best, *(c for c in candidates if c.fit is not best.fit)])
+
+
+def in_last_order(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
+    """`candidates` in order of evidence, as they stand once sets that need not pay for inexact shapes came before
+    others, and the first is as wide as pays. Several effects that came first because none of them bends do not where
+    one of them bends then. `state` is where the work stands.
+    """
+    stiff = several_first(state, candidates)
+    found = widened(state, fewest_first(state, stiff))
+    if stiff[0] is candidates[0] or not has_bending(found[0].fit):
+        return found
+    return widened(state, fewest_first(state, candidates))
 
 
 def widened(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
