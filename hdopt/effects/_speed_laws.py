@@ -18,8 +18,8 @@ FADING = (0.25, 0.5)
 
 
 def weights_by_speed(conditions: Conditions) -> list[Array]:
-    """What an offset of every speed alike would be multiplied by under each of the other laws, (n,) each; none where
-    the speed is not known or hardly varies.
+    """What an offset of every speed alike would be multiplied by under each of the other laws, (n,) each, in
+    `conditions` of n rows; none where the speed is not known or hardly varies.
     """
     if conditions.locked or conditions.speed is None:
         return []

@@ -57,6 +57,7 @@ def assessed(monkeypatch):
             "noise_between_neighbours": lambda recordings: 0.01,
             "fitted_scale": lambda fit, nuisances: f"scale of {fit.name}",
             "repeated_passes": lambda fit: f"passes of {fit.name}",
+            "other_law": lambda fit, inflation: f"law beside {fit.name} at {inflation}",
         }
         for name, answer in answers.items():
             monkeypatch.setattr(assessment, name, answer)
@@ -94,6 +95,7 @@ def test_every_part_of_the_evidence_is_asked_of_its_own_fit(assessed):
     assert evidence.wave == "wave of best"
     assert evidence.scale == "scale of best"
     assert evidence.passes == "passes of best"
+    assert evidence.other_law == "law beside best at 2.0"
     assert evidence.sensor_arcmin == 0.4
     assert evidence.false_alarm_p == 0.004
 
