@@ -6,6 +6,7 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.effects.conditions import Conditions
+from hdopt.effects.term import Term
 
 LEAST_RANGE = 1.15
 """Largest over smallest speed, but for a twentieth at either end, below which no law of the speed shows."""
@@ -15,6 +16,14 @@ POWERS = (-0.5, 0.5)
 """By a root of the speed, and by one over it."""
 FADING = (0.25, 0.5)
 """Parts of the largest speed within which boundary friction fades into that of a film (Stribeck)."""
+
+
+def columns_by_speed(conditions: Conditions, term: Term) -> list[Array]:
+    """The columns of `term`, alike at every speed, under each of the other laws, (n, p) each; none where
+    `weights_by_speed` has none for the `conditions`, or where the term acts in the zones.
+    """
+    columns = term.columns
+    return [] if columns is None else [columns * weight[:, None] for weight in weights_by_speed(conditions)]
 
 
 def weights_by_speed(conditions: Conditions) -> list[Array]:

@@ -97,8 +97,8 @@ class Explanation(ABC):
         """Shapes of the same inside the meshing zones, to be tried in its place; none for most."""
         return ()
 
-    def other_laws(self, conditions: Conditions, shape: Shape) -> Sequence[Array]:
-        """Columns like those of its term at this `shape`, each (n, p), by other laws of the speed than its own; none
+    def other_laws(self, conditions: Conditions, term: Term) -> Sequence[Array]:
+        """Columns like those of its `term`, each (n, p), by other laws of the speed than its own; none
         for most. Where one of these explains better, it is not this effect that is there."""
         return ()
 

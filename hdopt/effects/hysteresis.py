@@ -16,7 +16,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.effects._friction_law import LAWS, NAMES, Law
 from hdopt.effects._friction_torque import friction_columns, half_loop, passes_of
-from hdopt.effects._speed_laws import weights_by_speed
+from hdopt.effects._speed_laws import columns_by_speed
 from hdopt.effects.base import Effect, terms_at
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Category, Quantity
@@ -98,9 +98,8 @@ class Hysteresis(Effect):
             trials=14.0 * len(LAWS),
         )
 
-    def other_laws(self, conditions: Conditions, shape: Shape) -> Sequence[Array]:
-        columns = self.term(conditions, shape).columns
-        return [] if columns is None else [columns * weight[:, None] for weight in weights_by_speed(conditions)]
+    def other_laws(self, conditions: Conditions, term: Term) -> Sequence[Array]:
+        return columns_by_speed(conditions, term)
 
     def predict(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
         """The term of a drive that has run in: no limits by a record, no unknown start."""

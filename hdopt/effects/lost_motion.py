@@ -16,7 +16,7 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
-from hdopt.effects._speed_laws import weights_by_speed
+from hdopt.effects._speed_laws import columns_by_speed
 from hdopt.effects.base import Effect, Keys
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Quantity, needed, number, polar, sine_and_cosine
@@ -89,9 +89,8 @@ class LostMotion(Effect):
             parts += [step * np.sin(angle), step * np.cos(angle)]
         return Term(self.id, dict(shape), columns=np.column_stack(parts), trials=3.0 if "order" in shape else 1.0)
 
-    def other_laws(self, conditions: Conditions, shape: Shape) -> Sequence[Array]:
-        columns = self.term(conditions, shape).columns
-        return [] if columns is None else [columns * weight[:, None] for weight in weights_by_speed(conditions)]
+    def other_laws(self, conditions: Conditions, term: Term) -> Sequence[Array]:
+        return columns_by_speed(conditions, term)
 
     def highest_order(self, shape: Shape, ratio: float) -> float:
         return float(shape.get("order", 0))

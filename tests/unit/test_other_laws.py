@@ -102,7 +102,7 @@ def test_rough_noise_and_each_law_cost_evidence(monkeypatch):
 
 def test_effects_without_other_laws_are_not_asked(monkeypatch):
     fit = recorded(0.5)
-    monkeypatch.setattr(type(DELAY), "other_laws", lambda self, conditions, shape: ())
+    monkeypatch.setattr(type(DELAY), "other_laws", lambda self, conditions, term: ())
     assert other_law(fit, 1.0) == OtherLaw()
 
 

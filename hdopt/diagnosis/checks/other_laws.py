@@ -33,7 +33,7 @@ def other_law(fit: Fit, inflation: float) -> OtherLaw:
     """
     found = OtherLaw()
     for index, term in enumerate(fit.terms):
-        laws = properties_of(term.effect).other_laws(fit.problem.rows, term.shape)
+        laws = properties_of(term.effect).other_laws(fit.problem.rows, term)
         if not laws:
             continue
         probe = FitProbe(fit, keep=fit.all_but(index))
