@@ -13,37 +13,16 @@ from hdopt.diagnosis.search.penalty import Scale
 from hdopt.diagnosis.search.plain_for_waves import is_plain_term
 from hdopt.diagnosis.search.search_state import SearchPlan
 from hdopt.diagnosis.settings import DEFAULT
+from tests.unit.test_several_for_one import Piece, Weighed
 
 NARROW = DEFAULT.search.narrow
 
 
 @dataclass(frozen=True)
-class Piece:
-    """As much of a term as is asked for."""
+class Told(Weighed):
+    """A fit whose evidence for its freedom alone (`paid`) was written down beside that by all it pays."""
 
-    effect: str
-    width: int = 2
-
-
-@dataclass(frozen=True)
-class Told:
-    """A fit whose evidence for its freedom alone was written down, and the one that leads by all it pays."""
-
-    terms: tuple
     paid: float = 0.0
-    leads: float = 0.0
-
-    @property
-    def fit(self):
-        return self
-
-    @property
-    def effects(self):
-        return tuple(term.effect for term in self.terms)
-
-    @property
-    def outside(self):
-        return any(name.startswith("_s") for name in self.effects)
 
 
 @dataclass(frozen=True)
@@ -58,7 +37,7 @@ class Standing:
 
     @property
     def leader(self):
-        return max(self.fits.values(), key=lambda fit: fit.leads, default=None)
+        return max(self.fits.values(), key=lambda fit: fit.log_bayes_factor, default=None)
 
     def weigh(self, fit):
         return fit
@@ -73,7 +52,7 @@ def standing(*fits, **more):
 
 LOBES, WHEEL, DRIFT = Piece("circular_spline_lobing"), Piece("encoder_input_eccentricity"), Piece("thermal_drift", 9)
 WAVES, SINE = Piece("cs_tooth_harmonics", NARROW + 2), Piece("_sine_in_angle")
-LED = Told((WAVES, DRIFT), paid=50.0, leads=100.0)
+LED = Told((WAVES, DRIFT), paid=50.0, log_bayes_factor=100.0)
 
 
 def test_plain_is_what_turns_with_few_coefficients_and_what_does_not_turn():
@@ -104,8 +83,11 @@ def test_plain_sets_are_searched_among_themselves_and_by_their_freedom_alone(loo
     not about what leads by all it pays. The waves still lead. Faults caught: no clean base; about the leader of all;
     one look alone; what was found not taken."""
     centres, finds = looked
-    drift, lobes = Told((DRIFT,), paid=10.0, leads=90.0), Told((DRIFT, LOBES), paid=60.0, leads=20.0)
-    three = Told((DRIFT, LOBES, WHEEL), paid=80.0, leads=10.0)
+    drift, lobes = (
+        Told((DRIFT,), paid=10.0, log_bayes_factor=90.0),
+        Told((DRIFT, LOBES), paid=60.0, log_bayes_factor=20.0),
+    )
+    three = Told((DRIFT, LOBES, WHEEL), paid=80.0, log_bayes_factor=10.0)
     clean = Told(())
     finds += [[], [lobes], [three], []]
     state = rooms.plain_for_waves(standing(LED, drift, plan=replace(SearchPlan(), clean=clean)))
@@ -117,7 +99,7 @@ def test_plain_sets_are_searched_among_themselves_and_by_their_freedom_alone(loo
 
 @pytest.mark.parametrize("leader", [(LOBES, DRIFT), (SINE,), (WAVES, SINE)])
 def test_nothing_is_searched_where_all_is_plain_or_no_physics(looked, leader):
-    state = standing(Told(leader, leads=5.0))
+    state = standing(Told(leader, log_bayes_factor=5.0))
     assert rooms.plain_for_waves(state) is state
     assert rooms.plain_for_waves(standing()).fits == {}
     assert looked[0] == []
