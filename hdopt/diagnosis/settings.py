@@ -313,6 +313,9 @@ class HeldOutSettings:
         0.2, "1", "choice: share of the turns that a whole diagnosis never sees, as in one of five folds"
     )
     nested_training: int = threshold(6, "input turns", "choice: turns that are left to it at least")
+    nested_rows: int = threshold(
+        16000, "rows", "choice: effort; of longer recordings more turns are hidden, until it has no more rows"
+    )
     flips: int = threshold(99, "1", "theorem: resolves a chance of 1 in 100")
     flips_of_nothing: int = threshold(
         19, "1", "choice: flips where too little is explained for a name, so that none hangs on the chance"

@@ -29,7 +29,7 @@ from hdopt.diagnosis.inference.settled_shapes import settled
 from hdopt.diagnosis.orientation import Orientation, is_decisive, preference, turn_round
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.high_order import find_ripple, strong_ripple, subtract, subtracted_terms
-from hdopt.diagnosis.search.search_state import SearchPlan, SearchState, names_of
+from hdopt.diagnosis.search.search_state import SearchPlan
 from hdopt.diagnosis.search.subset_search import Selection, first_look, leading_evidence, select, select_from
 from hdopt.diagnosis.settings import DiagnosisSettings
 from hdopt.diagnosis.state import Guess, State
@@ -192,9 +192,8 @@ def begin_turned(state: State) -> State:
     asked = ("drift",) if state.nuisances.drift else ()
     taken = None if state.nuisances.taken is None else state.nuisances.taken.turned
     rng = np.random.default_rng(seed)
-    return set_strong_ripple_aside(
-        first_fit(turn_round(state.recordings), state.problem.base, rng, state.settings, asked, taken)
-    )
+    turned = first_fit(turn_round(state.recordings), state.problem.base, rng, state.settings, asked, taken)
+    return set_strong_ripple_aside(replace(turned, guesses=state.guesses))
 
 
 def smooth_model(
@@ -271,18 +270,21 @@ def unexplained(state: State) -> float:
 
 
 def plan_of(state: State) -> SearchPlan:
-    """What a search from `state` on is to do."""
-    known = leaders_on(state.selection, state.problem)
+    """What a search from `state` on is to do: what was found in another noise, and elsewhere, is where it begins."""
+    known = (*leaders_on(state.selection, state.problem), *guesses_here(state))
     wavy = None if state.wavy is None else drive_with_terms(state.wavy, state.problem)
     return SearchPlan(skip=state.ruled_out, clean=state.clean, wavy=wavy, known=known)
 
 
 def search_effects(state: State) -> State:
     """Which effects explain what the base leaves, unless it was looked for already: in this noise that stands, in
-    another it is where the search begins. `state` is where the work stands.
+    another it is where the search begins. What was found elsewhere does not save the first look. `state` is where the
+    work stands.
     """
     if state.searched:
         return state
+    if state.looked is None and guesses_here(state):
+        state = with_first_look(state)
     if state.looked is None:
         rng = state.draws()
         found = select(state.base, state.inflation, rng, plan_of(state))
@@ -292,28 +294,14 @@ def search_effects(state: State) -> State:
     return replace(state.found(found), rng=rng, searched=True, looked=None)
 
 
-def try_guesses(state: State) -> State:
-    """What was found on other rows of the recordings, from where it stood there: the two zones of a drive make many
-    minima, and what is better here was missed by the search. A gear without a base has no zones. `state` is where the
-    work stands.
+def guesses_here(state: State) -> tuple[Fit, ...]:
+    """What was found on other rows of the recordings, as they are counted at `state`, from where it stood there: the
+    two zones of a drive make many minima, of which a search may miss the best. A gear without a base has no zones.
     """
-    if state.problem.base is None or not state.guesses:
-        return state
-    known = {names_of(fit): fit for fit in leaders_on(state.selection, state.problem)}
-    look = SearchState(state.base, plan_of(state), state.inflation, state.draws())
-    least = state.selection.best.log_bayes_factor + state.settings.search.better
-    better = False
-    for guess in state.guesses:
-        if guess.turned != state.orientation.turned:
-            continue
-        fit = refine(guessed(guess, state.problem), state.settings.fit.known_iterations)
-        if look.log_bayes_factor(fit) > least:
-            known[names_of(fit)], better = fit, True
-    if not better:
-        return state
-    rng = state.draws()
-    plan = SearchPlan(skip=state.ruled_out, known=tuple(known.values()))
-    return replace(state.found(select(state.base, state.inflation, rng, plan)), rng=rng)
+    if state.problem.base is None:
+        return ()
+    here = (guess for guess in state.guesses if guess.turned == state.orientation.turned)
+    return tuple(guessed(guess, state.problem) for guess in here)
 
 
 def guessed(guess: Guess, problem: FitProblem) -> Fit:
@@ -422,7 +410,6 @@ STAGES: tuple[Callable[[State], State], ...] = (
     fit_base_in_noise,
     choose_orientation,
     search_effects,
-    try_guesses,
     measure_noise_again,
     search_high_orders,
     search_without_ripple,

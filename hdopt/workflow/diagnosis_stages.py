@@ -30,7 +30,6 @@ def _stages() -> dict[CodeType, str]:
         stages.choose_orientation: "which way the angles count",
         stages.choose_orientation_at_first_look: "which way the angles count",
         stages.search_effects: "search of effects",
-        stages.try_guesses: "what the first pass found",
         stages.measure_noise_again: "noise without what was found",
         stages.search_high_orders: "tooth mesh and encoder lines",
         stages.search_without_ripple: "search without the ripple",

@@ -8,6 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from hdopt.diagnosis.inference import clean_base
+from hdopt.diagnosis.inference.base_fit import fit_base
 from hdopt.diagnosis.inference.clean_base import (
     WAVES_OF_TEETH,
     beside_smooth,
@@ -108,9 +110,10 @@ def test_a_base_that_leaves_a_quarter_more_than_noise_may_be_wavy(left, wavy):
     assert is_left_wavy(SimpleNamespace(objective=left * 25.0, problem=problem)) is wavy
 
 
-def test_waves_that_take_up_little_are_not_the_teeths():
+def test_waves_that_take_up_little_are_not_the_teeths(monkeypatch):
     """A sine at a foreign order, twenty times the noise, beside waves of a few times it: these pay for their freedom,
-    but no wave of the teeth explains the sine. Fault caught: a search about a base that was bent to it.
+    but no wave of the teeth explains the sine. Faults caught: a search about a base that was bent to it; fewer waves
+    fitted where all of them leave most of it.
     """
     _, _, _, smooth = recorded(0.2)
     problem = smooth.problem
@@ -120,7 +123,11 @@ def test_waves_that_take_up_little_are_not_the_teeths():
         smooth, problem=replace(problem, rows=rows), objective=float(np.sum((smooth.residual + added) ** 2))
     )
     assert other.objective > DEFAULT.base.wavy * len(rows) * NOISE**2
+    fitted = []
+    monkeypatch.setattr(clean_base, "fit_base", lambda *about, **more: fitted.append(more) or fit_base(*about, **more))
     assert beside_waves(other, np.random.default_rng(2)) is None
+    ((flex, circular),) = (more["terms"] for more in fitted)
+    assert flex.width == circular.width == 2 * (8 - 1)  # 48 rows a turn hold no 24 waves
 
 
 def test_a_search_goes_about_the_base_beside_waves_with_draws_of_its_own(monkeypatch):

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from hdopt.diagnosis import diagnose
+from hdopt.diagnosis.inference import hidden_turns
 from hdopt.diagnosis.inference.cross_validation import held_out, turn_folds
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.hidden_turns import hidden_samples, uncut_blocks, without_samples
@@ -91,6 +92,25 @@ def test_turns_are_hidden_where_enough_are_on_either_side(share, hidden):
     found = hidden_samples(pass_of_15, np.random.default_rng(1), settings)
     turns = None if found is None else len(np.unique(gather(pass_of_15).block[found[0]]))
     assert turns == hidden
+
+
+@pytest.mark.parametrize(("rows", "left"), [(1000, 21), (1920, 32), (100, 6)])
+def test_of_a_long_recording_no_more_turns_are_left_than_are_needed(rows, left):
+    """Forty turns of 48 rows, 36 of which can be hidden: 1000 rows are 20.8 turns, 1920 all of them, of which a fifth
+    is hidden, and 100 fewer than the six that are needed at least. Fault caught: four fifths of ten thousand turns.
+    """
+    settings = replace(DEFAULT.held_out, nested_rows=rows)
+    recording = record(noise())
+    (hidden,) = hidden_samples([recording], np.random.default_rng(1), settings)
+    assert gather([recording]).blocks - len(np.unique(gather([recording]).block[hidden])) == left
+
+
+def test_rows_of_a_long_recording_are_means_of_samples(monkeypatch):
+    """1920 samples make 480 rows of four: of a limit of 480 nothing more is hidden, of 240 half of the turns."""
+    monkeypatch.setattr(hidden_turns, "neighbours_for", lambda recordings: 4)
+    for limit, hidden in ((480, round(DEFAULT.held_out.nested_share * 40)), (240, 20)):
+        settings = replace(DEFAULT.held_out, nested_rows=limit)
+        assert hidden_turns.turns_to_hide([record(noise())], 40, settings) == hidden
 
 
 def test_what_is_left_has_a_gap_where_turns_were_and_the_rest_as_it_was():

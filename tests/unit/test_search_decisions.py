@@ -324,6 +324,65 @@ def test_a_search_goes_on_about_a_new_leader_alone(beside):
     assert state.rng.bit_generator.seed_seq.n_children_spawned == 0
 
 
+@pytest.fixture
+def gone_through(monkeypatch):
+    """`of(state, after)`: which stages `select_from` goes through from `state` on, where those of a search that goes on
+    find the fits `after`."""
+
+    def of(state, *after):
+        through = []
+
+        def again(state):
+            through.append("again")
+            return state.taking(after)
+
+        monkeypatch.setattr(subset_search, "STAGES_AGAIN", (again,))
+        monkeypatch.setattr(subset_search, "STAGES", (lambda state: through.append("all") or state,))
+        monkeypatch.setattr(subset_search, "in_last_order", lambda state, candidates: candidates)
+        monkeypatch.setattr(subset_search, "completed", lambda state, candidates: candidates)
+        return through, subset_search.select_from(state)
+
+    return of
+
+
+def test_a_search_goes_on_from_what_was_known_until_another_set_leads(weighed, gone_through):
+    """All stages where nothing is known; those of a search that goes on where the first of what is known leads still;
+    both where another set leads, or nothing. Faults caught: the whole search done again in every noise, and what a
+    search that goes on finds taken without one.
+    """
+    first, second = of(50.0, "tooth"), of(40.0, "delay")
+    known = SearchPlan(known=(first, second))
+    assert gone_through(state_of())[0] == ["all"]
+    through, selection = gone_through(state_of(plan=known), first, second)
+    assert through == ["again"]
+    assert selection.best.effects == ("tooth",)
+    assert gone_through(state_of(plan=known), of(55.0, "tooth"), of(60.0, "tooth", "delay"))[0] == ["again", "all"]
+    assert gone_through(state_of(plan=known), replace(first, evidence=30.0), second)[0] == ["again", "all"]
+    assert gone_through(state_of(plan=known), of(-5.0, "tooth"))[0] == ["again", "all"]
+
+
+def test_of_what_is_known_the_better_fit_stays(weighed, monkeypatch):
+    """Fault caught: the fit of a first look replaced by a worse one that was found elsewhere."""
+    monkeypatch.setattr(subset_search, "refine", lambda fit, iterations: replace(fit, evidence=fit.evidence + 1.0))
+    plan = SearchPlan(known=(of(40.0, "tooth"), of(30.0, "delay")))
+    after = subset_search.refit_known(state_of(of(50.0, "tooth"), of(20.0, "delay"), plan=plan))
+    assert {fit.evidence for fit in after.fits.values()} == {50.0, 31.0}
+
+
+def test_a_search_that_goes_on_leaves_out_what_looks_for_sets_of_other_kinds():
+    """In the order of the search. Fault caught: a stage lost, or the dear ones done in every noise."""
+    again = [stage for stage in subset_search.STAGES_AGAIN if stage is not subset_search.refit_known]
+    assert again == [stage for stage in subset_search.STAGES if stage in again]
+    assert {stage.__name__ for stage in set(subset_search.STAGES) - set(again)} == {
+        "explore_base",
+        "look_beside_flexible_leader",
+        "with_teeth_in_the_zones",
+        "several_for_one",
+        "plain_for_waves",
+    }
+    assert subset_search.STAGES_AGAIN[0] is subset_search.refit_known
+
+
 def test_the_look_beside_a_far_drive_follows_the_search_about_the_leader():
     stages = subset_search.STAGES
     assert stages.index(subset_search.beside_a_far_drive) == stages.index(subset_search.search_about_leader) + 1

@@ -173,13 +173,15 @@ def test_after_both_searches_what_effects_and_base_explain_together_decides(monk
 @pytest.mark.parametrize("taken", [None, TakenSlope(0.01, 4.0)])
 def test_a_recording_turned_round_begins_as_the_other_did(monkeypatch, drift, taken):
     """Faults caught: the drift that was asked for forgotten, a slope taken out about the angle as it was counted, a
-    strong ripple left in.
+    strong ripple left in, what a part of the turns was found to hold forgotten.
     """
-    monkeypatch.setattr(stages, "first_fit", lambda *about: about)
-    monkeypatch.setattr(stages, "set_strong_ripple_aside", lambda state: ("set aside", *state))
-    state = state_of(Told(""), drift=drift, taken=taken)
-    said, (record,), base, _, settings, asked, slope = stages.begin_turned(state)
-    assert (said, base, settings, asked) == ("set aside", "a base", DEFAULT, ("drift",) if drift else ())
+    begun = []
+    monkeypatch.setattr(stages, "first_fit", lambda *about: begun.append(about) or state_of(Told("turned")))
+    monkeypatch.setattr(stages, "set_strong_ripple_aside", lambda state: ("set aside", state.guesses))
+    state = replace(state_of(Told(""), drift=drift, taken=taken), guesses=("told",))
+    assert stages.begin_turned(state) == ("set aside", ("told",))
+    (((record,), base, _, settings, asked, slope),) = begun
+    assert (base, settings, asked) == ("a base", DEFAULT, ("drift",) if drift else ())
     np.testing.assert_array_equal(record.input_angle, -state.recordings[0].input_angle)
     assert slope == (None if taken is None else TakenSlope(0.01, -4.0))
 
@@ -187,49 +189,38 @@ def test_a_recording_turned_round_begins_as_the_other_did(monkeypatch, drift, ta
 GUESS = Guess(np.full(12, 0.01), (("tooth_mesh", {}),), (np.ones(2),), False)
 
 
-@pytest.fixture
-def guessing(monkeypatch):
-    """`of(evidence of the guess, ...)`: the plan of the search that follows a guess, None where none does; what is
-    known has an evidence of 100."""
-
-    def of(worth, base="a base", inflation=4.0):
-        plans, roughness = [], []
-        known, told = Told("known", terms=("a",)), Told("told", terms=("b",))
-        state = state_of(
-            Told("base", problem=Problem(base=base)),
-            inflation=inflation,
-            selection=selection_of(known, 100.0),
-            guesses=(GUESS,),
-        )
-
-        def look(base, plan, inflation, rng):
-            roughness.append(inflation)
-            return SimpleNamespace(log_bayes_factor=lambda fit: worth)
-
-        monkeypatch.setattr(stages, "leaders_on", lambda selection, problem: (known,))
-        monkeypatch.setattr(stages, "names_of", lambda fit: fit.name)
-        monkeypatch.setattr(stages, "guessed", lambda guess, problem: told)
-        monkeypatch.setattr(stages, "refine", lambda fit, iterations: fit)
-        monkeypatch.setattr(stages, "SearchState", look)
-        monkeypatch.setattr(
-            stages, "select", lambda base, inflation, rng, plan: plans.append(plan) or selection_of(base)
-        )
-        stages.try_guesses(replace(state, ruled_out=("bearing_pass",)))
-        return plans[0] if plans else None, roughness
-
-    return of
-
-
-def test_a_guess_is_tried_beside_what_is_known_where_it_is_better(guessing):
-    """Faults caught: a guess that need not be better than what was found, one that must be much better, what is known
-    here or ruled out forgotten, evidence without the noise's roughness.
+def test_what_was_found_elsewhere_is_where_a_search_begins(monkeypatch):
+    """After what was found here in another noise. Faults caught: guesses dropped, or what was known here, tried on
+    recordings that are counted the other way round, or on a gear without a base.
     """
-    plan, roughness = guessing(100.1)
-    assert [fit.name for fit in plan.known] == ["known", "told"]
-    assert plan.skip == ("bearing_pass",)
-    assert roughness == [4.0]
-    assert guessing(99.9)[0] is None
-    assert guessing(100.1, base=None)[0] is None
+    monkeypatch.setattr(stages, "leaders_on", lambda selection, problem: ("known",))
+    monkeypatch.setattr(stages, "guessed", lambda guess, problem: ("told", guess.turned))
+    turned = replace(GUESS, turned=True)
+    state = replace(state_of(Told("base", problem=Problem(base="a base"))), guesses=(turned, GUESS))
+    assert stages.plan_of(state).known == ("known", ("told", False))
+    other = replace(state, orientation=Orientation(-1, -1, "data"))
+    assert stages.plan_of(other).known == ("known", ("told", True))
+    gear = state_of(Told("base", problem=Problem(base=None)), guesses=(GUESS,))
+    assert stages.plan_of(gear).known == ("known",)
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_what_was_found_elsewhere_does_not_save_the_first_look(monkeypatch, told):
+    """Fault caught: a search that sees only what a part of the turns saw. Without guesses there is nothing to save, and
+    the search takes its first look itself.
+    """
+    searched = []
+    monkeypatch.setattr(stages, "guesses_here", lambda state: ("told",) if told else ())
+    look = SimpleNamespace(rng=np.random.default_rng(3))
+    monkeypatch.setattr(stages, "with_first_look", lambda way: searched.append("look") or replace(way, looked=look))
+    monkeypatch.setattr(stages, "plan_of", lambda state: "its plan")
+    monkeypatch.setattr(
+        stages, "replace", lambda one, **new: SimpleNamespace(**new) if one is look else replace(one, **new)
+    )
+    monkeypatch.setattr(stages, "select_from", lambda state: searched.append("from it") or selection_of(Told("found")))
+    monkeypatch.setattr(stages, "select", lambda *about: searched.append("anew") or selection_of(Told("found")))
+    assert stages.search_effects(state_of(Told("base"))).searched
+    assert searched == (["look", "from it"] if told else ["anew"])
 
 
 def test_a_guess_stands_where_it_stood(monkeypatch):

@@ -116,7 +116,16 @@ def beside_waves(smooth: Fit, rng: np.random.Generator) -> Fit | None:
         terms = tuple(effect.term(problem.rows, {"members": run}, smooth.motion) for effect, run in waves)
         return fit_base(problem, own_rng, settings.starts_clean, terms=terms)
 
+    def takes_up(fit: Fit) -> bool:
+        return fit.objective - of_noise < settings.wavy_share * (smooth.objective - of_noise)
+
     sets = [members for members in WAVES_OF_TEETH if able(members)]
-    fits = [smooth, *each(fitted, zip(sets, rng.spawn(len(sets)), strict=True))]
-    best = min(fits, key=cost)
-    return best if best.objective - of_noise < settings.wavy_share * (smooth.objective - of_noise) else None
+    if not sets:
+        return None
+    *fewer, all_waves = zip(sets, rng.spawn(len(sets)), strict=True)
+    most = fitted(all_waves)
+    # What all waves leave, fewer of them leave too.
+    if not takes_up(most):
+        return None
+    best = min([smooth, *each(fitted, fewer), most], key=cost)
+    return best if takes_up(best) else None

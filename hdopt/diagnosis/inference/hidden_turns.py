@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -11,7 +12,7 @@ import numpy as np
 from hdopt.arrays import Array, Index, Mask
 from hdopt.diagnosis.settings import HeldOutSettings
 from hdopt.recordings.recording import Recording
-from hdopt.recordings.rows import Rows, gather
+from hdopt.recordings.rows import Rows, gather, neighbours_for
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,21 @@ def hidden_samples(
     if len(rows) != sum(len(one) for one in recordings):
         return None  # A slow sweep of a locked input, of which many samples make one row.
     free = uncut_blocks(rows)
-    most = min(round(settings.nested_share * rows.blocks), len(free))
+    most = min(turns_to_hide(recordings, rows.blocks, settings), len(free))
     if most < settings.fewest_turns or rows.blocks - most < settings.nested_training:
         return None
     chosen = np.isin(rows.block, rng.permutation(free)[:most])
     bounds = np.cumsum([0, *(len(one) for one in recordings)])
     return tuple(chosen[a:b] for a, b in pairwise(bounds))
+
+
+def turns_to_hide(recordings: Sequence[Recording], turns: int, settings: HeldOutSettings) -> int:
+    """How many of the `turns` of the `recordings` to hide: a share of them, or as many as leave no more rows than a
+    diagnosis needs, by the `settings`.
+    """
+    rows = sum(len(one) for one in recordings) / neighbours_for(recordings)
+    needed = max(math.ceil(turns * settings.nested_rows / rows), settings.nested_training)
+    return max(round(settings.nested_share * turns), turns - needed)
 
 
 def uncut_blocks(rows: Rows) -> Index:

@@ -87,11 +87,28 @@ def select(base: Fit, inflation: float, rng: np.random.Generator, plan: SearchPl
 
 
 def select_from(state: SearchState) -> Selection:
-    """`select` where the work stands at `state`: a first look is not taken twice."""
-    for stage in STAGES:
-        state = stage(state)
+    """`select` where the work stands at `state`: a first look is not taken twice, and what an earlier search found is
+    looked about first; all else is done again only where another set of effects leads then.
+    """
+    if state.plan.known:
+        state = through(STAGES_AGAIN, state)
+    if not leads_still(state):
+        state = through(STAGES, state)
     candidates = acceptable_first(ranked(state), state.settings.close_behind)
     return Selection(state.base, tuple(in_last_order(state, completed(state, candidates))), state.inflation)
+
+
+def through(stages: Sequence[Callable[[SearchState], SearchState]], state: SearchState) -> SearchState:
+    """`state` after one of the `stages` after the other."""
+    for stage in stages:
+        state = stage(state)
+    return state
+
+
+def leads_still(state: SearchState) -> bool:
+    """Whether the set of effects that led an earlier search, the first of those known, leads at `state` too."""
+    leader, known = state.leader, state.plan.known
+    return leader is not None and bool(known) and names_of(leader.fit) == names_of(known[0])
 
 
 def first_look(base: Fit, inflation: float, rng: np.random.Generator, plan: SearchPlan) -> SearchState:
@@ -108,9 +125,7 @@ def leading_evidence(state: SearchState) -> float:
 def refit_known(state: SearchState) -> SearchState:
     """The leaders of an earlier search, refitted on these rows and this noise. `state` is where the work stands."""
     iterations = state.base.problem.settings.fit.known_iterations
-    for fit in each(lambda fit: refine(fit, iterations), state.plan.known):
-        state = state.with_fit(fit)
-    return state
+    return state.taking(each(lambda fit: refine(fit, iterations), state.plan.known))
 
 
 def explore_base(state: SearchState) -> SearchState:
@@ -324,7 +339,6 @@ def base_beside_leader(state: SearchState) -> SearchState:
 
 
 STAGES: tuple[Callable[[SearchState], SearchState], ...] = (
-    refit_known,
     explore_base,
     explore_clean_base,
     look_beside_flexible_leader,
@@ -341,6 +355,22 @@ STAGES: tuple[Callable[[SearchState], SearchState], ...] = (
     base_beside_leader,
 )
 """The search, in the order of its work."""
+
+STAGES_AGAIN = (
+    refit_known,
+    explore_clean_base,
+    search_about_leader,
+    beside_a_far_drive,
+    refit_close_rivals,
+    beside_what_is_told,
+    leave_out_hidden_parts,
+    shorten_wide_terms,
+    leave_out_each_term,
+    base_beside_leader,
+)
+"""What of it is done where an earlier search, on other rows or in another noise, has looked for sets of other kinds in
+place of its leader.
+"""
 
 
 def ranked(state: SearchState) -> list[Candidate]:
