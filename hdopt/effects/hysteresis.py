@@ -35,6 +35,7 @@ class Hysteresis(Effect):
     place = 50
     domain = "reversal"
     lasting = 1
+    has_parts = True
     shifts_one_way = True
     separating = (
         "reverse after short and long travels and record the crossing: friction crosses gradually, play at once"
@@ -97,6 +98,11 @@ class Hysteresis(Effect):
             steps={"transition_deg": 0.02 * delta},
             trials=14.0 * len(LAWS),
         )
+
+    def every_part_shows(self, term: Term, estimate: FitEstimate) -> bool:
+        """Whether it crosses over within the longest crossing: what is drawn to that end relaxes, in time or far
+        travel, and is no friction."""
+        return float(term.shape.get("transition_deg", 0.0)) < LONGEST_DEG
 
     def other_laws(self, conditions: Conditions, term: Term) -> Sequence[Array]:
         return columns_by_speed(conditions, term)

@@ -60,6 +60,20 @@ def test_friction_does_not_know_where_a_recording_began():
     assert none.width == 1
 
 
+@pytest.mark.parametrize(("asked", "is_friction"), [(0.5, True), (9.9, True), (10.0, False), (40.0, False)])
+def test_friction_that_is_drawn_to_its_longest_crossing_is_none(asked, is_friction):
+    """In passes of sixty input turns, long enough for any crossing. Fault caught: what relaxes for minutes
+    after a reversal, named friction that crosses over within 10 deg (case 33 of run-014).
+    """
+    hysteresis = EFFECTS["hysteresis"]
+    rows = moving(passes=(60, 60))
+    assert 0.25 * rows.travel.max() > 40
+    term = hysteresis.term(rows, {"transition_deg": asked, "model": Law.DAHL})
+    nothing = FitEstimate(np.zeros(term.freedom), np.eye(term.freedom))
+    assert hysteresis.has_parts
+    assert hysteresis.every_part_shows(term, nothing) is is_friction
+
+
 def test_both_directions_lie_a_whole_loop_apart():
     half = {"half_loop_arcmin": Parameter(0.25, 0.2, 0.3, "arcmin"), "transition_deg": Parameter(2, 1, 3, "deg")}
     said = EFFECTS["hysteresis"].sentence({"model": Law.DAHL}, half, 0.1)

@@ -142,8 +142,8 @@ def confounded_items(diagnosis: Diagnosis) -> list[Table | Text]:
 
 
 HELD_OUT_BARS = {
-    "chosen without these turns": "Chosen without these turns: a fifth of all or more, hidden from every stage, predicted "
-    "by what the others alone led to.",
+    "chosen without these turns": "Chosen without these turns: a fifth of all or more, hidden from every stage, "
+    "predicted by what the others alone led to.",
     "fitted without these turns": "Fitted without these turns: what the search on all turns found, where the others "
     "alone prefer it to that.",
     "placebo": "Placebo: the best other effect of the catalogue.",
