@@ -59,14 +59,16 @@ class Part:
         """Errors on the hidden turns of the best set of `found`, the last state of the diagnosis of all turns, fitted
         to those that were left, on the rows of `found`: without the ripple that it took out. None where the turns that
         were left do not clearly prefer it to what was found on them alone, by Schwarz's criterion, and where it has
-        many waves of an effect that was not found on them: in which waves these are the hidden turns had a say.
+        many waves of an effect that was not found on them, or nothing beside such a ripple: in which waves these are
+        the hidden turns had a say.
         """
         best = found.selection.best.fit
         settings = best.problem.settings
-        if best.problem.base is None or not best.terms or len(best.residual) != len(self.best.residual):
+        ripple = () if found.high is None else found.high.best.fit.terms
+        if best.problem.base is None or len(best.residual) != len(self.best.residual):
             return None
-        many_waves = {term.effect for term in best.terms if bends_to_anything(term, settings.penalty)}
-        if not many_waves <= set(self.effects):
+        seen = [term for term in best.terms if bends_to_anything(term, settings.penalty)] if best.terms else ripple
+        if not (best.terms or ripple) or not {term.effect for term in seen} <= set(self.effects):
             return None
         problem = best.problem.with_noise(best.problem.noise.without(self.touched))
         base, fit = (
