@@ -568,6 +568,26 @@ def test_what_came_first_for_not_bending_must_not_bend_in_the_end(monkeypatch, b
     assert subset_search.in_last_order(None, [many, few])[0].effects == ("waves",)
 
 
+@pytest.mark.parametrize("led", [("waves", "wheel"), ("waves",)])
+def test_what_was_widened_is_held_against_sets_of_no_more_coefficients(monkeypatch, by_schwarz, led):
+    """Few waves led, and were widened to thirteen; fewer coefficients, of few waves and a code wheel, may explain more,
+    and are widened in their turn. Faults caught: the widened set held against none (case 10 of run-016), or by the gain
+    that it had before.
+    """
+    few, wheel = (Candidate(of(0.0, *names, gain=900.0), 9.0, 900.0) for names in (("waves",), ("waves", "wheel")))
+    asked = []
+
+    def fewest_first(state, candidates):
+        asked.append([(c.effects, c.gain) for c in candidates])
+        return candidates if len(asked) == 1 or led == few.effects else [wheel, few]
+
+    monkeypatch.setattr(subset_search, "fewest_first", fewest_first)
+    monkeypatch.setattr(subset_search, "widened_where_it_pays", lambda fit, *about: replace(fit, gain=fit.gain + 50.0))
+    found = subset_search.fewest_and_wide(state_of(few.fit, wheel.fit), [few, wheel])
+    assert asked[1][0] == (("waves",), 950.0)
+    assert (found[0].effects, found[0].gain) == (led, 950.0)
+
+
 @pytest.mark.parametrize(("known", "gain"), [(900.0, 900.0), (700.0, 800.0)])
 def test_a_set_that_lost_effects_stands_once_and_by_its_better_fit(monkeypatch, by_schwarz, known, gain):
     """The set without them may be known already, from another drive: the better of both leads, with the evidence of the
@@ -579,7 +599,7 @@ def test_a_set_that_lost_effects_stands_once_and_by_its_better_fit(monkeypatch, 
     rest = [Candidate(alone, 70.0, known), Candidate(other, 60.0, 10.0)]
     found = subset_search.widened(state, [first, *rest])
     assert [c.effects for c in found] == [("waves",), ("other",)]
-    assert found[0].log_bayes_factor == 80.0 and found[0].fit.gain == gain
+    assert found[0].log_bayes_factor == 80.0 and found[0].fit.gain == found[0].gain == gain
     monkeypatch.setattr(subset_search, "widened_where_it_pays", lambda fit, *about: fit)
     assert subset_search.widened(state, [first, *rest]) == [first, *rest]
 

@@ -81,17 +81,23 @@ def several_first(state: SearchState, candidates: list[Candidate]) -> list[Candi
 
 def fewest_first(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
     """`candidates` in order of evidence, but first a set that explains more than the first with no more coefficients,
-    clearly so, and is not just the same effects and others: it does not pay for being alike, or of two kinds, since
-    nothing of it can stand for what an inexact shape of the first leaves. Each of its effects must pay for its freedom.
-    `state` is where the work stands.
+    clearly so: it does not pay for being alike, or of two kinds, since nothing of it can stand for what an inexact
+    shape of the first leaves. The same effects in fewer coefficients, and others, pay as of another kind: what fewer
+    waves leave is taken up by more of them, not by what explains more than they. Each of its effects must pay for its
+    freedom. `state` is where the work stands.
     """
-    first = candidates[0]
+    first, scale = candidates[0], state.scale
 
     def freedom(candidate: Candidate) -> float:
         return sum(term.freedom for term in candidate.fit.terms)
 
     def paid(candidate: Candidate) -> float:
-        return paid_for_freedom(candidate, state.scale)
+        return paid_for_freedom(candidate, scale)
+
+    def ahead(candidate: Candidate) -> float:
+        has_all = set(first.effects) <= set(candidate.effects)
+        share = scale.settings.other_kind if has_all else 0.0
+        return paid(candidate) - paid(first) - share * state.top_gain / state.inflation / 2
 
     def pays(candidate: Candidate) -> bool:
         parts = (c for c in candidates if set(c.effects) < set(candidate.effects))
@@ -102,16 +108,14 @@ def fewest_first(state: SearchState, candidates: list[Candidate]) -> list[Candid
         for candidate in candidates[1:]
         if not candidate.outside
         and freedom(candidate) <= freedom(first)
-        and paid(candidate) > paid(first) + state.settings.clearly
-        and not set(first.effects) <= set(candidate.effects)
+        and ahead(candidate) > state.settings.clearly
         and pays(candidate)
         and is_acceptable(candidate.fit)
     ]
     if first.outside or not found:
         return candidates
-    best = max(found, key=paid)
-    ahead = first.log_bayes_factor + paid(best) - paid(first)
-    return with_evidence(candidates, best, ahead)
+    best = max(found, key=ahead)
+    return with_evidence(candidates, best, first.log_bayes_factor + ahead(best))
 
 
 def with_evidence(candidates: Sequence[Candidate], one: Candidate, log_bayes_factor: float) -> list[Candidate]:

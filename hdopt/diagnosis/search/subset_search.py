@@ -416,26 +416,36 @@ def in_last_order(state: SearchState, candidates: list[Candidate]) -> list[Candi
     one of them bends then. `state` is where the work stands.
     """
     stiff = several_first(state, candidates)
-    found = widened(state, fewest_first(state, stiff))
+    found = fewest_and_wide(state, stiff)
     if stiff[0] is candidates[0] or not has_bending(found[0].fit):
         return found
-    return widened(state, fewest_first(state, candidates))
+    return fewest_and_wide(state, candidates)
+
+
+def fewest_and_wide(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
+    """`candidates` in order of evidence, first the set that explains most for its coefficients, in wider variants where
+    these pay; where another set explains more than these in no more coefficients, that, as wide as pays. `state` is
+    where the work stands.
+    """
+    found = widened(state, fewest_first(state, candidates))
+    again = fewest_first(state, found)
+    return found if again[0] is found[0] else widened(state, again)
 
 
 def widened(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
     """`candidates` in order of evidence, the first with its effects in wider variants where these pay; effects that it
     lost to these stand for the set without them. `state` is where the work stands.
     """
-    first = candidates[0]
+    first, rest = candidates[0], candidates[1:]
     if not first.fit.terms:
         return candidates
     fit = widened_where_it_pays(first.fit, state.base, state.inflation, state.order_range)
     names = names_of(fit)
-    if names == names_of(first.fit):
-        return [replace(first, fit=fit), *candidates[1:]]
-    same = [fit, *([state.fits[names]] if names in state.fits else [])]
-    fit = max(same, key=lambda one: for_freedom_alone(one, state.base, state.inflation))
-    return [replace(first, fit=fit), *(one for one in candidates[1:] if names_of(one.fit) != names)]
+    if names != names_of(first.fit):
+        same = [fit, *([state.fits[names]] if names in state.fits else [])]
+        fit = max(same, key=lambda one: for_freedom_alone(one, state.base, state.inflation))
+        rest = [one for one in rest if names_of(one.fit) != names]
+    return [replace(first, fit=fit, gain=state.weigh(fit).gain), *rest]
 
 
 def may_complete(term: Term, narrow: int) -> bool:
