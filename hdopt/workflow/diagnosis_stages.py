@@ -9,9 +9,9 @@ from types import CodeType
 
 from hdopt.workflow.frames import frames_of
 
-SECOND_OVER_FIRST = (1.0, 3.0)
-"""Time of the work on all turns, with its checks, over that on four fifths of them: from where much is found in many
-rows to short records where little is, whose sign flips take most of it."""
+SECOND_OVER_FIRST = (0.5, 3.0)
+"""Time of the work on all turns, with its checks, over that on a part of them: from where much is found, and the second
+search goes on from it, to where nothing is, whose sign flips take most of it."""
 
 
 @cache
@@ -61,7 +61,7 @@ class DiagnosisWatch:
         now = time.monotonic()
         if part:
             self.in_part = True
-            return f"first of two passes, without a fifth of the turns: {stage or 'the turns left out'}"
+            return f"first of two passes, on a part of the turns: {stage or 'the turns left out'}"
         if not stage or not self.in_part:
             return stage
         if self.part_ended is None:

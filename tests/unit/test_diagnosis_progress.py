@@ -38,7 +38,7 @@ def test_every_stage_has_words_of_its_own():
 
 
 def test_a_watch_sees_stage_pass_and_what_is_left(seen, monkeypatch):
-    """Ten seconds a look: two in the first pass, then the second, of which 1 to 3 times the first is expected."""
+    """Ten seconds a look: two in the first pass, then the second, of which a half to 3 times the first is expected."""
     said, look = seen
 
     def search_effects(state):
@@ -58,10 +58,10 @@ def test_a_watch_sees_stage_pass_and_what_is_left(seen, monkeypatch):
     for _ in range(9):
         search_effects(None)
     assert said[0] == ""
-    assert said[1].endswith("without a fifth of the turns: the turns left out")
-    assert said[2].endswith("without a fifth of the turns: search of effects")
-    assert said[3] == "second pass, on all turns: search of effects, 40 to 120 s more"
-    assert said[4].endswith(", 30 to 110 s more")
+    assert said[1].endswith("on a part of the turns: the turns left out")
+    assert said[2].endswith("on a part of the turns: search of effects")
+    assert said[3] == "second pass, on all turns: search of effects, 20 to 120 s more"
+    assert said[4].endswith(", 10 to 110 s more")
     assert said[7].endswith(", up to 80 s more")
 
 
