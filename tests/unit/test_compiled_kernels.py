@@ -22,14 +22,14 @@ from hdopt.simulation.batch import stacked_peak_to_peak_arcmin, tabulate
 from hdopt.simulation.beat import kernel as beat
 from hdopt.simulation.turn import kernel as turn
 
-effect, of = sys.argv[1], drive()
+(effect, _, example), of = sys.argv[1].partition("-"), drive()
 rows = random_errors(1000, seed=1, scale=3.0).to_matrix()
 if effect == "none":
     found = matrix_peak_to_peak_arcmin(of, rows)
 else:
-    values = EFFECTS[effect].values(EFFECTS[effect].examples[0], of.geometry)
+    values = EFFECTS[effect].values(EFFECTS[effect].examples[int(example or 0)], of.geometry)
     found = stacked_peak_to_peak_arcmin(of, rows, tabulate(of, [EffectValues(effect, *values)], Operation(speed=3.0)))
-entries = (kernel.peak_to_peak_block, turn._fill, turn._fill_by_parts, beat.beat_block)
+entries = (kernel.peak_to_peak_block, turn._fill, turn._fill_by_parts, turn._fill_by_waves, beat.beat_block)
 libraries = [overload.library for each in entries for overload in each.overloads.values()]
 compiled = [library._compiled_object for library in libraries if library._compiled_object]
 print(json.dumps([found.tolist(), len(compiled), [name for code in compiled for name in drawn_in(code)]]))
@@ -54,7 +54,7 @@ def drawn_in(code):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("effect", ["none", "circular_spline_lobing", "tooth_mesh", "bearing_pass"])
+@pytest.mark.parametrize("effect", ["none", "circular_spline_lobing", "tooth_mesh", "tooth_mesh-2", "bearing_pass"])
 def test_who_compiles_finds_what_who_loads_does(effect, tmp_path):
     """To the bit: 20 to 33 % of drives with effects were others while some functions of a kernel were compiled for
     themselves, and once more with their caller. Then all calls go to the first copy that a process has: its own where

@@ -26,6 +26,7 @@ from hdopt.simulation.turn.effects import (
     spectrum_of,
     table_of,
 )
+from hdopt.simulation.turn.waves import NO_WAVES
 
 FEWEST_CELLS = 60
 """Wider cells than of effects that repeat, since each is taken in every turn, and places are looked at twice."""
@@ -107,6 +108,7 @@ def beat_of(zones: Array, cs: Array, fs: Array, turns: int, advance: float, per_
     turn = Turn(
         scan,
         NO_PARTS,
+        NO_WAVES,
         singles(rows.transpose(2, 0, 1).reshape(-1, 6)[::every]),
         on_cs if cs.size else on_cs[:0],
         cs_bend=single(largest(of_cs, 2)),

@@ -13,6 +13,7 @@ import numpy as np
 
 from hdopt.arrays import Array, Singles
 from hdopt.kinematics.lanes.single import single
+from hdopt.simulation.turn.waves import NO_WAVES, Waves, waves_of
 
 FEWEST_CELLS, MOST_CELLS = 96, 4096
 LEFT_BY_CELL, LEFT_BY_PLACE = 1e-4, 2e-5
@@ -73,6 +74,7 @@ class Turn(NamedTuple):
 
     scan: Scan
     fine: Fine
+    waves: Waves
     fixed: Singles
     cs: Singles
     cs_bend: float
@@ -98,13 +100,14 @@ def turn_of(zones: Array, cs: Array, turns: int, per_mm: float) -> Turn | None:
     tables = [table_of(spectrum, places) for spectrum in (fixed, on_cs)]
     of_cs = tables[1] if cs.size else tables[1][:0]
     if cells >= RIPPLE_FROM:
-        scan, fine, slow_cs = _with_parts(fixed, on_cs, cells, per_mm)
+        scan, fine, waves, slow_cs = _with_parts(fixed, on_cs, cells, per_mm)
         width = fine.width
     else:
-        scan, fine, slow_cs, width = scan_of(fixed, on_cs, cells), NO_PARTS, on_cs, 2 * math.pi / cells
+        scan, fine, waves, slow_cs, width = scan_of(fixed, on_cs, cells), NO_PARTS, NO_WAVES, on_cs, 2 * math.pi / cells
     return Turn(
         scan,
         fine,
+        waves,
         tables[0],
         of_cs,
         cs_bend=single(largest(slow_cs, 2)),
@@ -114,7 +117,7 @@ def turn_of(zones: Array, cs: Array, turns: int, per_mm: float) -> Turn | None:
     )
 
 
-def _with_parts(fixed: Array, on_cs: Array, cells: int, per_mm: float) -> tuple[Scan, Fine, Array]:
+def _with_parts(fixed: Array, on_cs: Array, cells: int, per_mm: float) -> tuple[Scan, Fine, Waves, Array]:
     """The scan of what is slow of two spectra, widened by the envelope of what is fast, its parts, so that they are
     `cells` at least, and what is slow on the CS."""
 
@@ -149,7 +152,7 @@ def _with_parts(fixed: Array, on_cs: Array, cells: int, per_mm: float) -> tuple[
         all_fixed.above + single(sag),
         single(width),
     )
-    return scan, fine, slow_cs
+    return scan, fine, waves_of(fixed, on_cs, highest, per_mm), slow_cs
 
 
 def _orders(spectrum: Array, first: int, last: int) -> Array:

@@ -36,7 +36,7 @@ from hdopt.simulation.turn.rows import (
 )
 
 LOOKS = 2
-"""Times that a place is looked at."""
+"""Times that a place is looked at: once where the best of them is looked at again."""
 
 
 @compiled
@@ -94,11 +94,11 @@ def _look(work: Singles, groups: int, design: Design, reach: float) -> None:
 
 
 @compiled
-def look_at_list(work: Singles, lanes: Index, count: int, design: Design, turn: Turn) -> None:
+def look_at_list(work: Singles, lanes: Index, count: int, design: Design, turn: Turn, looks: int = LOOKS) -> None:
     """Lower the least of the drives in the first `count` of `lanes` to what lies near the places of the list in
-    `work`, under a `design` with the effects of a `turn`."""
+    `work`, under a `design` with the effects of a `turn`, each looked at so many times (`looks`)."""
     groups = fill_list(work, lanes, count)
-    for _ in range(LOOKS):
+    for _ in range(looks):
         _meet(work, groups * GROUP, design, turn)
         _look(work, groups, design, turn.reach)
     for j in range(count):
