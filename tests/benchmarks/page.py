@@ -283,10 +283,12 @@ a few, in one run: on another machine the seconds differ, the ratios less.
 """
 ON_DRIVES = """
 Here a drive counts one direction. Wanted are 4 us where effects differ from turn to turn (from the bearing's cage down)
-and 10 base kernels for a ripple at the teeth. What misses them looks at more: waves of the FS at some 23 cells in every
-turn and 20 places, a damaged tooth and an encoder of 4001 lines at 14 to 20 cells in every turn, then at 17 to 27 of
-these part by part, and a ripple at all of its troughs and crests within second order of the best. Inside the zones the
-envelopes of both zones are taken as if their waves always met, so that more cells are parted than hold an extreme.
+and 10 base kernels for a ripple at the teeth, which keeps them: some eight of its troughs a drive are measured without
+slopes, of which hardly more than one is looked at. What misses them looks at more: waves of the FS at some 23 cells in
+every turn and 20 places, a damaged tooth and an encoder of 4001 lines at 14 to 20 cells in every turn, then at 17 to 27
+of these part by part, and a ripple inside the zones at all of its troughs and crests within second order of the best.
+There the envelopes of both zones are taken as if their waves always met, so that more cells are parted than hold an
+extreme.
 
 The walks are what a plain program does and what Jia 2021's figures come from; on a fixed grid they stay below the
 converged value. Multiply-adds are those in single precision that the machine makes at its peak in the same time: what a
