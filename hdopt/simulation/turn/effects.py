@@ -67,10 +67,10 @@ class Fine(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """Effects of one direction over an input turn: the `scan`, with its `fine` parts; value (mm of arc), slope and
-    curvature (per rad) in zone 1, then in zone 2, on even places of the input angle, `fixed` (n, 6), and of the CS,
-    `cs` (m, 6) or (0, 6); of the latter (where there are parts, of what is slow on it) the largest curvature and slope,
-    and the range; how far a parabola is followed, rad."""
+    """Effects of one direction over an input turn: the `scan`, with its `fine` parts, and `waves` that both zones
+    share; value (mm of arc), slope and curvature (per rad) in zone 1, then in zone 2, on even places of the input
+    angle, `fixed` (n, 6), and of the CS, `cs` (m, 6) or (0, 6); of the latter (where there are parts, of what is slow
+    on it) the largest curvature and slope, and the range; how far a parabola is followed, rad."""
 
     scan: Scan
     fine: Fine
