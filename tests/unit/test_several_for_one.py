@@ -182,6 +182,7 @@ def test_fewer_waves_and_another_effect_pay_as_of_another_kind(paid):
     [
         pytest.param(gaining(900.0, 4060.0, ONCE, LOBES), id="one that explains hardly more"),
         pytest.param(gaining(900.0, 4200.0, ONCE, LOBES, Piece("third")), id="one of more coefficients"),
+        pytest.param(gaining(900.0, 4900.0, Piece("cs_tooth_harmonics"), PULSE), id="the same effect and a pulse"),
         pytest.param(
             gaining(900.0, 4170.0, Piece("cs_tooth_harmonics"), ONCE),
             id="the same effect and another, not clearly more",

@@ -16,7 +16,7 @@ from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import Candidate, from_new_drives, in_order, joint_fit, paid_for_freedom
 from hdopt.diagnosis.search.explore import explore, pool_among
-from hdopt.diagnosis.search.penalty import bends, discrepancy
+from hdopt.diagnosis.search.penalty import bends, discrepancy, leaves_nothing
 from hdopt.diagnosis.search.search_state import SearchState
 from hdopt.effects import HIGH_ORDER
 
@@ -82,9 +82,9 @@ def several_first(state: SearchState, candidates: list[Candidate]) -> list[Candi
 def fewest_first(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
     """`candidates` in order of evidence, but first a set that explains more than the first with no more coefficients,
     clearly so: it does not pay for being alike, or of two kinds, since nothing of it can stand for what an inexact
-    shape of the first leaves. The same effects in fewer coefficients, and others, pay as of another kind: what fewer
-    waves leave is taken up by more of them, not by what explains more than they. Each of its effects must pay for its
-    freedom. `state` is where the work stands.
+    shape of the first leaves. The same effects in fewer coefficients, and sines of known orders, pay as of another
+    kind: what fewer waves leave is taken up by more of them or by a pulse, not by such sines. Each of its effects must
+    pay for its freedom. `state` is where the work stands.
     """
     first, scale = candidates[0], state.scale
 
@@ -99,6 +99,10 @@ def fewest_first(state: SearchState, candidates: list[Candidate]) -> list[Candid
         share = scale.settings.other_kind if has_all else 0.0
         return paid(candidate) - paid(first) - share * state.top_gain / state.inflation / 2
 
+    def is_other(candidate: Candidate) -> bool:
+        beside = (term for term in candidate.fit.terms if term.effect not in first.effects)
+        return not set(first.effects) <= set(candidate.effects) or all(leaves_nothing(term) for term in beside)
+
     def pays(candidate: Candidate) -> bool:
         parts = (c for c in candidates if set(c.effects) < set(candidate.effects))
         return all(paid(candidate) > paid(part) for part in parts)
@@ -109,6 +113,7 @@ def fewest_first(state: SearchState, candidates: list[Candidate]) -> list[Candid
         if not candidate.outside
         and freedom(candidate) <= freedom(first)
         and ahead(candidate) > state.settings.clearly
+        and is_other(candidate)
         and pays(candidate)
         and is_acceptable(candidate.fit)
     ]
