@@ -11,12 +11,18 @@ from typing import cast
 
 import numpy as np
 
+from hdopt.arrays import Array, Singles
 from hdopt.kinematics.compiled_closed_form import compiled
 
 
 def single(value: float) -> float:
     """`value` in single precision: a plain number in a kernel would widen all that it meets."""
     return cast("float", np.float32(value))
+
+
+def singles(values: Array) -> Singles:
+    """`values` of any shape in single precision, row by row."""
+    return np.ascontiguousarray(values, dtype=np.float32)
 
 
 narrowed = cast("Callable[[float], float]", np.float32)

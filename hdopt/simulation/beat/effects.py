@@ -9,7 +9,7 @@ import numpy as np
 
 from hdopt.arrays import Array, Singles
 from hdopt.kinematics.lanes.minima import GROUP
-from hdopt.kinematics.lanes.single import single
+from hdopt.kinematics.lanes.single import single, singles
 from hdopt.simulation.beat.on_fs import OnFs, on_fs_of
 from hdopt.simulation.turn.effects import (
     FARTHEST,
@@ -22,7 +22,6 @@ from hdopt.simulation.turn.effects import (
     largest,
     parts,
     scan_of,
-    singles,
     spectrum_of,
     table_of,
 )

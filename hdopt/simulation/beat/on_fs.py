@@ -13,8 +13,8 @@ import numpy as np
 
 from hdopt.arrays import Array, Index, Singles
 from hdopt.kinematics.lanes.minima import GROUP
-from hdopt.kinematics.lanes.single import single
-from hdopt.simulation.turn.effects import WIDER, derived, largest, singles
+from hdopt.kinematics.lanes.single import single, singles
+from hdopt.simulation.turn.effects import WIDER, derived, largest
 
 FEWEST_ROWS, MOST_ROWS = 16, 128
 LEFT_BY_ROW = 1e-3

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hdopt.arrays import Array, Singles
-from hdopt.kinematics.lanes.single import single
+from hdopt.kinematics.lanes.single import single, singles
 from hdopt.simulation.turn.waves import NO_WAVES, Waves, waves_of
 
 FEWEST_CELLS, MOST_CELLS = 96, 4096
@@ -221,11 +221,6 @@ def scan_of(fixed: Array, on_cs: Array, cells: int) -> Scan:
         half=single(width / 2),
         step=single(float(np.ptp(half, axis=1).max()) / 2),
     )
-
-
-def singles(values: Array) -> Singles:
-    """`values` of any shape in single precision, row by row."""
-    return np.ascontiguousarray(values, dtype=np.float32)
 
 
 _NONE: Singles = np.zeros(0, np.float32)

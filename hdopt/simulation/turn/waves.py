@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hdopt.arrays import Array, Singles
-from hdopt.kinematics.lanes.single import single
+from hdopt.kinematics.lanes.single import single, singles
 
 OCTAVE = 2
 """The highest order of a ripple over its lowest, from where on its waves no longer stand for themselves."""
@@ -91,11 +91,11 @@ def _places(fast: Array, fixed: Array, on_cs: Array) -> Places:
     turns = angle / (2 * math.pi)
     met = np.concatenate([_at(fixed, angle, 0) + _at(on_cs, angle, 0), _at(on_cs, angle, 1)])
     return Places(
-        _singles(turns - np.floor(turns + 0.5)),
-        _singles(np.cos(angle)),
-        _singles(np.sin(angle)),
-        _singles(met.T),
-        _singles(_at(fast, angle, 2)[0]),
+        singles(turns - np.floor(turns + 0.5)),
+        singles(np.cos(angle)),
+        singles(np.sin(angle)),
+        singles(met.T),
+        singles(_at(fast, angle, 2)[0]),
     )
 
 
@@ -109,10 +109,6 @@ def _at(spectrum: Array, angle: Array, times: int) -> Array:
     orders = np.flatnonzero(np.abs(spectrum).max(axis=0))
     weights = np.where(orders > 0, 2.0, 1.0) * (1j * orders) ** times
     return np.asarray((spectrum[:, orders] * weights @ np.exp(1j * orders[:, None] * angle)).real)
-
-
-def _singles(values: Array) -> Singles:
-    return np.ascontiguousarray(values, dtype=np.float32)
 
 
 _NONE: Singles = np.zeros(0, np.float32)
