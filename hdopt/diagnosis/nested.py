@@ -65,10 +65,10 @@ class Part:
         best = found.selection.best.fit
         settings = best.problem.settings
         ripple = () if found.high is None else found.high.best.fit.terms
-        if best.problem.base is None or len(best.residual) != len(self.best.residual):
+        if best.problem.base is None or not (best.terms or ripple) or len(best.residual) != len(self.best.residual):
             return None
-        seen = [term for term in best.terms if bends_to_anything(term, settings.penalty)] if best.terms else ripple
-        if not (best.terms or ripple) or not {term.effect for term in seen} <= set(self.effects):
+        many_waves = [term for term in best.terms if bends_to_anything(term, settings.penalty)]
+        if not {term.effect for term in (many_waves if best.terms else ripple)} <= set(self.effects):
             return None
         problem = best.problem.with_noise(best.problem.noise.without(self.touched))
         base, fit = (

@@ -271,7 +271,8 @@ def unexplained(state: State) -> float:
 
 def plan_of(state: State) -> SearchPlan:
     """What a search from `state` on is to do: what was found in another noise, and elsewhere, is where it begins."""
-    known = (*leaders_on(state.selection, state.problem), *guesses_here(state))
+    told = (guessed(guess, state.problem) for guess in guesses_here(state))
+    known = (*leaders_on(state.selection, state.problem), *told)
     wavy = None if state.wavy is None else drive_with_terms(state.wavy, state.problem)
     return SearchPlan(skip=state.ruled_out, clean=state.clean, wavy=wavy, known=known)
 
@@ -294,14 +295,13 @@ def search_effects(state: State) -> State:
     return replace(state.found(found), rng=rng, searched=True, looked=None)
 
 
-def guesses_here(state: State) -> tuple[Fit, ...]:
-    """What was found on other rows of the recordings, as they are counted at `state`, from where it stood there: the
-    two zones of a drive make many minima, of which a search may miss the best. A gear without a base has no zones.
+def guesses_here(state: State) -> tuple[Guess, ...]:
+    """What was found on other rows of the recordings, as they are counted at `state`: the two zones of a drive make
+    many minima, of which a search may miss the best. A gear without a base has no zones.
     """
     if state.problem.base is None:
         return ()
-    here = (guess for guess in state.guesses if guess.turned == state.orientation.turned)
-    return tuple(guessed(guess, state.problem) for guess in here)
+    return tuple(guess for guess in state.guesses if guess.turned == state.orientation.turned)
 
 
 def guessed(guess: Guess, problem: FitProblem) -> Fit:

@@ -94,14 +94,16 @@ def fewest_first(state: SearchState, candidates: list[Candidate]) -> list[Candid
     def paid(candidate: Candidate) -> float:
         return paid_for_freedom(candidate, scale)
 
+    def has_all(candidate: Candidate) -> bool:
+        return set(first.effects) <= set(candidate.effects)
+
     def ahead(candidate: Candidate) -> float:
-        has_all = set(first.effects) <= set(candidate.effects)
-        share = scale.settings.other_kind if has_all else 0.0
+        share = scale.settings.other_kind if has_all(candidate) else 0.0
         return paid(candidate) - paid(first) - share * state.top_gain / state.inflation / 2
 
     def is_other(candidate: Candidate) -> bool:
         beside = (term for term in candidate.fit.terms if term.effect not in first.effects)
-        return not set(first.effects) <= set(candidate.effects) or all(leaves_nothing(term) for term in beside)
+        return not has_all(candidate) or all(leaves_nothing(term) for term in beside)
 
     def pays(candidate: Candidate) -> bool:
         parts = (c for c in candidates if set(c.effects) < set(candidate.effects))

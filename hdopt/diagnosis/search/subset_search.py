@@ -356,21 +356,17 @@ STAGES: tuple[Callable[[SearchState], SearchState], ...] = (
 )
 """The search, in the order of its work."""
 
-STAGES_AGAIN = (
-    refit_known,
-    explore_clean_base,
-    search_about_leader,
-    beside_a_far_drive,
-    refit_close_rivals,
-    beside_what_is_told,
-    leave_out_hidden_parts,
-    shorten_wide_terms,
-    leave_out_each_term,
-    base_beside_leader,
+FOR_OTHER_KINDS = (
+    explore_base,
+    look_beside_flexible_leader,
+    with_teeth_in_the_zones,
+    several_for_one,
+    plain_for_waves,
 )
-"""What of it is done where an earlier search, on other rows or in another noise, has looked for sets of other kinds in
-place of its leader.
-"""
+"""What of it looks for sets of other kinds in place of a leader, or where none is known."""
+
+STAGES_AGAIN = (refit_known, *(stage for stage in STAGES if stage not in FOR_OTHER_KINDS))
+"""The search where an earlier one, on other rows or in another noise, has looked for those."""
 
 
 def ranked(state: SearchState) -> list[Candidate]:
