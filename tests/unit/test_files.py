@@ -155,7 +155,8 @@ try:
     with signals_raise(Interruption(), None), replacing(Path(sys.argv[1])) as passing:
         passing.write_text("half")
         print("writing", flush=True)
-        time.sleep(30)
+        for _ in range(3000):
+            time.sleep(0.01)  # a signal just before a sleep is handled after it only
 except (KeyboardInterrupt, Terminated):
     sys.exit(3)
 """
