@@ -57,6 +57,19 @@ def bare(recording, sigma=0.02):
     return refine(evaluate(problem, np.zeros(0), np.zeros(1), (), ()))
 
 
+def test_a_term_that_moves_nothing_takes_no_coefficient():
+    """A tooth in a zone that never drives has columns of zeros. Would catch a fit that ends in a singular matrix, and a
+    clean recording of 100 turns without an answer."""
+    turns = np.linspace(0, 10 * TURN, 1000)
+    fit = bare(record(turns, 0.1 * np.sin(2 * turns)))
+    nothing = Term("tooth_mesh", {}, columns=np.zeros((len(fit.residual), 2)))
+    beside = Term("tooth_mesh", {}, columns=np.column_stack([np.sin(2 * turns), np.zeros(len(turns))]))
+    joined = joint_fit(fit, [nothing])
+    assert np.array_equal(joined.coefficients[0], np.zeros(2))
+    assert joined.objective == pytest.approx(fit.objective, rel=1e-9)
+    assert joint_fit(fit, [beside]).coefficients[0] == pytest.approx([0.1, 0.0], abs=1e-6)
+
+
 def test_noise_model_keeps_slow_wander_and_draws_lines_in():
     slow, line = 0.98, 0.999 * np.exp(0.7j)
     ar = -np.real(np.poly([slow, line, np.conj(line)]))[1:]

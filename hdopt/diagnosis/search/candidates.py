@@ -144,7 +144,8 @@ def joint_fit(start: Fit, terms: Sequence[Term], rng: np.random.Generator | None
     columns = np.column_stack([probe.columns(term) for term in terms])
     gram = columns.T @ columns
     target = probe.project(start.problem.noise.whiten(start.residual + start.contributions))
-    ridge = SMALL_RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram))
+    # A tooth in a zone that never drives moves nothing, and takes no coefficient.
+    ridge = (SMALL_RIDGE * np.trace(gram) / len(gram) + TINY) * np.eye(len(gram))
     solution = solved(gram + ridge, columns.T @ target)
     parts, position = [], 0
     for term in terms:
