@@ -372,6 +372,9 @@ class SearchSettings:
         0.5, "1", "choice: power left above the noise over it from which a leading set is taken for a part of another"
     )
     complete: float = threshold(0.1, "1", "choice: share of that power which the other set may leave")
+    leaves_more: float = threshold(
+        0.05, "1", "choice: power left above the noise over it from which one plain effect more is tried"
+    )
     lost_by_trimming: float = threshold(0.005, "1", "choice: share of the gain that parts which do not show may take")
     known: int = threshold(5, "1", "choice: candidates from which a later search goes on")
     tie_of_variants: float = threshold(10.0, "1", "choice: log evidence by which a wider variant must be better")

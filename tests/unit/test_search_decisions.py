@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hdopt.diagnosis.search import candidates as weighing
+from hdopt.diagnosis.search import completion as completing
 from hdopt.diagnosis.search import explore as exploring
 from hdopt.diagnosis.search import refinement, search_state, subset_search
 from hdopt.diagnosis.search.candidates import Candidate, RankedSubset
@@ -69,7 +70,8 @@ def weighed(monkeypatch):
     monkeypatch.setattr(search_state, "penalty_scale", lambda *about: "scale")
     monkeypatch.setattr(search_state, "FitProbe", lambda fit, keep=None, order_range=None: (fit, keep))
     monkeypatch.setattr(search_state, "search_terms", lambda probe, skip: [Effect("found beside")])
-    for module in (subset_search, refinement):
+    monkeypatch.setattr(completing, "is_far", lambda fit: np.array([False, fit.far]))
+    for module in (subset_search, refinement, completing):
         monkeypatch.setattr(module, "is_acceptable", lambda fit: fit.may_be_said)
 
 
@@ -113,12 +115,14 @@ def in_rows(monkeypatch):
     each term pays 3, `sine` and `cosine` leave nothing."""
 
     def scale(problem, inflation, subtracted):
-        return SimpleNamespace(rows=ROWS, inflation=inflation)
+        return SimpleNamespace(rows=ROWS, inflation=inflation, settings=SimpleNamespace(other_kind=0.01))
 
     monkeypatch.setattr(search_state, "penalty_scale", scale)
     monkeypatch.setattr(weighing, "penalty", lambda terms, gain, scale: 3.0 * len(terms) + gain)
-    monkeypatch.setattr(subset_search, "leaves_nothing", lambda term: term.effect in ("sine", "cosine"))
-    monkeypatch.setattr(subset_search, "kind_of", lambda term: "turning" if "lobes" in term.effect else "load")
+    monkeypatch.setattr(completing, "leaves_nothing", lambda term: term.effect in ("sine", "cosine"))
+    monkeypatch.setattr(completing, "kind_of", lambda term: "turning" if "lobes" in term.effect else "load")
+    monkeypatch.setattr(search_state, "search_terms", lambda probe, skip: [])
+    monkeypatch.setattr(search_state, "FitProbe", lambda *about, **more: SimpleNamespace(gain=None))
     problem = SimpleNamespace(**vars(PROBLEM), noise=SimpleNamespace(sigma=SIGMA))
 
     def candidate(evidence, names, left, inflation=2.0):
@@ -160,7 +164,7 @@ def test_sines_that_take_up_nearly_all_complete_a_set_that_leaves_far_more(in_ro
     tooth, and a spline's two lobes beside an encoder and the mesh."""
     names, left = other
     begun, more, last = in_rows(900.0, ("a",), first), in_rows(100.0, names, left), in_rows(20.0, ("c",), 2.0)
-    found = subset_search.completed(state_of(), [begun, more, last])
+    found = completing.completed(state_of(), [begun, more, last])
     if not taken:
         assert found == [begun, more, last]
         return
@@ -169,19 +173,179 @@ def test_sines_that_take_up_nearly_all_complete_a_set_that_leaves_far_more(in_ro
 
 
 def test_what_bends_to_nothing_is_sines_or_turns_and_has_few_coefficients(monkeypatch):
-    monkeypatch.setattr(subset_search, "leaves_nothing", lambda term: term.effect == "sine")
-    monkeypatch.setattr(subset_search, "kind_of", lambda term: "load" if term.effect == "friction" else "turning")
+    monkeypatch.setattr(completing, "leaves_nothing", lambda term: term.effect == "sine")
+    monkeypatch.setattr(completing, "kind_of", lambda term: "load" if term.effect == "friction" else "turning")
     for term, may in ((Effect("sine", 9), True), (Effect("lobes", 4), True), (Effect("teeth", 5), False)):
-        assert subset_search.may_complete(term, narrow=4) is may
-    assert not subset_search.may_complete(Effect("friction", 1), narrow=4)
+        assert completing.may_complete(term, narrow=4) is may
+    assert not completing.may_complete(Effect("friction", 1), narrow=4)
 
 
 def test_of_two_completed_sets_the_better_and_nothing_where_the_base_leads(in_rows):
     begun = in_rows(900.0, ("a",), 0.6)
     one, two = in_rows(100.0, ("a", "sine"), 0.04), in_rows(90.0, ("a", "cosine"), 0.02)
-    assert subset_search.completed(state_of(), [begun, one, two])[0].fit is two.fit
+    assert [c.fit for c in completing.completed(state_of(), [begun, one, two])] == [two.fit, one.fit, begun.fit]
     alone = in_rows(0.0, (), 0.6)
-    assert subset_search.completed(state_of(), [alone, one]) == [alone, one]
+    assert completing.completed(state_of(), [alone, one]) == [alone, one]
+
+
+@dataclass(frozen=True)
+class Beside:
+    """What stands beside a leading set: its `effect`, what is `left` with it (from new drives: `left_anew`), and how it
+    may not be said."""
+
+    effect: str
+    left: float
+    left_anew: float | None = None
+    width: int = 2
+    freedom: float = 2.0
+    doubtful: bool = False
+    trials: float = 1.0
+    met: object = None
+    may_be_said: bool = True
+    far: bool = False
+    other_law: float = 0.0
+
+
+@pytest.fixture
+def completion(monkeypatch, in_rows):
+    """`of(first, *found)`: what is completed of a `first` candidate, where the terms `found` are seen beside it, and
+    the sets that were fitted, with whether they were from new drives."""
+    fitted = []
+
+    def of(first, *found, known=()):
+        fitted.clear()
+
+        def joint_fit(start, terms, rng=None):
+            term = terms[-1]
+            fitted.append((term.effect, rng is not None))
+            left = term.left if rng is None or term.left_anew is None else term.left_anew
+            fit = in_rows(0.0, tuple(one.effect for one in terms), left).fit
+            return replace(fit, terms=tuple(terms), may_be_said=term.may_be_said, far=term.far or rng is None)
+
+        monkeypatch.setattr(completing, "joint_fit", joint_fit)
+        monkeypatch.setattr(weighing, "joint_fit", joint_fit)
+        for module in (completing, weighing):
+            monkeypatch.setattr(module, "each", lambda work, items: [work(item) for item in items])
+        monkeypatch.setattr(completing, "is_driven", lambda term: term.effect == "swing")
+        monkeypatch.setattr(
+            completing, "other_law", lambda fit, inflation: SimpleNamespace(log_evidence=fit.terms[-1].other_law)
+        )
+        monkeypatch.setattr(
+            search_state,
+            "FitProbe",
+            lambda fit, keep=None, order_range=None: SimpleNamespace(gain=lambda term: -term.left),
+        )
+        monkeypatch.setattr(
+            search_state, "search_terms", lambda probe, skip: [one for one in found if one.effect not in skip]
+        )
+        return completing.completed(state_of(*known), [first])
+
+    of.fitted = fitted
+    return of
+
+
+def test_a_plain_effect_that_takes_up_nearly_all_completes_a_set(completion, in_rows):
+    """A delay that took the place of a friction and a delay leaves 0.2 of the noise above it; with a friction a
+    hundredth of that. They come first by what they gain, less their freedom alone. Faults caught: two effects of one
+    kind, of which the first takes up most of the second, called unknown."""
+    first = in_rows(900.0, ("delay",), 0.2)
+    found = completion(first, Beside("friction", 0.002), Beside("drift", 0.15))
+    assert [one.effects for one in found] == [("delay", "friction"), ("delay",)]
+    assert found[0].log_bayes_factor == pytest.approx(900.0 + (0.2 - 0.002) * ROWS / 2 - 3.0)
+
+
+@pytest.mark.parametrize(
+    ("first", "beside"),
+    [
+        ((0.04, ("delay",)), Beside("friction", 0.0)),
+        ((0.2, ("delay",)), Beside("friction", 0.03)),
+        ((0.2, ("delay",)), Beside("friction", 0.0, may_be_said=False)),
+        ((0.2, ("delay",)), Beside("friction", 0.0, other_law=5.0 + DEFAULT.verdict.other_law)),
+        ((0.2, ("delay",)), Beside("friction", 0.0, width=SETTINGS.narrow + 1)),
+        ((0.2, ("delay",)), Beside("friction", 0.0, doubtful=True)),
+        ((0.2, ("delay",)), Beside("swing", 0.0)),
+        ((0.2, ("delay",)), Beside("_jump", 0.0)),
+        ((0.2, ("_jump",)), Beside("friction", 0.0)),
+        ((0.2, ("delay", "drift", "lobes")), Beside("friction", 0.0)),
+        ((0.0495, ("delay",)), Beside("friction", -0.4)),
+    ],
+    ids=[
+        "noise alone is left",
+        "not nearly all",
+        "not acceptable",
+        "another law",
+        "wide",
+        "doubtful",
+        "swings",
+        "no physics",
+        "a set without physics",
+        "three already",
+        "just noise",
+    ],
+)
+def test_what_does_not_complete_a_set(completion, in_rows, first, beside):
+    left, names = first
+    begun = in_rows(900.0, names, left)
+    assert completion(begun, beside) == [begun]
+
+
+def test_what_completes_a_set_must_be_clear(completion, in_rows, monkeypatch):
+    monkeypatch.setattr(weighing, "penalty", lambda terms, gain, scale: 40.0 * len(terms))
+    begun = in_rows(900.0, ("delay",), 0.11)
+    assert completion(begun, Beside("friction", 0.0)) == [begun]  # 55 - 40 < 20
+    begun = in_rows(900.0, ("delay",), 0.13)
+    assert len(completion(begun, Beside("friction", 0.0))) == 2  # 65 - 40 > 20
+
+
+def test_sines_are_fitted_from_new_drives_and_the_best_of_others_where_none_fills(completion, in_rows):
+    """A drive takes up most of an eccentric encoder, and a damaged tooth wants another drive. Faults caught: waves of
+    the teeth that fill by chance, so that the encoder beside the lobes was not looked at."""
+    begun = in_rows(900.0, ("lobes",), 0.2)
+    found = completion(begun, Beside("waves", 0.015), Beside("sine", 0.19, left_anew=-0.1))
+    assert [one.effects for one in found] == [("lobes", "sine"), ("lobes", "waves"), ("lobes",)]
+    assert completion.fitted == [("waves", False), ("sine", False), ("sine", True)]
+    found = completion(begun, Beside("tooth", 0.1, left_anew=-0.1), Beside("drift", 0.15, left_anew=-0.2))
+    assert [one.effects for one in found] == [("lobes", "tooth"), ("lobes",)]
+    assert completion.fitted == [("tooth", False), ("drift", False), ("tooth", True)]
+
+
+def test_only_the_best_are_fitted_and_every_sine(completion, in_rows):
+    begun = in_rows(900.0, ("lobes",), 0.2)
+    others = [Beside(f"{i}", 0.1 + 0.01 * i) for i in range(5)]
+    completion(begun, *others, Beside("sine", 0.18))
+    assert [name for name, anew in completion.fitted if not anew] == ["0", "1", "2", "sine"]
+
+
+def test_sines_that_bring_a_far_drive_home_complete_a_set(completion, in_rows, monkeypatch):
+    """The drive lies far outside its tolerances and leaves no more than noise: sines that bring it home come first,
+    and pay as of another kind; nothing else does, nor sines beside which it stays far."""
+    begun = in_rows(900.0, ("bearing",), 0.0)
+    begun = replace(begun, fit=replace(begun.fit, far=True))
+    found = completion(begun, Beside("friction", -0.3), Beside("sine", 0.0, left_anew=-0.1), known=(begun.fit,))
+    assert [one.effects for one in found] == [("bearing", "sine"), ("bearing",)]
+    assert completion.fitted == [("sine", False), ("sine", True)]
+    # A hundredth of what the best set that is known explains, three times the noise.
+    assert found[0].log_bayes_factor == pytest.approx(900.0 + 0.1 * ROWS / 2 - 3.0 - 0.01 * 3.0 * ROWS / 2)
+    assert completion(begun, Beside("sine", -0.1, far=True, left_anew=-0.11)) == [begun]
+
+
+def test_a_set_that_came_out_wider_is_completed_once_more(monkeypatch):
+    """Few waves of the teeth beside a delay leave far more than a friction takes up; many leave the friction. Would
+    catch a friction that stays hidden beside waves and a delay."""
+    few, many = (Candidate(of(9.0, "waves", objective=left), 9.0, 1.0) for left in (2.0, 1.0))
+    asked = []
+
+    def completed(state, candidates):
+        asked.append(candidates[0])
+        return candidates
+
+    monkeypatch.setattr(subset_search, "completed", completed)
+    monkeypatch.setattr(subset_search, "in_last_order", lambda state, candidates: [many])
+    subset_search.complete_and_wide(state_of(), [few])
+    assert asked == [few, many]
+    asked.clear()
+    assert subset_search.complete_and_wide(state_of(), [many]) == [many]
+    assert asked == [many]
 
 
 def test_a_far_drive_pays_against_other_effects_alone():
@@ -476,12 +640,13 @@ def test_shorter_runs_are_tried_as_long_as_they_are_better(monkeypatch):
 def chosen(monkeypatch):
     """Effects of the sets that are fitted of a pool with these gains, about a centre."""
 
-    def of_gains(subsets, exact=(), afresh=False):
+    def of_gains(subsets, exact=(), afresh=False, swings=""):
         names = sorted({i for indices, _ in subsets for i in indices})
         pool = [Effect(f"e{i}") for i in names]
         ranked = [RankedSubset(gain, gain, indices) for indices, gain in subsets]
         monkeypatch.setattr(exploring, "rank_subsets", lambda *about: ranked)
         monkeypatch.setattr(exploring, "behind_a_resonance", lambda *about: [])
+        monkeypatch.setattr(exploring, "is_driven", lambda term: term.effect == swings)
         monkeypatch.setattr(exploring, "has_exact_shape", lambda term: term.effect in exact)
         sets = exploring._worth_a_fit(state_of(), Told(0.0), pool, afresh, "scale")
         return [tuple(term.effect for term in terms) for terms in sets]
@@ -490,11 +655,14 @@ def chosen(monkeypatch):
 
 
 def test_leaders_and_single_effects_of_a_quarter_of_the_best_gain_are_fitted(chosen):
-    """The three best sets, then singles of a quarter of the gain and more; at the first look any of exact shape."""
+    """The three best sets, then singles of a quarter of the gain and more; at the first look any of exact shape. Of
+    sets with what swings, which may turn out to be no swing, the three best without as well."""
     subsets = [((0, 1), 100.0), ((0, 2), 90.0), ((0,), 80.0), ((1, 2), 70.0), ((1,), 30.0), ((2,), 20.0), ((3,), 10.0)]
     assert chosen(subsets) == [("e0", "e1"), ("e0", "e2"), ("e0",), ("e1",)]
     assert chosen(subsets, exact=("e3",), afresh=True) == [("e0", "e1"), ("e0", "e2"), ("e0",), ("e1",), ("e3",)]
     assert chosen(subsets, exact=("e3",)) == chosen(subsets)
+    swinging = [((4, i), 110.0 - i) for i in range(4)]
+    assert chosen([*swinging, *subsets], swings="e4") == [*(("e4", f"e{i}") for i in range(3)), *chosen(subsets)]
 
 
 @pytest.mark.parametrize(("more", "taken"), [(0.9, 2), (1.1, 3)])

@@ -44,7 +44,10 @@ def _worth_a_fit(state: SearchState, centre: Fit, pool: Sequence[Term], afresh: 
         return alone and (subset.gain >= settings.worth_a_fit * most or exact)
 
     singles = [subset for subset in ranked if single(subset)]
-    chosen = ranked[: settings.leaders] + singles[: settings.leaders + settings.more_singles]
+    # What swings is acceptable with the numbers of what swings alone, which only its fit shows.
+    still = [subset for subset in ranked if not any(is_driven(pool[i]) for i in subset.indices)]
+    chosen = ranked[: settings.leaders] + still[: settings.leaders]
+    chosen += singles[: settings.leaders + settings.more_singles]
     sets: dict[frozenset[str], list[Term]] = {}
     for terms in [*behind_a_resonance(state, centre, pool), *([pool[i] for i in s.indices] for s in chosen)]:
         sets.setdefault(frozenset(term.effect for term in terms), terms)

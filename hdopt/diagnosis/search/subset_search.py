@@ -25,12 +25,12 @@ from hdopt.diagnosis.search.candidates import (
     from_new_drives,
     in_order,
     joint_fit,
-    paid_for_freedom,
     search_terms,
     without_each,
 )
+from hdopt.diagnosis.search.completion import completed
 from hdopt.diagnosis.search.explore import explore
-from hdopt.diagnosis.search.penalty import flexibility, kind_of, leaves_nothing
+from hdopt.diagnosis.search.penalty import flexibility, leaves_nothing
 from hdopt.diagnosis.search.plain_for_waves import plain_for_waves
 from hdopt.diagnosis.search.refinement import (
     for_freedom_alone,
@@ -95,7 +95,7 @@ def select_from(state: SearchState) -> Selection:
     if not leads_still(state):
         state = through(STAGES, state)
     candidates = acceptable_first(ranked(state), state.settings.close_behind)
-    return Selection(state.base, tuple(in_last_order(state, completed(state, candidates))), state.inflation)
+    return Selection(state.base, tuple(complete_and_wide(state, candidates)), state.inflation)
 
 
 def through(stages: Sequence[Callable[[SearchState], SearchState]], state: SearchState) -> SearchState:
@@ -385,25 +385,13 @@ def ranked(state: SearchState) -> list[Candidate]:
     return in_order(candidates)
 
 
-def completed(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
-    """`candidates` in order of evidence, the first only begun where it leaves far more than noise and terms that bend
-    to nothing take up nearly all of that beside it: what an inexact shape leaves no such term takes up, so that these
-    do not pay for it. `state` is where the work stands.
+def complete_and_wide(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
+    """`candidates` in their last order, the first completed; once more where it came out wider, or another: what it
+    leaves then may be one effect more. `state` is where the work stands.
     """
-    first, settings = candidates[0], state.settings
-    left = state.above_noise(first.fit)
-    if not first.fit.terms or left < settings.begun * state.scale.rows:
-        return candidates
-    found = []
-    for candidate in candidates[1:]:
-        beside = [term for term in candidate.fit.terms if term.effect not in first.effects]
-        if set(first.effects) < set(candidate.effects) and all(may_complete(term, settings.narrow) for term in beside):
-            if state.above_noise(candidate.fit) <= settings.complete * left:
-                found.append(without_inexactness(state, first, candidate))
-    if not found:
-        return candidates
-    best = max(found, key=lambda c: c.log_bayes_factor)
-    return in_order([best, *(c for c in candidates if c.fit is not best.fit)])
+    begun = completed(state, candidates)
+    wide = in_last_order(state, begun)
+    return wide if wide[0].fit is begun[0].fit else completed(state, wide)
 
 
 def in_last_order(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
@@ -442,20 +430,6 @@ def widened(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
         fit = max(same, key=lambda one: for_freedom_alone(one, state.base, state.inflation))
         rest = [one for one in rest if names_of(one.fit) != names]
     return [replace(first, fit=fit, gain=state.weigh(fit).gain), *rest]
-
-
-def may_complete(term: Term, narrow: int) -> bool:
-    """Whether `term` is sines at lines that are known, or turns with the drive and has no more than `narrow`
-    coefficients: it bends to nothing."""
-    return leaves_nothing(term) or (kind_of(term) == "turning" and term.width <= narrow)
-
-
-def without_inexactness(state: SearchState, first: Candidate, more: Candidate) -> Candidate:
-    """The candidate of `more` effects than the `first`, of which those beside it pay for their freedom alone. `state`
-    is where the work stands.
-    """
-    gained = paid_for_freedom(more, state.scale) - paid_for_freedom(first, state.scale)
-    return replace(more, log_bayes_factor=first.log_bayes_factor + gained)
 
 
 def acceptable_first(candidates: Sequence[Candidate], close_behind: float) -> list[Candidate]:

@@ -1,0 +1,133 @@
+"""A leading set that is only begun, and what completes it.
+
+A set of effects pays a share of all that it explains for each effect (`search.penalty`): what an inexact shape leaves
+must not be named. So a delay that took the place of a friction and a delay leads these two, though it leaves what no
+noise does. A set that leaves more than noise, or whose drive lies far outside its tolerances, leaves physics out; where
+one plain effect more takes up nearly all of that, or brings the drive home, that is no misfit of a shape, which would
+be left beside it. Such sets do not pay for being inexact against the set that they complete.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import replace
+
+from hdopt.diagnosis.checks.other_laws import other_law
+from hdopt.diagnosis.inference.base_excitation import is_driven
+from hdopt.diagnosis.inference.base_fit import is_far
+from hdopt.diagnosis.inference.catalogue import is_outside
+from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.search.acceptance import is_acceptable
+from hdopt.diagnosis.search.candidates import Candidate, from_new_drives, in_order, joint_fit, paid_for_freedom
+from hdopt.diagnosis.search.penalty import kind_of, leaves_nothing
+from hdopt.diagnosis.search.search_state import Names, SearchState, names_of
+from hdopt.effects.term import Term
+from hdopt.parallel.shared_memory import each
+
+
+def completed(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
+    """`candidates` in order of evidence, the first only begun where another set has all its effects and takes up what
+    it leaves: such sets then come first. `state` is where the work stands.
+    """
+    first = candidates[0]
+    if not first.fit.terms:
+        return candidates
+    found: dict[Names, Candidate] = {}
+    for one in in_order([*far_more_taken_up(state, candidates), *by_one_plain_effect(state, first)]):
+        found.setdefault(names_of(one.fit), one)
+    return in_order([*found.values(), *(one for one in candidates if names_of(one.fit) not in found)])
+
+
+def far_more_taken_up(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
+    """Of the `candidates` those that complete the first where it leaves far more than noise: terms that bend to nothing
+    take up nearly all of that beside it. `state` is where the work stands.
+    """
+    first, settings = candidates[0], state.settings
+    left = state.above_noise(first.fit)
+    if left < settings.begun * state.scale.rows:
+        return []
+    found = []
+    for candidate in candidates[1:]:
+        beside = [term for term in candidate.fit.terms if term.effect not in first.effects]
+        if set(first.effects) < set(candidate.effects) and all(may_complete(term, settings.narrow) for term in beside):
+            if state.above_noise(candidate.fit) <= settings.complete * left:
+                found.append(without_inexactness(state, first, candidate))
+    return found
+
+
+def by_one_plain_effect(state: SearchState, first: Candidate) -> list[Candidate]:
+    """Sets that complete the `first`, one of physics, by one plain effect more: where it leaves more than noise, any
+    that takes up nearly all of that; where its drive lies far outside its tolerances, sines of known orders that bring
+    it home. `state` is where the work stands.
+    """
+    settings, fit = state.settings, first.fit
+    left, far = state.above_noise(fit), bool(is_far(fit).any())
+    leaves_more = left >= settings.leaves_more * state.scale.rows
+    if first.outside or len(fit.terms) >= settings.most_effects or not (leaves_more or far):
+        return []
+
+    def fills(more: Fit) -> bool:
+        return leaves_more and state.above_noise(more) <= settings.complete * left
+
+    def brings_home(more: Fit) -> bool:
+        beside = (term for term in more.terms if term.effect not in first.effects)
+        return far and not is_far(more).any() and all(leaves_nothing(term) for term in beside)
+
+    found = []
+    for more in with_one_more(state, fit, fills, sines_alone=not leaves_more):
+        one = without_inexactness(state, first, state.weigh(more, state.top_gain))
+        if not fills(more):
+            share = state.scale.settings.other_kind * state.top_gain / state.inflation / 2
+            one = replace(one, log_bayes_factor=one.log_bayes_factor - share)
+        ahead = one.log_bayes_factor - first.log_bayes_factor > settings.clearly
+        if ahead and (fills(more) or brings_home(more)) and is_acceptable(more) and follows_its_laws(more, state):
+            found.append(one)
+    return found
+
+
+def with_one_more(state: SearchState, fit: Fit, fills: Callable[[Fit], bool], sines_alone: bool) -> list[Fit]:
+    """`fit` with each of the best plain effects beside it, or of sines at known orders (`sines_alone`): the best fit
+    for each set of effects. They are fitted from where `fit` stands, sines from new drives too, since a drive takes up
+    most of them; so is the best where none takes up what `fit` leaves (`fills`). `state` is where the work stands; the
+    draws are its own.
+    """
+    probe, settings = state.probe(fit), state.settings
+    pool = [term for term in state.terms_for(probe, *names_of(fit)) if is_plain(term, settings.narrow)]
+    pool = sorted((t for t in pool if leaves_nothing(t) or not sines_alone), key=probe.gain, reverse=True)
+    pool = [*pool[: settings.most_plain], *(t for t in pool[settings.most_plain :] if leaves_nothing(t))]
+    fits = sorted(each(lambda term: joint_fit(fit, [*fit.terms, term]), pool), key=lambda one: one.objective)
+    again = [[*fit.terms, term] for term in pool if leaves_nothing(term)]
+    if not any(fills(one) for one in fits):
+        again += [[*one.terms] for one in fits if not leaves_nothing(one.terms[-1])][:1]
+    fits += from_new_drives(fit, again, copy.deepcopy(state.rng))
+    best: dict[Names, Fit] = {}
+    for one in sorted(fits, key=lambda fit: fit.objective):
+        best.setdefault(names_of(one), one)
+    return list(best.values())
+
+
+def is_plain(term: Term, narrow: int) -> bool:
+    """Whether `term` is physics of no more than `narrow` coefficients, that neither swings nor stands for lines that
+    could be another effect's."""
+    return term.width <= narrow and not (is_outside(term.effect) or term.doubtful or is_driven(term))
+
+
+def follows_its_laws(fit: Fit, state: SearchState) -> bool:
+    """Whether every effect of `fit` depends on the speed as it does, and no other law explains better. `state` is where
+    the work stands."""
+    return other_law(fit, state.inflation).log_evidence <= fit.problem.settings.verdict.other_law
+
+
+def may_complete(term: Term, narrow: int) -> bool:
+    """Whether `term` is sines at lines that are known, or turns with the drive and has no more than `narrow`
+    coefficients: it bends to nothing."""
+    return leaves_nothing(term) or (kind_of(term) == "turning" and term.width <= narrow)
+
+
+def without_inexactness(state: SearchState, first: Candidate, more: Candidate) -> Candidate:
+    """The candidate of `more` effects than the `first`, of which those beside it pay for their freedom alone. `state`
+    is where the work stands.
+    """
+    gained = paid_for_freedom(more, state.scale) - paid_for_freedom(first, state.scale)
+    return replace(more, log_bayes_factor=first.log_bayes_factor + gained)
