@@ -8,6 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hdopt.diagnosis.checks.slow_wander import SlowWave
+from hdopt.diagnosis.checks.step_detection import Steps
 from hdopt.diagnosis.checks.turn_by_turn import from_turn_to_turn
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
@@ -86,11 +88,53 @@ def test_of_too_few_turns_nothing_is_said():
     assert from_turn_to_turn(fit, 0).t == 0.0
 
 
-def evidence(fit):
+def evidence(fit, noise=NOISE):
     best = SimpleNamespace(fit=fit, effects=tuple(term.effect for term in fit.terms))
     return SimpleNamespace(
-        settings=DEFAULT, selection=SimpleNamespace(best=best), base_held_out=SimpleNamespace(variance=0.01)
+        settings=DEFAULT,
+        selection=SimpleNamespace(best=best, base=fit),
+        base_held_out=SimpleNamespace(variance=0.01),
+        extended_held_out=SimpleNamespace(variance=0.001),
+        neighbours_arcmin=noise,
+        sensor_arcmin=0.0,
+        rows=SimpleNamespace(output_step=0.0),
+        wave=None,
+        steps=Steps(np.zeros(0, int), 0.0),
     )
+
+
+def seen_at(rms):
+    """Noise between neighbours, arcmin, in which `rms` is as much as sensors resolve."""
+    return rms / DEFAULT.verdict.sensor_resolution
+
+
+def test_what_is_below_the_resolution_comes_and_goes_unsaid():
+    """Would catch a clean recording of 600,000 rows called unknown for a pulse of 0.0002 arcmin that comes and goes."""
+    fit = fitted(at_random(0.4))
+    rms = residual_structure.comes_and_goes(evidence(fit))["rms_arcmin"]
+    assert residual_structure.comes_and_goes(evidence(fit, seen_at(0.9 * rms))) is not None
+    assert residual_structure.comes_and_goes(evidence(fit, seen_at(1.1 * rms))) is None
+    assert residual_structure.unsteady(evidence(fit, seen_at(1.1 * rms))) is None
+
+
+@pytest.mark.parametrize("what", ["wave", "steps"])
+def test_what_is_below_the_resolution_does_not_change_in_time(what):
+    fit, rms = fitted(lambda turn: 0.3), 0.1
+    found = {"wave": SlowWave(30.0, rms), "steps": Steps(np.arange(3), rms)}[what]
+    for share, said in ((0.9, True), (1.1, False)):
+        seen = evidence(fit, seen_at(share * rms))
+        setattr(seen, what, found)
+        assert (residual_structure.unsteady(seen) is not None) == said
+
+
+def test_what_is_below_the_resolution_did_not_happen():
+    fit = fitted(lambda turn: 0.3)
+    rms = float(np.std(fit.contribution(0)))
+    for share, said in ((0.9, True), (1.1, False)):
+        seen = evidence(fit, seen_at(share * rms))
+        seen.selection.best.effects = ("_jump",)
+        seen.selection.best.log_bayes_factor = 1e6
+        assert residual_structure.momentary(seen) == said
 
 
 def test_pulses_that_come_and_go_are_unsteady():

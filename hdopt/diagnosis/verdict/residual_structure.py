@@ -36,7 +36,7 @@ def effect_powers(candidate: Candidate) -> list[float]:
 
 def momentary(evidence: Evidence) -> bool:
     """Whether something that happened at one moment only, and that no held-out turn can show again, is most of what
-    is there. `evidence` is that of the diagnosis.
+    is there, and more than sensors and model resolve. `evidence` is that of the diagnosis.
     """
     best, settings = evidence.selection.best, evidence.settings.verdict
     powers = term_powers(best.fit)
@@ -46,6 +46,7 @@ def momentary(evidence: Evidence) -> bool:
         and once > settings.momentary_share * sum(powers)
         and best.log_bayes_factor > settings.momentary_evidence
         and once > settings.smallest_share * float(np.var(best.fit.residual))
+        and once > resolution(evidence) ** 2
     )
 
 
@@ -76,7 +77,8 @@ def place(domain: str, orders: list[float], rms: float, evidence: Evidence) -> W
 
 def comes_and_goes(evidence: Evidence) -> Where | None:
     """Where an effect of the best set lives that is the same each time it is met, but differs from turn to turn by more
-    than noise and by a fair part of itself; None where none does. `evidence` is that of the diagnosis.
+    than noise, by a fair part of itself and by more than sensors and model resolve; None where none does. `evidence` is
+    that of the diagnosis.
     """
     fit, settings = evidence.selection.best.fit, evidence.settings.verdict
     for index, term in enumerate(fit.terms):
@@ -87,20 +89,21 @@ def comes_and_goes(evidence: Evidence) -> Where | None:
         if differs.t > settings.remainder_t_alone and differs.spread > settings.spread_over_turns:
             contribution = fit.contribution(index)
             rms = differs.spread * float(np.std(contribution))
-            where = place(effect.domain, main_orders(fit, contribution), rms, evidence)
-            return where | {"spread_over_turns": differs.spread}
+            if rms > resolution(evidence):
+                where = place(effect.domain, main_orders(fit, contribution), rms, evidence)
+                return where | {"spread_over_turns": differs.spread}
     return None
 
 
 def unsteady(evidence: Evidence) -> Where | None:
     """Where something lives that changes in time as no noise does, or that comes and goes, if it is a fair part of what
-    is there, or None. `evidence` is that of the diagnosis.
+    is there and more than sensors and model resolve, or None. `evidence` is that of the diagnosis.
     """
     if (gone := comes_and_goes(evidence)) is not None:
         return gone
     settings = evidence.settings.verdict
     least = settings.remainder_share * max(evidence.base_held_out.variance - evidence.extended_held_out.variance, 0.0)
-    floor = settings.smallest_share * evidence.extended_held_out.variance
+    floor = max(settings.smallest_share * evidence.extended_held_out.variance, resolution(evidence) ** 2)
     wave, steps = evidence.wave, evidence.steps
     rms = max(wave.rms if wave is not None else 0.0, steps.rms)
     if not (steps.any or wave is not None) or rms**2 <= max(least, floor):
