@@ -33,7 +33,7 @@ from hdopt.diagnosis.verdict.residual_structure import (
     left_over_passes,
     outside_share,
 )
-from hdopt.diagnosis.verdict.rivals import beside_told, placebo_as_good, rivals, scale_is_as_good
+from hdopt.diagnosis.verdict.rivals import beside_told, hum_as_good, placebo_as_good, rivals, scale_is_as_good
 from hdopt.diagnosis.verdict.rules import rule_for
 from hdopt.effects.term import Term
 
@@ -199,6 +199,34 @@ def test_where_there_is_a_tie_all_that_fit_no_worse_are_listed():
 def test_a_scale_that_explains_as_well(behind, said):
     alone, beside = candidate({SCALE: 1.0}, 100 - behind), candidate({SCALE: 1.0, "hysteresis": 1.0}, 99.0)
     assert scale_is_as_good(evidence(candidate({"thermal_drift": 1.0}), beside, alone)) is said
+
+
+@pytest.mark.parametrize(
+    ("others", "there"),
+    [
+        ([candidate({"_mains": 1.0}, 96.0)], True),
+        ([candidate({"_mains": 1.0}, 94.0)], False),
+        ([candidate({"_mains": 1.0, "hysteresis": 1.0}, 99.0)], False),
+        ([candidate({"_sine_in_time": 1.0}, 99.0)], False),
+        ([], False),
+    ],
+)
+def test_hum_that_explains_as_well(others, there):
+    """With no more terms, within a tie, on the averaged rows or on those recorded. Faults caught: any sine for hum, a
+    larger set with hum, either search left out."""
+    encoder = candidate({"encoder_interpolation": 1.0})
+    low, high = evidence(encoder, *others), SimpleNamespace(candidates=(encoder, *others))
+    assert (hum_as_good(low, None) is not None) is there
+    without = evidence(encoder, high=high)
+    assert (hum_as_good(without, encoder) is not None) is there
+    assert hum_as_good(without, None) is None
+    for found in (hum_as_good(low, None), hum_as_good(without, encoder)):
+        assert found is None or found == (others[0].fit, 0)
+
+
+def test_hum_that_is_found_is_no_rival_of_itself():
+    best, other = candidate({"_mains": 1.0, "hysteresis": 1.0}), candidate({"lost_motion": 1.0, "_mains": 1.0}, 99.0)
+    assert hum_as_good(evidence(best, other), None) is None
 
 
 def told_and_more(gain=160.0, power=1.0, told=SCALE, of="hysteresis", worth=100.0):

@@ -77,6 +77,8 @@ FIRED = [
     ("not found again", replace(NAMED, found_again=False, heldout_over_floor=1.5), {"own_gain": 0.0}),
     ("misses unseen turns", replace(NAMED, heldout_over_floor=2.4), {"heldout_over_floor": 1.9}),
     ("misses unseen turns", replace(NAMED, heldout_over_floor=2.4), {"unseen_gain": 0.0}),
+    ("hum explains as well", replace(NAMED, hum_as_good=True), {"hum_as_good": False}),
+    ("hum explains as well", replace(NAMED, hum_as_good=True), {"own_gain": 0.0}),
     ("others are as good", replace(NAMED, rivals=(("lost_motion",),)), {"rivals": ()}),
     ("named", NAMED, {"own_gain": 0.01}),
     ("named", NAMED, {"unseen_gain": 0.01}),

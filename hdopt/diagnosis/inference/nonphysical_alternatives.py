@@ -7,6 +7,7 @@ charged like one. A catalogue effect that merely resembles such a structure lose
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -111,6 +112,75 @@ class AnyFrequency(Alternative):
             odds=s.odds,
             doubtful=True,
         )
+
+
+class Mains(Alternative):
+    """Hum of the mains: its frequency, or that and its double and triple. At one speed it is a line of some order,
+    which an encoder or a tooth mesh may have too; that the line is at the mains' frequency is no chance.
+    """
+
+    id = "_mains"
+    domain = "time"
+    leaves_nothing = True
+
+    def lacks(self, samples: Conditions) -> str | None:
+        return None if samples.time is not None and not samples.locked else "a time column"
+
+    def search(self, probe: Probe) -> list[Term]:
+        s, samples = self.settings, probe.samples
+        off = np.linspace(-s.mains_off, s.mains_off, self._places(samples))
+        shapes = []
+        for mains in s.mains_hz:
+            held = [multiples for multiples in s.mains_multiples if multiples * mains < self._highest(samples)]
+            power = [self._power(samples, probe.residual, mains * k, off) for k in range(1, max(held, default=0) + 1)]
+            for multiples in held:
+                best = off[int(np.argmax(sum(power[:multiples])))]
+                beside = np.linspace(-1, 1, s.resolution_steps) * (off[1] - off[0])
+                shapes += [{"frequency_hz": mains * (1 + best + d), "multiples": float(multiples)} for d in beside]
+        return best_terms(probe, [self.term(samples, shape) for shape in shapes])
+
+    def term(self, samples: Conditions, shape: Mapping[str, float], base_value: Array | None = None) -> Term:
+        s, time = self.settings, np.zeros(len(samples)) if samples.time is None else samples.time
+        mains = min(s.mains_hz, key=lambda one: abs(one - shape["frequency_hz"]))
+        frequency = float(np.clip(shape["frequency_hz"], mains * (1 - s.mains_off), mains * (1 + s.mains_off)))
+        hum = [frequency * k for k in range(1, int(shape["multiples"]) + 1)]
+        sines = sine_columns(TURN * (time - time.min()), hum)
+        # Each recording has a clock of its own, which nobody set by the mains.
+        own = [sines * (samples.record == record)[:, None] for record in range(samples.records)]
+        return Term(
+            self.id,
+            {"frequency_hz": frequency, "multiples": shape["multiples"]},
+            columns=np.hstack(own),
+            steps={"frequency_hz": s.derivative / float(np.ptp(time))},
+            trials=float(self._places(samples) * len(s.mains_hz) * len(s.mains_multiples)),
+            odds=s.mains_odds,
+        )
+
+    def _power(self, samples: Conditions, residual: Array, frequency: float, off: Array) -> Array:
+        """Power of the `residual` (n,) at a `frequency` (Hz) that is `off` (k,) by shares of it, (k,), added over the
+        recordings, each with a phase of its own: turned back by the frequency it changes so slowly that means over a
+        part of a cycle of the largest difference hold it.
+        """
+        time = samples.known_time - samples.known_time.min()
+        cell = (time * (frequency * np.max(np.abs(off)) * self.settings.mains_cells)).astype(int)
+        cell += samples.record * (int(cell.max()) + 1)
+        at = np.unique(cell, return_inverse=True)[1]
+        count = np.bincount(at)
+        middle, record = np.bincount(at, time) / count, (np.bincount(at, samples.record) / count).astype(int)
+        turned = residual * np.exp(-1j * TURN * frequency * time)
+        slow = np.bincount(at, turned.real) + 1j * np.bincount(at, turned.imag)
+        back = np.exp(-1j * TURN * frequency * np.outer(off, middle)) * slow
+        return np.asarray(sum(np.abs(back[:, record == r].sum(axis=1)) ** 2 for r in range(samples.records)))
+
+    def _places(self, samples: Conditions) -> int:
+        """Places within the mains' tolerance that the time of `samples` tells apart."""
+        wide = 2 * self.settings.mains_off * max(self.settings.mains_hz) * float(np.ptp(samples.known_time))
+        return 1 + 2 * math.ceil(wide * self.settings.trials_a_step / 2)
+
+    def _highest(self, samples: Conditions) -> float:
+        """The highest frequency (Hz) that the rows of `samples` hold."""
+        usual = float(np.median(np.diff(samples.known_time)[np.diff(samples.piece) == 0]))
+        return self.settings.highest_frequency / usual
 
 
 def strongest_frequencies(rows: Conditions, residual: Array, settings: AlternativeSettings) -> list[float]:
@@ -402,6 +472,7 @@ class VaryingContact(Alternative):
 ALTERNATIVES: tuple[type[Alternative], ...] = (
     AnyOrder,
     AnyFrequency,
+    Mains,
     Jump,
     Bump,
     ChangingOrder,

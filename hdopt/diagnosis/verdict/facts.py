@@ -31,6 +31,7 @@ from hdopt.diagnosis.verdict.rivals import (
     Sets,
     beside_told,
     confounded_pairs,
+    hum_as_good,
     imitating_sets,
     placebo_as_good,
     rivals,
@@ -52,7 +53,8 @@ class Facts:
     `generic_t`; `beaten_by_generic`: such a basis alone, without the effects, predicts better than they do.
     `turns_suffice`: turns can be held out; `too_little`: the record cannot say even that the base is
     adequate. `rivals`: other sets that are as good, placebo and
-    perfect imitations among them; `scale_as_good`: so is a ratio or gain that is off, alone. `heldout_over_floor`:
+    perfect imitations among them; `scale_as_good`: so is a ratio or gain that is off, alone, and
+    `hum_as_good`: hum of the mains in an effect's place. `heldout_over_floor`:
     error on turns that were hidden from the fit (cross-validated where none could be spared) over what a generic basis
     leaves; `found_again`: what is said is preferred without those turns too; `noise_over_neighbours`: cross-validated
     error over the noise that neighbouring samples and the sensors' steps show; `walk`: what is left is as rough at
@@ -78,6 +80,7 @@ class Facts:
     too_little: bool
     rivals: Sets
     scale_as_good: bool = False
+    hum_as_good: bool = False
     log_evidence: float = 0.0
     unseen_gain: float = math.inf
     heldout_over_floor: float = 1.0
@@ -182,6 +185,7 @@ def find(evidence: Evidence) -> Findings:
         too_little=too_little(evidence),
         rivals=(),
         scale_as_good=scale_is_as_good(evidence),
+        hum_as_good=hum_as_good(evidence, high) is not None,
         log_evidence=best.log_bayes_factor,
         unseen_gain=unseen_gain(evidence),
         heldout_over_floor=unseen_rms(evidence) / evidence.noise_floor,

@@ -11,6 +11,7 @@ from hdopt.diagnosis.checks.turn_by_turn import from_turn_to_turn
 from hdopt.diagnosis.inference.catalogue import TOLD, is_outside, properties_of
 from hdopt.diagnosis.inference.cross_validation import paired_chance
 from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.inference.nonphysical_alternatives import Mains
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.verdict.named_effect import main_orders, share_of
@@ -19,6 +20,8 @@ from hdopt.effects.tooth_mesh import ToothMesh
 
 LISTED_DIGITS = 4
 """Digits of an order in the JSON."""
+SHORTEST_WAVE_S = 0.025
+"""Period (s) below which what changes in time is hum of the mains: a slow wave lasts turns of the input."""
 MOMENTARY = frozenset({"_jump", "_bump"})
 """Descriptions of what happened at one moment."""
 
@@ -52,6 +55,8 @@ def momentary(evidence: Evidence) -> bool:
 
 def in_what_way(where: Where) -> str:
     """How something that changes in time (`where`) shows, for the sentence."""
+    if "period_s" in where and where["period_s"] < SHORTEST_WAVE_S:
+        return f", a hum of {1 / where['period_s']:.4g} Hz as of the mains"
     if "period_s" in where:
         return f", a wave of {where['period_s']:.3g} s"
     if "sudden_steps" in where:
@@ -210,14 +215,7 @@ def locate_remainder(evidence: Evidence) -> Where:
     for candidate in (evidence.selection.best, *((evidence.high.best,) if evidence.high is not None else ())):
         for index, term in enumerate(candidate.fit.terms):
             if is_outside(term.effect):
-                contribution = candidate.fit.contribution(index)
-                return {
-                    "domain": properties_of(term.effect).domain,
-                    "orders_per_input_turn": main_orders(candidate.fit, contribution),
-                    "direction": "both",
-                    "share_of_residual": float(min(share_of(candidate.fit, index), 1.0)),
-                    "rms_arcmin": float(np.std(contribution)),
-                }
+                return where_outside(candidate.fit, index)
     explainable = max(evidence.base_held_out.variance, TINY)
     return {
         "domain": domain,
@@ -226,6 +224,19 @@ def locate_remainder(evidence: Evidence) -> Where:
         "share_of_residual": float(min(left / explainable, 1.0)),
         "rms_arcmin": math.sqrt(left),
     }
+
+
+def where_outside(fit: Fit, index: int) -> Where:
+    """Where the description without physics lives that is term `index` of `fit`; of hum with its period."""
+    term, contribution = fit.terms[index], fit.contribution(index)
+    where: Where = {
+        "domain": properties_of(term.effect).domain,
+        "orders_per_input_turn": main_orders(fit, contribution),
+        "direction": "both",
+        "share_of_residual": float(min(share_of(fit, index), 1.0)),
+        "rms_arcmin": float(np.std(contribution)),
+    }
+    return where | {"period_s": 1 / term.shape["frequency_hz"]} if term.effect == Mains.id else where
 
 
 def locate_repeated(evidence: Evidence) -> Where:

@@ -10,6 +10,8 @@ from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding, confounded_with
 from hdopt.diagnosis.inference.catalogue import EXACT_TOLD, TOLD, is_effect
 from hdopt.diagnosis.inference.cross_validation import paired_t
+from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.inference.nonphysical_alternatives import Mains
 from hdopt.diagnosis.search.candidates import Candidate, paid_for_freedom, penalty_scale
 from hdopt.diagnosis.search.high_order import ripple_orders
 from hdopt.diagnosis.settings import VerdictSettings
@@ -42,6 +44,24 @@ def rivals(evidence: Evidence, high: Candidate | None) -> Sets:
     found = [*tied, *fit_as_well] if tied else []
     different = (names for names in dict.fromkeys(found) if names and set(names) != said)
     return tuple(different)[: settings.most_rivals]
+
+
+def hum_as_good(evidence: Evidence, high: Candidate | None) -> tuple[Fit, int] | None:
+    """A fit of no more terms that explains as well with hum of the mains among them, and which of its terms that is;
+    None where there is none, or the best has hum itself. `evidence` is that of the diagnosis, `high` what was found in
+    orders above its rows.
+    """
+    tie = evidence.settings.verdict.tie
+    sets = [evidence.selection.candidates]
+    if high is not None and evidence.high is not None:
+        sets.append(evidence.high.candidates)
+    for best, *others in sets:
+        for other in others:
+            behind = best.log_bayes_factor - other.log_bayes_factor
+            hum = Mains.id in other.effects and Mains.id not in best.effects
+            if hum and behind <= tie and len(other.effects) <= len(best.effects):
+                return other.fit, other.effects.index(Mains.id)
+    return None
 
 
 def scale_is_as_good(evidence: Evidence) -> bool:

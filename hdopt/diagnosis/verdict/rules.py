@@ -21,8 +21,9 @@ from hdopt.diagnosis.verdict.residual_structure import (
     locate_repeated,
     place,
     term_powers,
+    where_outside,
 )
-from hdopt.diagnosis.verdict.rivals import Sets, separating_measurement, tied_pairs
+from hdopt.diagnosis.verdict.rivals import Sets, hum_as_good, separating_measurement, tied_pairs
 from hdopt.diagnosis.verdict.where import Where
 from hdopt.effects import EFFECTS
 
@@ -150,6 +151,13 @@ def something_is_left(facts: Facts) -> bool:
 def another_law_explains(facts: Facts) -> bool:
     """Effects are named, and one of them follows another law than its own. `facts` are those of the recording."""
     return facts.named and facts.other_law > facts.settings.other_law
+
+
+def hum_explains_as_well(facts: Facts) -> bool:
+    """Effects are named, and hum of the mains in the place of one explains as well. `facts` are those of the
+    recording.
+    """
+    return facts.said and facts.hum_as_good
 
 
 def others_are_as_good(facts: Facts) -> bool:
@@ -288,6 +296,20 @@ def where_largest(candidate: Candidate, power: float, evidence: Evidence) -> Whe
     return place(properties_of(candidate.effects[largest]).domain, orders, math.sqrt(power), evidence)
 
 
+def may_be_hum(findings: Findings) -> Conclusion:
+    """What is named, and that hum would look the same at the speed recorded. `findings` hold the facts and the evidence
+    behind them.
+    """
+    found = hum_as_good(findings.evidence, findings.high)
+    assert found is not None, "the rule holds only where hum explains as well"
+    where = where_outside(*found)
+    says = " ".join(effect.says for effect in findings.effects)
+    says += f" Or it is none of the drive's: at the speed recorded hum of the mains, {1 / where['period_s']:.4g} Hz, "
+    says += "explains as much."
+    test = "record at another speed: hum keeps its frequency, what belongs to the drive its order"
+    return Conclusion("unknown", says, findings.effects, separating_test=test, where=where)
+
+
 def likeness(candidate: Candidate) -> str:
     """The catalogue's effects in `candidate`, as a part of a sentence."""
     return " and ".join(name for name in candidate.effects if name in EFFECTS) or "none of the catalogue's effects"
@@ -392,6 +414,7 @@ RULES = (
     Rule("another law explains", another_law_explains, not_by_its_law),
     Rule("not found again", not_found_again, unstable),
     Rule("misses unseen turns", misses_unseen, unstable),
+    Rule("hum explains as well", hum_explains_as_well, may_be_hum),
     Rule("others are as good", others_are_as_good, ambiguous),
     Rule("named", lambda facts: facts.said, named),
     Rule("more than is told", more_than_is_told, more),
