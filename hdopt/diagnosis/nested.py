@@ -22,11 +22,12 @@ from hdopt.arrays import Array, Mask
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut, hidden_samples, shares_of_samples, without_samples
 from hdopt.diagnosis.orientation import turn_round
+from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.high_order import subtract
 from hdopt.diagnosis.search.penalty import bends_to_anything
 from hdopt.diagnosis.settings import DiagnosisSettings
 from hdopt.diagnosis.stages import on_problem
-from hdopt.diagnosis.state import Guess, State
+from hdopt.diagnosis.state import State
 from hdopt.effects.term import Term
 from hdopt.recordings.recording import Recording
 from hdopt.recordings.rows import Rows, gather, neighbours_for
@@ -39,7 +40,7 @@ class Part:
     """A diagnosis of the turns that were left: what its `base` alone and all that it chose (`best`) make of all turns,
     fitted to those that were left; which rows hold hidden samples (`touched`, (n,)) and which nothing else (`hidden`,
     (n,)); the `effects` found, and with how many coefficients and shapes (`freedom`), those of high orders among them;
-    and `guesses` for a search on all turns.
+    `guesses` for a search on all turns, and the `ripple` for the same.
     """
 
     base: Fit
@@ -49,6 +50,7 @@ class Part:
     effects: tuple[str, ...]
     freedom: int
     guesses: tuple[Guess, ...]
+    ripple: Guess | None = None
 
     @property
     def held_out(self) -> NestedHeldOut:
@@ -113,7 +115,7 @@ def diagnosis_of_a_part(
     rows = gather(subtract(seen, ripple_of(seen, state)), neighbours)
     share = shares_of_samples(seen, hidden, neighbours)
     base, best = (refitted(fit, rows, share > 0, state) for fit in (state.selection.base, state.selection.best.fit))
-    return Part(base, best, share > 0, share == 1, *all_found(state), state.as_guesses())
+    return Part(base, best, share > 0, share == 1, *all_found(state), state.as_guesses(), state.ripple_as_guess())
 
 
 def as_seen(recordings: Sequence[Recording], hidden: Sequence[Mask], state: State) -> tuple[Recording, ...]:

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 from hdopt.diagnosis.checks.assessment import Evidence, assess
 from hdopt.diagnosis.inference.encoder_steps import without_output_steps
-from hdopt.diagnosis.nested import diagnosis_of_a_part
+from hdopt.diagnosis.nested import Part, diagnosis_of_a_part
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
 from hdopt.diagnosis.stages import STAGES, STAGES_OF_A_PART, begin, smooth_model
-from hdopt.diagnosis.state import Guess, State
+from hdopt.diagnosis.state import State
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import Recording
 
@@ -29,9 +29,11 @@ def gather_evidence(
     """
 
     def run(
-        some: Sequence[Recording], stages: Sequence[Callable[[State], State]], guesses: tuple[Guess, ...] = ()
+        some: Sequence[Recording], stages: Sequence[Callable[[State], State]], told_by: Part | None = None
     ) -> State:
-        state = replace(begin(some, base, seed, settings, nuisance), guesses=guesses)
+        state = begin(some, base, seed, settings, nuisance)
+        if told_by is not None:
+            state = replace(state, guesses=told_by.guesses, guessed_ripple=told_by.ripple)
         for stage in stages:
             state = stage(state)
         return state
@@ -43,5 +45,5 @@ def gather_evidence(
     part = diagnosis_of_a_part(recordings, lambda some: run(some, STAGES_OF_A_PART), seed, settings)
     if part is None:
         return assess(run(recordings, STAGES))
-    state = run(recordings, STAGES, part.guesses)
+    state = run(recordings, STAGES, part)
     return replace(assess(state), nested=part.held_out, proposed=part.of_proposal(state))

@@ -248,6 +248,13 @@ class AlternativeSettings:
     line_cells: int = threshold(8, "1", "theorem: cells of a line's main lobe at this oversampling")
     slow_waves: tuple[float, ...] = threshold((0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8), "1/record", "choice: slow waves")
     slowest: float = threshold(0.2, "1/record", "choice: slowest wave a fit may move to")
+    mains_hz: tuple[float, ...] = threshold((50.0, 60.0), "Hz", "paper: IEC 60038, mains of either frequency")
+    mains_off: float = threshold(
+        0.002, "1", "choice: share by which mains and a bench's clock are off; EN 50160 allows 1 % for 99.5 % of a year"
+    )
+    mains_cells: int = threshold(10, "1/cycle", "theorem: means over a tenth of a cycle lose 1.6 % of it")
+    mains_multiples: tuple[int, ...] = threshold((1, 3), "1", "choice: the frequency alone, or with double and triple")
+    mains_odds: float = threshold(-1.0, "1", "choice: log prior odds of hum, about 1 in 3")
     jumps: tuple[int, ...] = threshold((1, 2, 3, 4, 5, 6, 7, 9, 11, 13, 16, 20, 25, 30), "1", "choice: jumps tried")
     at_a_reversal: float = threshold(0.5, "input turns", "choice: about a reversal a jump may be what a loop leaves")
     jump_edge_rows: int = threshold(10, "rows", "choice: ends of a record where no jump is placed")
@@ -404,6 +411,11 @@ class HighOrderSettings:
         0.01, "1", "choice: power over the high orders' from which their names are looked at anew"
     )
     zone_rows: int = threshold(30000, "rows", "choice: effort; as recorded, of a first fit of a ripple in the zones")
+    told_by_neighbours: float = threshold(
+        0.02,
+        "1",
+        "choice: share of what is left that the rows before it tell, below which a ripple is not looked for anew",
+    )
     height_waves: tuple[int, ...] = threshold(
         (0, 1, 2, 5, 11),
         "1",

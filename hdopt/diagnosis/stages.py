@@ -28,11 +28,12 @@ from hdopt.diagnosis.inference.residual_noise import measure_noise
 from hdopt.diagnosis.inference.settled_shapes import settled
 from hdopt.diagnosis.orientation import Orientation, is_decisive, preference, turn_round
 from hdopt.diagnosis.search.candidates import Candidate
+from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.high_order import find_ripple, strong_ripple, subtract, subtracted_terms
 from hdopt.diagnosis.search.search_state import SearchPlan
 from hdopt.diagnosis.search.subset_search import Selection, first_look, leading_evidence, select, select_from
 from hdopt.diagnosis.settings import DiagnosisSettings
-from hdopt.diagnosis.state import Guess, State
+from hdopt.diagnosis.state import State
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import Recording
 from hdopt.recordings.rows import gather, neighbours_for
@@ -193,7 +194,7 @@ def begin_turned(state: State) -> State:
     taken = None if state.nuisances.taken is None else state.nuisances.taken.turned
     rng = np.random.default_rng(seed)
     turned = first_fit(turn_round(state.recordings), state.problem.base, rng, state.settings, asked, taken)
-    return set_strong_ripple_aside(replace(turned, guesses=state.guesses))
+    return set_strong_ripple_aside(replace(turned, guesses=state.guesses, guessed_ripple=state.guessed_ripple))
 
 
 def smooth_model(
@@ -335,8 +336,16 @@ def measure_noise_again(state: State) -> State:
 def search_high_orders(state: State) -> State:
     """Tooth mesh and encoder lines, on the rows as recorded. `state` is where the work stands."""
     rng = state.draws()
-    high, ripple = find_ripple(state.recordings, state.selection, state.nuisances, state.ruled_out, rng)
+    high, ripple = find_ripple(
+        state.recordings, state.selection, state.nuisances, state.ruled_out, rng, ripple_told(state)
+    )
     return replace(state, high=high, ripple=ripple, rng=rng)
+
+
+def ripple_told(state: State) -> Guess | None:
+    """The ripple found on other rows of the recordings, where these were counted as at `state`."""
+    guess = state.guessed_ripple
+    return guess if guess is not None and guess.turned == state.orientation.turned else None
 
 
 def search_without_ripple(state: State) -> State:
@@ -363,7 +372,9 @@ def search_without_ripple(state: State) -> State:
     sizes = [float(np.var(fit.contributions)) for fit in (selection.best.fit, before.fit)]
     if state.ripple is not None and changed and max(sizes) > settings.high_order.beside * float(np.var(state.ripple)):
         # What was beside the ripple when it was named is not there any more.
-        high, _ = find_ripple(state.recordings, state.selection, state.nuisances, state.ruled_out, rng)
+        high, _ = find_ripple(
+            state.recordings, state.selection, state.nuisances, state.ruled_out, rng, ripple_told(state)
+        )
         state = state if stands(state.high, high) else replace(state, high=high)
     return state
 

@@ -11,23 +11,11 @@ from hdopt.arrays import Array
 from hdopt.diagnosis.inference.fit import Fit, FitProblem
 from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.orientation import AS_COUNTED, Orientation
+from hdopt.diagnosis.search.guess import Guess, guess_of
 from hdopt.diagnosis.search.search_state import SearchState
 from hdopt.diagnosis.search.subset_search import Selection
 from hdopt.diagnosis.settings import DiagnosisSettings
-from hdopt.effects.term import Shape
 from hdopt.recordings.read import Recording
-
-
-@dataclass(frozen=True)
-class Guess:
-    """What a search on other rows of the same recordings found, without its rows: `errors` of the base (12,) mm,
-    `terms` as (effect id, shape) with their `coefficients`, and whether the recordings were `turned` round there.
-    """
-
-    errors: Array
-    terms: tuple[tuple[str, Shape], ...]
-    coefficients: tuple[Array, ...]
-    turned: bool
 
 
 @dataclass(frozen=True)
@@ -44,7 +32,7 @@ class State:
     `orientation` says which way the angles were counted: `recordings` and everything after stand as counted there.
     `searched`: whether the `selection` is that of a search in the noise that stands here; `looked` is where one stands
     after its first look about this base in this noise (None: not begun). `guesses` are what was found elsewhere and is
-    tried here too.
+    tried here too, and so is the `guessed_ripple`.
     """
 
     recordings: tuple[Recording, ...]
@@ -61,6 +49,7 @@ class State:
     searched: bool = False
     looked: SearchState | None = None
     guesses: tuple[Guess, ...] = ()
+    guessed_ripple: Guess | None = None
     wavy: Fit | None = None
 
     @property
@@ -79,15 +68,13 @@ class State:
 
     def as_guesses(self) -> tuple[Guess, ...]:
         """What the search found, the best first, to be tried on other rows of these recordings."""
-        return tuple(
-            Guess(
-                fit.errors,
-                tuple((term.effect, term.shape) for term in fit.terms),
-                fit.coefficients,
-                self.orientation.turned,
-            )
-            for fit in self.selection.leaders
-        )
+        return tuple(guess_of(fit, self.orientation.turned) for fit in self.selection.leaders)
+
+    def ripple_as_guess(self) -> Guess | None:
+        """The ripple that was found, inside the zones or beside them, to be tried on other rows of these recordings;
+        None without one.
+        """
+        return None if self.high is None else guess_of(self.high.best.fit, self.orientation.turned)
 
     def found(self, selection: Selection) -> State:
         """The state with the `selection` of a search, whose base may be a better one."""

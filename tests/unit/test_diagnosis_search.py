@@ -12,7 +12,9 @@ from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.noise import Noise, estimate, without_lines
 from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.search import zone_high_order
 from hdopt.diagnosis.search.candidates import joint_fit
+from hdopt.diagnosis.search.guess import guess_of
 from hdopt.diagnosis.search.penalty import Scale, SubtractedTerms, discrepancy, penalty
 from hdopt.diagnosis.search.tooth_heights import waves_round
 from hdopt.diagnosis.search.zone_high_order import fit_in_zones, widened
@@ -158,6 +160,82 @@ def test_mesh_inside_the_zones_comes_back(study):
     assert np.std(inside.fit.residual) < 1.1 * 0.01
     assert np.std(low.residual - start @ sines.columns.T) > 1.5 * 0.01
     np.testing.assert_allclose(inside.adds, value - base.evaluate(theta, errors)[0], atol=0.02)
+
+
+@pytest.fixture
+def mesh_of_both_zones(study):
+    """Rows, the drive's own fit, its sines beside a mesh that both zones meet inside the larger-zone rule, and what
+    that mesh is there, in noise of 0.01 arcmin; `off` moves the drive."""
+    base = CartesianModel.of(study.drive)
+    theta = np.linspace(0, 8 * TURN, 8 * 500)
+    errors = to_cartesian(study.errors, base.half_width)
+    rotation, mesh = base.rotation(theta), EFFECTS["tooth_mesh"]
+    met = met_angles(theta, base.advance, base.beyond_at(rotation, errors))[Spline.CIRCULAR]
+    value, _, _ = base.evaluate_at(rotation, errors, 1.5e-3 * np.sin(162 * met + np.array([[0.3], [2.0]])))
+
+    def of(beside=0.0, colour=0.0):
+        noise = np.random.default_rng(5).normal(0, 0.01, len(theta))
+        noise[1:] += colour * noise[:-1]
+        samples = gather([record(theta, value + noise)])
+        problem = FitProblem(samples, base, np.ones((len(samples), 1)), Noise.white(samples, 0.01))
+        low = evaluate(problem, errors, np.zeros(1), (), ())
+        sines = mesh.term(samples, {"sidebands": SIDEBANDS[6]})
+        plain = FitProblem(samples, None, problem.nuisance, problem.noise)
+        start = np.linalg.lstsq(sines.columns, low.residual, rcond=None)[0]
+        return samples, low, evaluate(plain, np.zeros(0), np.zeros(1), [sines], [start])
+
+    return of
+
+
+@pytest.fixture
+def looked_anew(monkeypatch):
+    """How often a mesh inside the zones was looked for from its sines on."""
+    seen, step_by_step = [], zone_high_order._step_by_step
+    monkeypatch.setattr(zone_high_order, "_step_by_step", lambda *about: seen.append(1) or step_by_step(*about))
+    return seen
+
+
+def test_a_mesh_that_was_told_is_not_looked_for_anew(mesh_of_both_zones, looked_anew):
+    """Found on other rows, it is fitted from there, and leaves white noise; where it leaves more, as in noise that is
+    not white, all is tried. Faults caught: the waves or the drive told not used, the rest tried all the same, or never.
+    """
+    samples, low, plain = mesh_of_both_zones()
+    found = fit_in_zones(samples, low, _OneZero(), plain)
+    assert len(looked_anew) == 1
+    moved = evaluate(low.problem, low.errors + 0.02 * np.cos(np.arange(12.0)), low.offsets, (), ())
+    told = replace(guess_of(found.fit, False), errors=low.errors)
+    again = fit_in_zones(samples, moved, _OneZero(), plain, told)
+    assert len(looked_anew) == 1
+    assert np.std(again.fit.residual) < 1.01 * np.std(found.fit.residual)
+    np.testing.assert_allclose(again.adds, found.adds, atol=0.01)
+    samples, low, plain = mesh_of_both_zones(colour=0.5)
+    fit_in_zones(samples, low, _OneZero(), plain, told)
+    assert len(looked_anew) == 2
+
+
+def test_a_mesh_that_was_told_beside_the_zones_is_not_looked_for_in_them(study, looked_anew):
+    """Where its sines leave white noise here too; what was told of another effect says nothing. Faults caught: tried
+    all the same, or left out where the sines leave more."""
+    base = CartesianModel.of(study.drive)
+    theta = np.linspace(0, 8 * TURN, 8 * 500)
+    errors = to_cartesian(study.errors, base.half_width)
+    value = base.evaluate(theta, errors)[0]
+    for slow, tries in ((0.0, 0), (0.02, 1)):
+        noise = np.random.default_rng(6).normal(0, 0.01, len(theta)) + slow * np.sin(7.3 * theta)
+        samples = gather([record(theta, value + 0.2 * np.sin(162 * theta) + noise)])
+        problem = FitProblem(samples, base, np.ones((len(samples), 1)), Noise.white(samples, 0.01))
+        low = evaluate(problem, errors, np.zeros(1), (), ())
+        sines = EFFECTS["tooth_mesh"].term(samples, {"sidebands": SIDEBANDS[0]})
+        without_base = FitProblem(samples, None, problem.nuisance, problem.noise)
+        start = np.linalg.lstsq(sines.columns, low.residual, rcond=None)[0]
+        plain = evaluate(without_base, np.zeros(0), np.zeros(1), [sines], [start])
+        looked_anew.clear()
+        fit_in_zones(samples, low, _OneZero(), plain, guess_of(plain, False))
+        assert len(looked_anew) == tries
+    other = replace(guess_of(plain, False), terms=(("encoder_interpolation", {"lines": 5000}),))
+    looked_anew.clear()
+    fit_in_zones(samples, low, _OneZero(), plain, other)
+    assert len(looked_anew) == 1
 
 
 def test_mesh_of_unequal_teeth_comes_back_from_a_bent_base(study):

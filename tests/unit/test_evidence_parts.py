@@ -181,7 +181,13 @@ def hidden(monkeypatch):
     base, best = fit(10.0), fit(1.0, "hysteresis")
     found = SimpleNamespace(best=SimpleNamespace(fit=best), base=base)
     high = SimpleNamespace(best=SimpleNamespace(fit=fit(1.0, "tooth_mesh")))
-    state = SimpleNamespace(selection=found, high=high, recordings=(), as_guesses=lambda: ("a guess",))
+    state = SimpleNamespace(
+        selection=found,
+        high=high,
+        recordings=(),
+        as_guesses=lambda: ("a guess",),
+        ripple_as_guess=lambda: "a ripple",
+    )
     monkeypatch.setattr(nested, "hidden_samples", lambda *about: ("mask",))
     monkeypatch.setattr(nested, "without_samples", lambda recordings, mask: recordings)
     monkeypatch.setattr(nested, "as_seen", lambda *about: ())
@@ -209,4 +215,4 @@ def test_a_nested_run_tells_all_that_it_found(hidden):
     part, _ = hidden
     assert part.held_out.effects == ("hysteresis", "tooth_mesh")
     assert part.freedom == 4
-    assert part.guesses == ("a guess",)
+    assert (part.guesses, part.ripple) == (("a guess",), "a ripple")

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from hdopt.diagnosis.inference.catalogue import explanations
-from hdopt.diagnosis.inference.nonphysical_alternatives import AnyOrder
+from hdopt.diagnosis.inference.nonphysical_alternatives import AnyOrder, Mains
 from hdopt.diagnosis.search import high_order
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.high_order import high_order_selection, ripple_orders, subtract
@@ -120,9 +120,9 @@ def searched(monkeypatch):
 
 
 def test_high_orders_are_searched_by_what_is_of_high_order(searched):
-    """All of the catalogue that is not, and what is ruled out, is left aside; plain lines of any order are not."""
+    """All of the catalogue that is not, and what is ruled out, is left aside; plain lines and hum are not."""
     plan = searched().plan
-    assert set(explanations()) - set(plan.skip) == {*HIGH_ORDER, AnyOrder.id} - {"tooth_mesh"}
+    assert set(explanations()) - set(plan.skip) == {*HIGH_ORDER, AnyOrder.id, Mains.id} - {"tooth_mesh"}
     assert plan.order_range == (20.0, DEFAULT.high_order.order_share * 400.0)
 
 
@@ -147,6 +147,6 @@ def test_a_ripple_found_in_the_zones_adds_what_it_adds_there(monkeypatch):
     monkeypatch.setattr(high_order, "gather", lambda recordings: None)
     inside = SimpleNamespace(fit="inside", adds="what it adds there")
     for zones, fit, adds in ((inside, "inside", "what it adds there"), (None, high.best.fit, "beside")):
-        monkeypatch.setattr(high_order, "fit_in_zones", lambda *about, zones=zones: zones)
-        selection, ripple = high_order.find_ripple((), found, None, (), None)
+        monkeypatch.setattr(high_order, "fit_in_zones", lambda *about, zones=zones: about[-1] == "told" and zones)
+        selection, ripple = high_order.find_ripple((), found, None, (), None, "told")
         assert (selection.best.fit, ripple) == (fit, adds)

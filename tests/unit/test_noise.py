@@ -1,12 +1,21 @@
 """The noise's autoregression: its filter, its gaps, its order, and how much rougher the noise is than it."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy import linalg, signal
 from test_cross_validation import RATE, noisy, rows_of, without_base
 
 from hdopt.diagnosis.inference import residual_noise
-from hdopt.diagnosis.inference.noise import Noise, _covariance, autoregression, estimate, weights_with_a_past
+from hdopt.diagnosis.inference.noise import (
+    Noise,
+    _covariance,
+    autoregression,
+    estimate,
+    predictable_share,
+    weights_with_a_past,
+)
 from hdopt.diagnosis.inference.nonphysical_alternatives import strongest_frequencies
 from hdopt.diagnosis.inference.residual_noise import measure_noise, roughness
 from hdopt.diagnosis.settings import DEFAULT
@@ -129,3 +138,17 @@ def test_each_lag_has_rows_behind_it():
     for length, lags in ((45, 2), (400, DEFAULT.noise.highest_order)):
         covariance = _covariance(in_pieces(rows, length).piece, rows.error, DEFAULT.noise)
         assert len(covariance) == 1 + lags
+
+
+def test_what_the_rows_before_tell_of_a_residual():
+    """Of white noise nothing, of a first-order autoregression its coefficient's square, of a sine all, and nothing over
+    a gap. Faults caught: power for share, a lag forgotten, the pieces joined."""
+    rng = np.random.default_rng(2)
+    white = rng.normal(0, 3.0, 20000)
+    rows = SimpleNamespace(piece=np.zeros(20000, np.int64))
+    assert predictable_share(rows, white) < 1e-3
+    assert predictable_share(rows, signal.lfilter([1.0], [1.0, -0.5], white)) == pytest.approx(0.25, abs=0.02)
+    assert predictable_share(rows, np.sin(0.7 * np.arange(20000))) > 0.95
+    apart = SimpleNamespace(piece=np.arange(20000) // 50)
+    steps = np.repeat(rng.choice([-1.0, 1.0], 400), 50)
+    assert predictable_share(apart, steps + 1e-3 * white) > 0.9

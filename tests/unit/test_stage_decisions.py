@@ -13,9 +13,10 @@ from hdopt.diagnosis.inference import clean_base
 from hdopt.diagnosis.inference.common_slope import TakenSlope
 from hdopt.diagnosis.orientation import Orientation
 from hdopt.diagnosis.search.candidates import Candidate
+from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.subset_search import Selection
 from hdopt.diagnosis.settings import DEFAULT
-from hdopt.diagnosis.state import Guess, State
+from hdopt.diagnosis.state import State
 from hdopt.recordings.recording import Recording
 
 
@@ -177,9 +178,9 @@ def test_a_recording_turned_round_begins_as_the_other_did(monkeypatch, drift, ta
     """
     begun = []
     monkeypatch.setattr(stages, "first_fit", lambda *about: begun.append(about) or state_of(Told("turned")))
-    monkeypatch.setattr(stages, "set_strong_ripple_aside", lambda state: ("set aside", state.guesses))
-    state = replace(state_of(Told(""), drift=drift, taken=taken), guesses=("told",))
-    assert stages.begin_turned(state) == ("set aside", ("told",))
+    monkeypatch.setattr(stages, "set_strong_ripple_aside", lambda state: (state.guesses, state.guessed_ripple))
+    state = replace(state_of(Told(""), drift=drift, taken=taken), guesses=("told",), guessed_ripple="a ripple")
+    assert stages.begin_turned(state) == (("told",), "a ripple")
     (((record,), base, _, settings, asked, slope),) = begun
     assert (base, settings, asked) == ("a base", DEFAULT, ("drift",) if drift else ())
     np.testing.assert_array_equal(record.input_angle, -state.recordings[0].input_angle)
@@ -202,6 +203,17 @@ def test_what_was_found_elsewhere_is_where_a_search_begins(monkeypatch):
     assert stages.plan_of(other).known == ("known", ("told", True))
     gear = state_of(Told("base", problem=Problem(base=None)), guesses=(GUESS,))
     assert stages.plan_of(gear).known == ("known",)
+
+
+def test_a_ripple_is_told_where_it_was_counted_as_here(monkeypatch):
+    """Faults caught: a ripple of recordings that are counted the other way round, and one that is not handed on."""
+    told = []
+    monkeypatch.setattr(stages, "find_ripple", lambda *about: told.append(about[-1]) or (None, None))
+    state = replace(state_of(Told("base")), guessed_ripple=GUESS)
+    stages.search_high_orders(state)
+    stages.search_high_orders(replace(state, orientation=Orientation(-1, -1, "data")))
+    stages.search_high_orders(replace(state, guessed_ripple=None))
+    assert told == [GUESS, None, None]
 
 
 @pytest.mark.parametrize("told", [True, False])

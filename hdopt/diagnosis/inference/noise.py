@@ -125,6 +125,15 @@ def estimate(rows: Rows, residual: Array, settings: NoiseSettings = DEFAULT.nois
     return Noise(ar, float(np.sqrt(np.sum(white**2) / max((noise.root_weight > 0).sum(), 1))), noise.root_weight)
 
 
+def predictable_share(rows: Rows, residual: Array, settings: NoiseSettings = DEFAULT.noise) -> float:
+    """Share of the power of a `residual` (n,) that the `rows` before tell, by an autoregression of the order that
+    Schwarz's criterion prefers: 0 for white noise. `settings` are the thresholds.
+    """
+    covariance = _covariance(rows.piece, residual, settings)
+    ar = autoregression(covariance, len(residual), settings)
+    return float(ar @ covariance[1 : len(ar) + 1] / max(covariance[0], TINY))
+
+
 def weights_with_a_past(rows: Rows, order: int) -> Array:
     """Root weights (n,) of the `rows` that have so many (`order`) before them in their own piece; 0 for the others."""
     piece = rows.piece

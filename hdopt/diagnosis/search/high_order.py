@@ -13,9 +13,10 @@ from hdopt.diagnosis.inference import noise as noise_model
 from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.noise import Noise
-from hdopt.diagnosis.inference.nonphysical_alternatives import AnyOrder
+from hdopt.diagnosis.inference.nonphysical_alternatives import AnyOrder, Mains
 from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.penalty import SubtractedTerms, leaves_nothing
 from hdopt.diagnosis.search.search_state import SearchPlan
 from hdopt.diagnosis.search.subset_search import Selection, select
@@ -35,15 +36,16 @@ def find_ripple(
     nuisances: Nuisances,
     ruled_out: Sequence[str],
     rng: np.random.Generator,
+    told: Guess | None = None,
 ) -> tuple[Selection | None, Array | None]:
     """The search of orders above the averaged rows of `recordings` beside what was `found` in them and the
     `nuisances`, without the effects `ruled_out`, and what its best candidate adds to the rows as recorded, (n,).
-    `rng` draws what is random.
+    `rng` draws what is random; `told` is the ripple found on other rows of them.
     """
     high = high_order_selection(recordings, found, nuisances, ruled_out, rng)
     if high is None or not high.best.fit.terms:
         return high, None
-    inside = fit_in_zones(gather(recordings), found.best.fit, nuisances, high.best.fit)
+    inside = fit_in_zones(gather(recordings), found.best.fit, nuisances, high.best.fit, told)
     if inside is None:
         return high, high.best.fit.contributions
     return high.with_best_fit(inside.fit), inside.adds
@@ -77,7 +79,7 @@ def high_order_selection(
         left = bare.residual - waves_of(raw, bare.residual, lines)
         noise = noise_model.estimate(raw, left, settings.noise)
     bare = evaluate(problem.with_noise(noise), np.zeros(0), bare.offsets, (), ())
-    low_effects = (*ruled_out, *(e for e in explanations() if e not in HIGH_ORDER and e != AnyOrder.id))
+    low_effects = (*ruled_out, *(e for e in explanations() if e not in HIGH_ORDER and e not in (AnyOrder.id, Mains.id)))
     # What a pulse or a loop leaves where its shape is not quite right reaches into these orders too.
     rough = [i for i, term in enumerate(low.terms) if not leaves_nothing(term)]
     power = float(np.var(sum((low.contribution(i) for i in rough), np.zeros(len(averaged)))))

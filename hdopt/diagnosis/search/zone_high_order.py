@@ -22,7 +22,9 @@ from hdopt.arrays import Array
 from hdopt.diagnosis.inference.base_fit import thinned
 from hdopt.diagnosis.inference.catalogue import is_outside
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine, term_columns
+from hdopt.diagnosis.inference.noise import predictable_share
 from hdopt.diagnosis.inference.nuisance import Nuisances
+from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.tooth_heights import fit_heights
 from hdopt.effects.base import Explanation
 from hdopt.effects.term import Shape, Term
@@ -43,13 +45,16 @@ class ZoneRipple:
     adds: Array
 
 
-def fit_in_zones(rows: Rows, low: Fit, nuisances: Nuisances, ripple: Fit) -> ZoneRipple | None:
+def fit_in_zones(
+    rows: Rows, low: Fit, nuisances: Nuisances, ripple: Fit, told: Guess | None = None
+) -> ZoneRipple | None:
     """The one term of `ripple` that the zones may meet inside them, or None where it acts beside them or the sum of
     sines explains as much. Effects found with it stay beside; a sine without physics, which stands for what it does to
     the driving zone, goes.
 
     `rows` are the rows as recorded with their recorded error, `low` the base and effects fitted on averaged rows.
-    `nuisances` are the columns that are always free.
+    `nuisances` are the columns that are always free; `told` is what was found of it on other rows of the recordings,
+    inside the zones or beside them: where that leaves nothing that the row before would tell, nothing else is tried.
     """
     base = low.problem.base
     physical = [one for one in _weighed(ripple.terms, ripple) if not is_outside(one[0].effect)]
@@ -69,11 +74,39 @@ def fit_in_zones(rows: Rows, low: Fit, nuisances: Nuisances, ripple: Fit) -> Zon
     others = [one for one in known if one[0].met is None]
     starts = (known, others) if len(others) < len(known) else (known,)
     shapes = effect.in_zones(shape)
-    fits = each(lambda start: _step_by_step(problem, low, [*start, *beside], effect, shapes), starts)
-    for start, fit in zip(starts, fits, strict=True):
+    fits: list[Fit] = []
+    if told is not None and (term := _told_term(rows, effect, told)) is not None:
+        if not term.in_zones and _leaves_nothing(sines):
+            return None
+        if term.in_zones:
+            fits = [_as_told(problem, low, [*start, *beside], term, told) for start in starts]
+    if not any(_leaves_nothing(fit) for fit in fits):
+        fits += each(lambda start: _step_by_step(problem, low, [*start, *beside], effect, shapes), starts)
+    for fit in fits:
         if _score(fit) < best:
-            best, inside = _score(fit), _alone(fit, len(start))
+            best, inside = _score(fit), _alone(fit, len(fit.terms) - len(beside) - 1)
     return inside
+
+
+def _told_term(rows: Rows, effect: Explanation, told: Guess) -> Term | None:
+    """The term of `effect` on these `rows` that was `told`, inside the zones or beside them; None where it was not."""
+    shapes = [shape for name, shape in told.terms if name == effect.id]
+    return effect.term(rows, shapes[0]) if shapes else None
+
+
+def _as_told(problem: FitProblem, low: Fit, beside: Sequence[Weighed], term: Term, told: Guess) -> Fit:
+    """The fit of `term` inside the zones with all `beside` it, from the drive and the waves that were `told`. Offsets
+    are those of `low`."""
+    waves = next(own for (name, _), own in zip(told.terms, told.coefficients, strict=True) if name == term.effect)
+    terms = [*(one for one, _ in beside), term]
+    start = evaluate(problem, told.errors, low.offsets, terms, [*(own for _, own in beside), waves])
+    return refine(start, problem.settings.fit.known_iterations, move_shapes=False)
+
+
+def _leaves_nothing(fit: Fit) -> bool:
+    """Whether neighbouring rows tell next to nothing of what `fit` leaves."""
+    settings = fit.problem.settings
+    return predictable_share(fit.problem.rows, fit.residual, settings.noise) < settings.high_order.told_by_neighbours
 
 
 def _step_by_step(
