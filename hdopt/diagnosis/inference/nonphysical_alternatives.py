@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.fft import fft, next_fast_len
 from scipy.ndimage import convolve1d
 
 from hdopt.arrays import Array
@@ -128,15 +129,16 @@ class Mains(Alternative):
 
     def search(self, probe: Probe) -> list[Term]:
         s, samples = self.settings, probe.samples
-        off = np.linspace(-s.mains_off, s.mains_off, self._places(samples))
         shapes = []
         for mains in s.mains_hz:
             held = [multiples for multiples in s.mains_multiples if multiples * mains < self._highest(samples)]
-            power = [self._power(samples, probe.residual, mains * k, off) for k in range(1, max(held, default=0) + 1)]
+            if not held:
+                continue
+            off, power = self._spectrum(samples, probe.residual, mains, max(held))
             for multiples in held:
-                best = off[int(np.argmax(sum(power[:multiples])))]
+                best = off[int(np.argmax(power[:multiples].sum(axis=0)))]
                 beside = np.linspace(-1, 1, s.resolution_steps) * (off[1] - off[0])
-                shapes += [{"frequency_hz": mains * (1 + best + d), "multiples": float(multiples)} for d in beside]
+                shapes += [{"frequency_hz": mains + best + d, "multiples": float(multiples)} for d in beside]
         return best_terms(probe, [self.term(samples, shape) for shape in shapes])
 
     def term(self, samples: Conditions, shape: Mapping[str, float], base_value: Array | None = None) -> Term:
@@ -156,21 +158,28 @@ class Mains(Alternative):
             odds=s.mains_odds,
         )
 
-    def _power(self, samples: Conditions, residual: Array, frequency: float, off: Array) -> Array:
-        """Power of the `residual` (n,) at a `frequency` (Hz) that is `off` (k,) by shares of it, (k,), added over the
-        recordings, each with a phase of its own: turned back by the frequency it changes so slowly that means over a
-        part of a cycle of the largest difference hold it.
+    def _spectrum(self, samples: Conditions, residual: Array, mains: float, multiples: int) -> tuple[Array, Array]:
+        """Differences (k,), Hz, from the `mains`' frequency within its tolerance, and the power of the `residual` (n,)
+        at 1 to `multiples` times the frequencies that they make, (multiples, k), added over the recordings, each with a
+        phase of its own. Turned back by the mains' frequency, hum changes so slowly that means over a part of a cycle
+        of the largest difference hold it.
         """
-        time = samples.known_time - samples.known_time.min()
-        cell = (time * (frequency * np.max(np.abs(off)) * self.settings.mains_cells)).astype(int)
-        cell += samples.record * (int(cell.max()) + 1)
-        at = np.unique(cell, return_inverse=True)[1]
-        count = np.bincount(at)
-        middle, record = np.bincount(at, time) / count, (np.bincount(at, samples.record) / count).astype(int)
-        turned = residual * np.exp(-1j * TURN * frequency * time)
-        slow = np.bincount(at, turned.real) + 1j * np.bincount(at, turned.imag)
-        back = np.exp(-1j * TURN * frequency * np.outer(off, middle)) * slow
-        return np.asarray(sum(np.abs(back[:, record == r].sum(axis=1)) ** 2 for r in range(samples.records)))
+        s, widest = self.settings, self.settings.mains_off * mains
+        time, starts = samples.known_time, np.flatnonzero(np.diff(samples.record, prepend=-1))
+        since = time - time[starts][samples.record]
+        cell = (since * (widest * multiples * s.mains_cells)).astype(int)
+        length = next_fast_len(int(s.trials_a_step) * (int(cell.max()) + 1))
+        step = widest * multiples * s.mains_cells / length
+        last = max(int(widest / step), 1)
+        at = np.arange(-last, last + 1)
+        power = np.zeros((multiples, len(at)))
+        for record in range(samples.records):
+            own = samples.record == record
+            for k in range(1, multiples + 1):
+                turned = residual[own] * np.exp(-1j * TURN * k * mains * since[own])
+                slow = np.bincount(cell[own], turned.real, length) + 1j * np.bincount(cell[own], turned.imag, length)
+                power[k - 1] += np.abs(fft(slow)[k * at]) ** 2
+        return np.asarray(at * step, np.float64), power
 
     def _places(self, samples: Conditions) -> int:
         """Places within the mains' tolerance that the time of `samples` tells apart."""
