@@ -611,7 +611,16 @@ class VerdictSettings:
         2.0, "1", "choice: log prior odds against an imitator without one of its parts, as a code wheel oval, yet true"
     )
     smallest_weight: float = threshold(-60.0, "1", "choice: log weight below which a candidate is none")
-    most_confident: float = threshold(0.97, "1", "measured: 97 of 100 names of three runs of the injection study")
+    right_alone: float = threshold(
+        4.45, "1", "measured: log odds that a name alone is right, at the floor; 412 names of runs 014 to 017"
+    )
+    right_less_a_name: float = threshold(0.57, "1", "measured: how much less they are for each name beside it")
+    right_less_over_floor: float = threshold(
+        31.0, "1", "measured: how much less they are by the log of the held-out error over the noise floor"
+    )
+    right_most_over: float = threshold(
+        1.1, "1", "choice: held-out error over noise floor up to which that was learned; more is as much"
+    )
     listed_orders: int = threshold(4, "1", "choice: orders listed")
     listed_share: float = threshold(0.3, "1", "choice: share of the largest from which an order is listed")
     order_turns: float = threshold(0.5, "input turns", "choice: turns that orders need")

@@ -1,72 +1,57 @@
-"""Whether the confidence of a name can be computed: `python -m tests.benchmarks.confidence_fit`
+"""How often a name is right, by what its answer shows: `python -m tests.benchmarks.confidence_fit [RUN...] [--on RUN]`
 
-Reads `confidence-cases.jsonl`, learns the chance that a name is right from what carries it, and holds it against the
-best constant by log score, each case left out in turn with all of its names.
+Reads the kept answers of registered runs of the blind proof (docs/proof), learns the log odds that a name in a `named`
+answer is right from how many are named and from how much of the noise floor's multiple is left on turns left out, and
+holds that against the best constant by log score, each run left out in turn. The slopes of all runs stand in
+`hdopt/diagnosis/settings.py` (`right_*`). `--on` tries them as they stand there on a run that they were not learned on.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from scipy.optimize import minimize
 from scipy.special import expit
 
-from tests.benchmarks.confidence_cases import KEPT
+from hdopt.bench import registry
+from hdopt.diagnosis.settings import DEFAULT
 
-RIDGE = 1.0
-"""Penalty on a slope per standard deviation of its feature: a normal prior of unit width."""
-LIMIT = 0.002
-"""Chances are kept this far from 0 and 1 in scores."""
-BINS = (0.0, 0.5, 0.8, 0.9, 0.95, 0.98, 1.0)
-
-
-def names(cases: list[dict]) -> tuple[list[str], np.ndarray, np.ndarray, np.ndarray]:
-    """Of each name in `cases`: the features' names, their values (n, k), whether it is right (n,), its case (n,)."""
-    rows, right, group = [], [], []
-    for number, case in enumerate(cases):
-        for effect in case.get("effects", []):
-            rows.append(features(case, effect))
-            right.append(effect["id"] in {*case["truth"], *case["beside_true"]})
-            group.append(number)
-    return list(rows[0]), np.array([list(one.values()) for one in rows]), np.array(right, float), np.array(group)
+RUNS = ("run-014", "run-015", "run-016", "run-017")
+FEATURES = ("names beside it", "log of held-out error over the floor")
+BINS = (0.0, 0.5, 0.8, 0.9, 0.95, 0.97, 1.0)
 
 
-def features(case: dict, effect: dict) -> dict[str, float]:
-    """What may carry the name of an `effect` in a `case`, each larger where more speaks for it."""
-    fit, nested = case["fit"], case["nested"]
-    unseen = fit["heldout_nested_rms_arcmin"] or fit["heldout_rms_extended_arcmin"]
-    apart = effect["log_evidence_apart"]
-    return {
-        "log of evidence apart": np.log1p(max(apart if apart is not None else 100.0, 0.0)),
-        "log of floor over unseen": -np.log(unseen / fit["noise_floor_arcmin"]),
-        "log of placebo over extended": np.log(fit["heldout_rms_placebo_arcmin"] / fit["heldout_rms_extended_arcmin"]),
-        "log of its size over the floor": np.log(effect["rms_arcmin"] / fit["noise_floor_arcmin"]),
-        "found again": 0.5 if nested is None else float(effect["id"] in nested["effects"]),
-        "only explanation": float(case["verdict"] == "named"),
-        "alone": float(len(case["effects"]) == 1),
-    }
+def names(run: str) -> tuple[np.ndarray, np.ndarray]:
+    """Of each name of the `named` answers of a registered `run`: its features (n, 2), and whether it is right (n,)."""
+    answers, keys = registry.kept(registry.FOLDER, run)
+    rows, right = [], []
+    for key in keys:
+        answer = answers.get(key["id"])
+        if not answer or answer.get("verdict") != "named":
+            continue
+        over = np.log(answer["fit"]["heldout_rms_extended_arcmin"] / answer["fit"]["noise_floor_arcmin"])
+        for effect in answer["effects"]:
+            rows.append([len(answer["effects"]) - 1, np.clip(over, 0, np.log(DEFAULT.verdict.right_most_over))])
+            right.append(effect["id"] in {*key["effects"], *key["beside_true"]})
+    return np.array(rows), np.array(right, float)
 
 
-def logistic(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Slopes (k + 1,), the constant first, on `x` (n, k) shifted and scaled by what comes second and third."""
-    middle, spread = x.mean(0), np.where(x.std(0) > 0, x.std(0), 1.0)
-    design = np.column_stack([np.ones(len(x)), (x - middle) / spread])
+def logistic(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Log odds at zero and slopes (k + 1,) on `x` (n, k) by greatest likelihood of `y` (n,)."""
+    design = np.column_stack([np.ones(len(x)), x])
 
     def loss(slopes: np.ndarray) -> float:
         score = design @ slopes
-        return float(np.sum(np.logaddexp(0, score) - y * score) + RIDGE * np.sum(slopes[1:] ** 2) / 2)
+        return float(np.sum(np.logaddexp(0, score) - y * score))
 
-    return minimize(loss, np.zeros(design.shape[1])).x, middle, spread
+    return minimize(loss, np.zeros(design.shape[1])).x
 
 
-def chance(learned: tuple[np.ndarray, np.ndarray, np.ndarray], x: np.ndarray) -> np.ndarray:
+def chance(slopes: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Chances (n,) that names with the features `x` (n, k) are right."""
-    slopes, middle, spread = learned
-    return np.clip(expit(slopes[0] + (x - middle) / spread @ slopes[1:]), LIMIT, 1 - LIMIT)
+    return expit(slopes[0] + x @ slopes[1:])
 
 
 def log_score(p: np.ndarray, y: np.ndarray) -> float:
@@ -74,42 +59,49 @@ def log_score(p: np.ndarray, y: np.ndarray) -> float:
     return float(np.mean(np.log(np.where(y > 0, p, 1 - p))))
 
 
-def left_out(x: np.ndarray, y: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Chances (n,) by the features and by the constant, each case left out of what was learned."""
-    learned, constant = np.empty(len(y)), np.empty(len(y))
-    for one in np.unique(group):
-        out = group == one
-        learned[out] = chance(logistic(x[~out], y[~out]), x[out])
-        constant[out] = np.clip(y[~out].mean(), LIMIT, 1 - LIMIT)
-    return learned, constant
+def reliability(p: np.ndarray, y: np.ndarray) -> None:
+    """Print how many names were right by their chance."""
+    print("| chance | names | mean | right |")
+    for low, high in pairwise(BINS):
+        inside = (p >= low) & (p < high)
+        if inside.any():
+            print(f"| {low:g}-{high:g} | {inside.sum()} | {p[inside].mean():.3f} | {y[inside].mean():.3f} |")
 
 
 def main() -> None:
-    """Print scores, slopes and the reliability of `--cases`."""
+    """Print slopes, scores and the reliability of the runs named."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=Path, default=KEPT)
+    parser.add_argument("runs", nargs="*", default=RUNS)
+    parser.add_argument("--on", metavar="RUN", help="a run to try the shipped slopes on")
     options = parser.parse_args()
-    cases = [json.loads(line) for line in options.cases.read_text().splitlines()]
-    answered = [case for case in cases if "error" not in case]
-    labels, x, y, group = names(answered)
-    print(f"{len(answered)} cases answered of {len(cases)}")
-    print(f"{len(y)} names in {len(np.unique(group))} cases, {int(y.sum())} right")
-    learned, constant = left_out(x, y, group)
-    print(f"log score: features {log_score(learned, y):.4f}, constant {log_score(constant, y):.4f}")
-    for i, label in enumerate(labels):
-        alone, _ = left_out(x[:, [i]], y, group)
-        print(f"  {label} alone {log_score(alone, y):.4f}")
-    said = np.array([effect["confidence"] for case in answered for effect in case["effects"]])
-    print(f"  as said {log_score(np.clip(said, LIMIT, 1 - LIMIT), y):.4f}")
-    slopes, middle, spread = logistic(x, y)
-    print(f"constant {slopes[0]:.3f}")
-    for label, slope, m, s in zip(labels, slopes[1:], middle, spread, strict=True):
-        print(f"{label}: {slope:.3f} per {s:.3f} from {m:.3f}")
-    print("| computed, case left out | names | mean | right |")
-    for low, high in pairwise(BINS):
-        inside = (learned >= low) & (learned < high)
-        if inside.any():
-            print(f"| {low:g}-{high:g} | {inside.sum()} | {learned[inside].mean():.3f} | {y[inside].mean():.3f} |")
+    if options.on:
+        s = DEFAULT.verdict
+        x, y = names(options.on)
+        p = chance(np.array([s.right_alone, -s.right_less_a_name, -s.right_less_over_floor]), x)
+        best = np.full(len(y), y.mean())
+        print(
+            f"{options.on}: {len(y)} names, {int(y.sum())} right; log score as shipped {log_score(p, y):.4f}, ", end=""
+        )
+        print(f"best constant {log_score(best, y):.4f}")
+        reliability(p, y)
+        return
+    known = {run: names(run) for run in options.runs}
+    x, y = (np.concatenate([one[i] for one in known.values()]) for i in (0, 1))
+    print(f"{len(y)} names, {int(y.sum())} right")
+    learned, constant, seen = [], [], []
+    for run, (own, right) in known.items():
+        others = [one for name, one in known.items() if name != run]
+        rest, so = (np.concatenate([one[i] for one in others]) for i in (0, 1))
+        learned.append(chance(logistic(rest, so), own))
+        constant.append(np.full(len(right), so.mean()))
+        seen.append(right)
+    p, c, y_seen = (np.concatenate(one) for one in (learned, constant, seen))
+    print(f"each run left out: log score {log_score(p, y_seen):.4f}, by the constant {log_score(c, y_seen):.4f}")
+    reliability(p, y_seen)
+    slopes = logistic(x, y)
+    print(f"log odds alone at the floor {slopes[0]:.3f}")
+    for label, slope in zip(FEATURES, slopes[1:], strict=True):
+        print(f"{label}: {slope:.3f}")
 
 
 if __name__ == "__main__":

@@ -16,6 +16,8 @@ from hdopt.diagnosis.inference.fit import refine
 from hdopt.diagnosis.inference.nonphysical_alternatives import AnyFrequency, Mains
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.search.penalty import Scale, penalty
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.diagnosis.verdict.named_effect import chance_right
 from hdopt.diagnosis.verdict.residual_structure import in_what_way
 from hdopt.effects import EFFECTS
 from hdopt.recordings.read import Recording
@@ -153,6 +155,16 @@ def test_hum_of_two_speeds_is_located_in_time():
     found = diagnose([slow, fast], None, RATIO)
     assert (found.verdict, found.effects) == ("unknown", ())
     assert "a hum of 50 Hz as of the mains" in found.says
+
+
+def test_an_encoder_away_from_the_mains_is_named_as_surely_as_such_names_were_right():
+    """The same at 37 Hz. Faults caught: any line in time for hum, and a confidence of all that was weighed."""
+    hummed = there_and_back(473, 0.02, 3)
+    found = diagnose([replace(hummed, time=hummed.time * 50 / 37)], None, RATIO)
+    assert (found.verdict, [one.id for one in found.effects]) == ("named", ["encoder_interpolation"])
+    fit = found.to_dict()["fit"]
+    right = chance_right(1, fit["heldout_rms_extended_arcmin"] / fit["noise_floor_arcmin"], DEFAULT.verdict)
+    assert found.effects[0].confidence == pytest.approx(right * (1 - fit["false_alarm_p"]), rel=1e-3)
 
 
 def test_a_slow_wave_is_no_hum():

@@ -26,7 +26,7 @@ from hdopt.diagnosis.verdict.facts import (
     unseen_gain,
     unseen_rms,
 )
-from hdopt.diagnosis.verdict.named_effect import confidences
+from hdopt.diagnosis.verdict.named_effect import NamedEffect, as_right_as_such_names, confidences
 from hdopt.diagnosis.verdict.residual_structure import (
     beaten_by_generic,
     clearly_unexplained,
@@ -346,13 +346,33 @@ def test_the_share_without_physics_is_of_all_that_is_explained():
 
 
 def test_confidence_is_the_weight_of_the_sets_that_hold_an_effect():
-    """Two sets 2 apart, flattened by 2: 1 to exp(-1), less the chance of a false alarm; never above its cap."""
+    """Two sets 2 apart, flattened by 2: 1 to exp(-1), less the chance of a false alarm."""
     pair = (candidate({"hysteresis": 1.0, "thermal_drift": 1.0}, 10.0), candidate({"thermal_drift": 1.0}, 8.0))
     found = confidences(evidence(*pair, false_alarm_p=0.2))
     assert DEFAULT.verdict.flatten == 2.0
     assert found["hysteresis"] == pytest.approx(0.8 / (1 + exp(-1)))
     assert found["thermal_drift"] == pytest.approx(0.8)
-    assert confidences(evidence(*pair, false_alarm_p=0.0))["thermal_drift"] == DEFAULT.verdict.most_confident
+    assert confidences(evidence(*pair, false_alarm_p=0.0))["thermal_drift"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("names", "left", "floor", "odds"),
+    [
+        (1, 1.0, 1.0, 4.45),
+        (1, 0.9, 1.0, 4.45),
+        (3, 1.0, 1.0, 4.45 - 2 * 0.57),
+        (1, 1.05, 1.0, 4.45 - 31.0 * np.log(1.05)),
+        (2, 2.1, 2.0, 4.45 - 0.57 - 31.0 * np.log(1.05)),
+        (1, 1.4, 1.0, 4.45 - 31.0 * np.log(1.1)),
+    ],
+)
+def test_no_name_is_surer_than_such_names_were_right(names, left, floor, odds):
+    """Faults caught: names that are not counted, or the one itself too; held-out power for error, or error not over the
+    floor; surer below the floor; slopes beyond where they were learned."""
+    found = evidence(candidate({"hysteresis": 1.0}), extended=left**2, noise_floor=floor)
+    said = [NamedEffect("hysteresis", 0.8, {}, {}, "")] * names
+    sure = as_right_as_such_names(said, found)
+    assert [one.confidence for one in sure] == pytest.approx([0.8 / (1 + exp(-odds))] * names)
 
 
 @pytest.mark.parametrize(

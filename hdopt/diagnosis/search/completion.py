@@ -93,7 +93,7 @@ def with_one_more(state: SearchState, fit: Fit, fills: Callable[[Fit], bool], si
     draws are its own.
     """
     probe, settings = state.probe(fit), state.settings
-    pool = [term for term in state.terms_for(probe, *names_of(fit)) if is_plain(term, settings.narrow)]
+    pool = [term for term in state.terms_for(probe, *names_of(fit)) if may_be_one_more(term, settings.narrow)]
     pool = sorted((t for t in pool if leaves_nothing(t) or not sines_alone), key=probe.gain, reverse=True)
     pool = [*pool[: settings.most_plain], *(t for t in pool[settings.most_plain :] if leaves_nothing(t))]
     fits = sorted(each(lambda term: joint_fit(fit, [*fit.terms, term]), pool), key=lambda one: one.objective)
@@ -107,7 +107,7 @@ def with_one_more(state: SearchState, fit: Fit, fills: Callable[[Fit], bool], si
     return list(best.values())
 
 
-def is_plain(term: Term, narrow: int) -> bool:
+def may_be_one_more(term: Term, narrow: int) -> bool:
     """Whether `term` is physics of no more than `narrow` coefficients, that neither swings nor stands for lines that
     could be another effect's."""
     return term.width <= narrow and not (is_outside(term.effect) or term.doubtful or is_driven(term))

@@ -26,9 +26,9 @@ def plain_for_waves(state: SearchState) -> SearchState:
     in which nothing comes of it goes on as without it.
     """
     leader, narrow = state.leader, state.settings.narrow
-    if leader is None or leader.outside or is_plain(leader.fit, narrow):
+    if leader is None or leader.outside or all_plain(leader.fit, narrow):
         return state
-    plain = {names: fit for names, fit in state.fits.items() if is_plain(fit, narrow)}
+    plain = {names: fit for names, fit in state.fits.items() if all_plain(fit, narrow)}
     own = about(replace(state, rng=copy.deepcopy(state.rng), fits=plain), leader.fit)
     if state.plan.clean is not None:
         own = about(own, state.plan.clean)
@@ -52,7 +52,7 @@ def about(state: SearchState, centre: Fit) -> SearchState:
     return explore(state, centre, pool, scale=replace(state.scale, settings=exact))
 
 
-def is_plain(fit: Fit, narrow: int) -> bool:
+def all_plain(fit: Fit, narrow: int) -> bool:
     """Whether all terms of `fit` are plain; `narrow` as for `is_plain_term`."""
     return all(is_plain_term(term, narrow) for term in fit.terms)
 

@@ -15,7 +15,7 @@ from hdopt.diagnosis.inference.neighbour_noise import is_a_walk
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.settings import VerdictSettings
-from hdopt.diagnosis.verdict.named_effect import NamedEffect, describe
+from hdopt.diagnosis.verdict.named_effect import NamedEffect, as_right_as_such_names, describe
 from hdopt.diagnosis.verdict.residual_structure import (
     beaten_by_generic,
     clearly_unexplained,
@@ -199,7 +199,7 @@ def find(evidence: Evidence) -> Findings:
         other_law=evidence.other_law.log_evidence,
     )
     pairs = confounded_pairs(evidence, facts.named, high) if facts.said else ()
-    effects = effects_said(evidence, facts, high)
+    effects = as_right_as_such_names(effects_said(evidence, facts, high), evidence)
     as_good: Sets = ()
     if facts.named:
         as_good = rivals(evidence, high)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -58,8 +59,8 @@ class NamedEffect:
 
 
 def confidences(evidence: Evidence) -> dict[str, float]:
-    """Probability of each effect of the best set: weights of all candidate sets, flattened for model discrepancy.
-    `evidence` is that of the diagnosis.
+    """Probability of each effect of the best set by what was weighed: weights of all candidate sets, flattened for
+    model discrepancy. `evidence` is that of the diagnosis.
     """
     candidates, settings = evidence.selection.candidates, evidence.settings.verdict
     top = candidates[0].log_bayes_factor
@@ -69,8 +70,25 @@ def confidences(evidence: Evidence) -> dict[str, float]:
     result = {}
     for effect in candidates[0].effects:
         share = float(sum(w for w, c in zip(weights, candidates, strict=True) if effect in c.effects))
-        result[effect] = float(np.clip(share * (1 - evidence.false_alarm_p), 0.0, settings.most_confident))
+        result[effect] = share * (1 - evidence.false_alarm_p)
     return result
+
+
+def chance_right(names: int, over_floor: float, settings: VerdictSettings) -> float:
+    """Chance that what a set of so many `names` says is right where all evidence is for it: what all shapes of the
+    catalogue miss is in no evidence, and shows in what is left on held-out turns over the noise floor (`over_floor`, a
+    ratio). Log odds as they were in registered runs, by the `settings`.
+    """
+    over = math.log(min(max(over_floor, 1.0), settings.right_most_over))
+    odds = settings.right_alone - settings.right_less_a_name * (names - 1) - settings.right_less_over_floor * over
+    return 1 / (1 + math.exp(-odds))
+
+
+def as_right_as_such_names(effects: Sequence[NamedEffect], evidence: Evidence) -> tuple[NamedEffect, ...]:
+    """The `effects` said, each no surer than such names were right. `evidence` is that of the diagnosis."""
+    over = evidence.extended_held_out.rms / evidence.noise_floor
+    right = chance_right(len(effects), over, evidence.settings.verdict)
+    return tuple(replace(one, confidence=one.confidence * right) for one in effects)
 
 
 def evidence_apart(evidence: Evidence) -> dict[str, float]:
@@ -106,7 +124,7 @@ def describe(candidate: Candidate, evidence: Evidence, high: bool = False) -> li
         found.append(
             NamedEffect(
                 term.effect,
-                confidence.get(term.effect, evidence.settings.verdict.most_confident),
+                confidence.get(term.effect, 1.0),
                 {
                     "domain": effect.domain,
                     "orders_per_input_turn": exact_orders(term, fit) or main_orders(fit, contribution),
