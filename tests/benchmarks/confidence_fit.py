@@ -20,6 +20,8 @@ from hdopt.diagnosis.settings import DEFAULT
 
 RUNS = ("run-014", "run-015", "run-016", "run-017")
 FEATURES = ("names beside it", "log of held-out error over the floor")
+CAP = 0.97
+"""What all names had before they were told apart."""
 BINS = (0.0, 0.5, 0.8, 0.9, 0.95, 0.97, 1.0)
 
 
