@@ -80,11 +80,11 @@ def main() -> None:
         s = DEFAULT.verdict
         x, y = names(options.on)
         p = chance(np.array([s.right_alone, -s.right_less_a_name, -s.right_less_over_floor]), x)
-        best = np.full(len(y), y.mean())
+        cap, best = (log_score(np.full(len(y), one), y) for one in (CAP, y.mean()))
+        print(f"{options.on}: {len(y)} names, {int(y.sum())} right")
         print(
-            f"{options.on}: {len(y)} names, {int(y.sum())} right; log score as shipped {log_score(p, y):.4f}, ", end=""
+            f"log score as shipped {log_score(p, y):.4f}, by {CAP} for all {cap:.4f}, by the best constant {best:.4f}"
         )
-        print(f"best constant {log_score(best, y):.4f}")
         reliability(p, y)
         return
     known = {run: names(run) for run in options.runs}
