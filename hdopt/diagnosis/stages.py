@@ -336,16 +336,17 @@ def measure_noise_again(state: State) -> State:
 def search_high_orders(state: State) -> State:
     """Tooth mesh and encoder lines, on the rows as recorded. `state` is where the work stands."""
     rng = state.draws()
-    high, ripple = find_ripple(
-        state.recordings, state.selection, state.nuisances, state.ruled_out, rng, ripple_told(state)
-    )
+    high, ripple = ripple_beside_selection(state, rng)
     return replace(state, high=high, ripple=ripple, rng=rng)
 
 
-def ripple_told(state: State) -> Guess | None:
-    """The ripple found on other rows of the recordings, where these were counted as at `state`."""
+def ripple_beside_selection(state: State, rng: np.random.Generator) -> tuple[Selection | None, Array | None]:
+    """The orders above the averaged rows beside the selection of `state`, and what they add, as `find_ripple` has them;
+    a ripple found on other rows of the recordings is told where these were counted as here. `rng` draws what is random.
+    """
     guess = state.guessed_ripple
-    return guess if guess is not None and guess.turned == state.orientation.turned else None
+    told = guess if guess is not None and guess.turned == state.orientation.turned else None
+    return find_ripple(state.recordings, state.selection, state.nuisances, state.ruled_out, rng, told)
 
 
 def search_without_ripple(state: State) -> State:
@@ -372,9 +373,7 @@ def search_without_ripple(state: State) -> State:
     sizes = [float(np.var(fit.contributions)) for fit in (selection.best.fit, before.fit)]
     if state.ripple is not None and changed and max(sizes) > settings.high_order.beside * float(np.var(state.ripple)):
         # What was beside the ripple when it was named is not there any more.
-        high, _ = find_ripple(
-            state.recordings, state.selection, state.nuisances, state.ruled_out, rng, ripple_told(state)
-        )
+        high, _ = ripple_beside_selection(state, rng)
         state = state if stands(state.high, high) else replace(state, high=high)
     return state
 

@@ -9,6 +9,7 @@ holds that against the best constant by log score, each run left out in turn. Th
 from __future__ import annotations
 
 import argparse
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +18,7 @@ from scipy.special import expit
 
 from hdopt.bench import registry
 from hdopt.diagnosis.settings import DEFAULT
+from hdopt.diagnosis.verdict.named_effect import chance_right
 
 RUNS = ("run-014", "run-015", "run-016", "run-017")
 FEATURES = ("names beside it", "log of held-out error over the floor")
@@ -77,9 +79,8 @@ def main() -> None:
     parser.add_argument("--on", metavar="RUN", help="a run to try the shipped slopes on")
     options = parser.parse_args()
     if options.on:
-        s = DEFAULT.verdict
         x, y = names(options.on)
-        p = chance(np.array([s.right_alone, -s.right_less_a_name, -s.right_less_over_floor]), x)
+        p = np.array([chance_right(1 + beside, math.exp(over), DEFAULT.verdict) for beside, over in x])
         cap, best = (log_score(np.full(len(y), one), y) for one in (CAP, y.mean()))
         print(f"{options.on}: {len(y)} names, {int(y.sum())} right")
         print(

@@ -80,14 +80,19 @@ class AnyOrder(Alternative):
         )
 
 
-class AnyFrequency(Alternative):
-    """A sine at any fixed frequency in time, slow waves among them."""
+class InTime(Alternative):
+    """Something that follows the clock, whatever the angle."""
 
-    id = "_sine_in_time"
     domain = "time"
 
     def lacks(self, samples: Conditions) -> str | None:
         return None if samples.time is not None and not samples.locked else "a time column"
+
+
+class AnyFrequency(InTime):
+    """A sine at any fixed frequency in time, slow waves among them."""
+
+    id = "_sine_in_time"
 
     def search(self, probe: Probe) -> list[Term]:
         s, rows = self.settings, probe.samples
@@ -115,17 +120,13 @@ class AnyFrequency(Alternative):
         )
 
 
-class Mains(Alternative):
+class Mains(InTime):
     """Hum of the mains: its frequency, or that and its double and triple. At one speed it is a line of some order,
     which an encoder or a tooth mesh may have too; that the line is at the mains' frequency is no chance.
     """
 
     id = "_mains"
-    domain = "time"
     leaves_nothing = True
-
-    def lacks(self, samples: Conditions) -> str | None:
-        return None if samples.time is not None and not samples.locked else "a time column"
 
     def search(self, probe: Probe) -> list[Term]:
         s, samples = self.settings, probe.samples
@@ -142,7 +143,7 @@ class Mains(Alternative):
         return best_terms(probe, [self.term(samples, shape) for shape in shapes])
 
     def term(self, samples: Conditions, shape: Mapping[str, float], base_value: Array | None = None) -> Term:
-        s, time = self.settings, np.zeros(len(samples)) if samples.time is None else samples.time
+        s, time = self.settings, samples.known_time
         mains = min(s.mains_hz, key=lambda one: abs(one - shape["frequency_hz"]))
         frequency = float(np.clip(shape["frequency_hz"], mains * (1 - s.mains_off), mains * (1 + s.mains_off)))
         hum = [frequency * k for k in range(1, int(shape["multiples"]) + 1)]
@@ -188,8 +189,7 @@ class Mains(Alternative):
 
     def _highest(self, samples: Conditions) -> float:
         """The highest frequency (Hz) that the rows of `samples` hold."""
-        usual = float(np.median(np.diff(samples.known_time)[np.diff(samples.piece) == 0]))
-        return self.settings.highest_frequency / usual
+        return self.settings.highest_frequency / usual_step(samples, samples.known_time)
 
 
 def strongest_frequencies(rows: Conditions, residual: Array, settings: AlternativeSettings) -> list[float]:
@@ -206,7 +206,7 @@ def strongest_frequencies(rows: Conditions, residual: Array, settings: Alternati
     signal = np.bincount(cell, residual - residual.mean(), minlength=length)[:length]
     amplitude = np.abs(np.fft.rfft(signal))
     frequencies = np.arange(len(amplitude)) / (length * step)
-    usual = float(np.median(np.diff(time)[np.diff(rows.piece) == 0])) if len(rows) > 2 else step
+    usual = usual_step(rows, time) if len(rows) > 2 else step
     highest = settings.highest_frequency / max(usual, step)
     amplitude[(frequencies < settings.lowest_frequency / duration) | (frequencies > highest)] = 0
     found = []
@@ -215,6 +215,11 @@ def strongest_frequencies(rows: Conditions, residual: Array, settings: Alternati
         found.append(float(frequencies[at]))
         amplitude[max(at - settings.line_cells, 0) : at + settings.line_cells] = 0
     return found
+
+
+def usual_step(rows: Conditions, time: Array) -> float:
+    """The median time (s) from one of the `rows` to the next of its piece, by their `time` (n,)."""
+    return float(np.median(np.diff(time)[np.diff(rows.piece) == 0]))
 
 
 class Event(Alternative):

@@ -75,11 +75,13 @@ def fit_in_zones(
     starts = (known, others) if len(others) < len(known) else (known,)
     shapes = effect.in_zones(shape)
     fits: list[Fit] = []
-    if told is not None and (term := _told_term(rows, effect, told)) is not None:
-        if not term.in_zones and _leaves_nothing(sines):
+    if told is not None and (known_ripple := _ripple_told(rows, effect, told)) is not None:
+        if known_ripple[0].in_zones:
+            there, iterations = replace(low, errors=told.errors), problem.settings.fit.known_iterations
+            begun = [_at(problem, there, [*start, *beside, known_ripple]) for start in starts]
+            fits = each(lambda one: refine(one, iterations, move_shapes=False), begun)
+        elif _leaves_nothing(sines):
             return None
-        if term.in_zones:
-            fits = [_as_told(problem, low, [*start, *beside], term, told) for start in starts]
     if not any(_leaves_nothing(fit) for fit in fits):
         fits += each(lambda start: _step_by_step(problem, low, [*start, *beside], effect, shapes), starts)
     for fit in fits:
@@ -88,19 +90,13 @@ def fit_in_zones(
     return inside
 
 
-def _told_term(rows: Rows, effect: Explanation, told: Guess) -> Term | None:
-    """The term of `effect` on these `rows` that was `told`, inside the zones or beside them; None where it was not."""
-    shapes = [shape for name, shape in told.terms if name == effect.id]
-    return effect.term(rows, shapes[0]) if shapes else None
-
-
-def _as_told(problem: FitProblem, low: Fit, beside: Sequence[Weighed], term: Term, told: Guess) -> Fit:
-    """The fit of `term` inside the zones with all `beside` it, from the drive and the waves that were `told`. Offsets
-    are those of `low`."""
-    waves = next(own for (name, _), own in zip(told.terms, told.coefficients, strict=True) if name == term.effect)
-    terms = [*(one for one, _ in beside), term]
-    start = evaluate(problem, told.errors, low.offsets, terms, [*(own for _, own in beside), waves])
-    return refine(start, problem.settings.fit.known_iterations, move_shapes=False)
+def _ripple_told(rows: Rows, effect: Explanation, told: Guess) -> Weighed | None:
+    """The term of `effect` on these `rows` that was `told`, inside the zones or beside them, with its coefficients;
+    None where it was not."""
+    for (name, shape), own in zip(told.terms, told.coefficients, strict=True):
+        if name == effect.id:
+            return effect.term(rows, shape), own
+    return None
 
 
 def _leaves_nothing(fit: Fit) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding
 from hdopt.diagnosis.inference.catalogue import TOLD
+from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.neighbour_noise import is_a_walk
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.search.candidates import Candidate
@@ -146,6 +147,8 @@ class Findings:
     """Every effect that is said, the largest first."""
     more: Candidate | None = None
     """The set that adds most to what is told, if any does."""
+    hum: tuple[Fit, int] | None = None
+    """A fit with hum in the place of an effect that explains as well, if any does, and which of its terms that is."""
 
 
 def effects_said(evidence: Evidence, facts: Facts, high: Candidate | None) -> tuple[NamedEffect, ...]:
@@ -169,6 +172,7 @@ def find(evidence: Evidence) -> Findings:
     if high is not None and not (suffice and stands_out(high, evidence)):
         high = None
     more, adding = beside_told(evidence)
+    hum = hum_as_good(evidence, high)
     facts = Facts(
         settings=settings,
         turns_suffice=suffice,
@@ -185,7 +189,7 @@ def find(evidence: Evidence) -> Findings:
         too_little=too_little(evidence),
         rivals=(),
         scale_as_good=scale_is_as_good(evidence),
-        hum_as_good=hum_as_good(evidence, high) is not None,
+        hum_as_good=hum is not None,
         log_evidence=best.log_bayes_factor,
         unseen_gain=unseen_gain(evidence),
         heldout_over_floor=unseen_rms(evidence) / evidence.noise_floor,
@@ -210,7 +214,7 @@ def find(evidence: Evidence) -> Findings:
         as_good = (*as_good, *imitating_sets(pairs, [one.id for one in effects], settings))
     as_good = tuple(dict.fromkeys(as_good))[: settings.most_rivals]
     again = found_again(evidence, effects)
-    return Findings(evidence, replace(facts, rivals=as_good, found_again=again), high, pairs, effects, more)
+    return Findings(evidence, replace(facts, rivals=as_good, found_again=again), high, pairs, effects, more, hum)
 
 
 def unseen_rms(evidence: Evidence) -> float:

@@ -23,7 +23,7 @@ from hdopt.diagnosis.verdict.residual_structure import (
     term_powers,
     where_outside,
 )
-from hdopt.diagnosis.verdict.rivals import Sets, hum_as_good, separating_measurement, tied_pairs
+from hdopt.diagnosis.verdict.rivals import Sets, separating_measurement, tied_pairs
 from hdopt.diagnosis.verdict.where import Where
 from hdopt.effects import EFFECTS
 
@@ -300,9 +300,8 @@ def may_be_hum(findings: Findings) -> Conclusion:
     """What is named, and that hum would look the same at the speed recorded. `findings` hold the facts and the evidence
     behind them.
     """
-    found = hum_as_good(findings.evidence, findings.high)
-    assert found is not None, "the rule holds only where hum explains as well"
-    where = where_outside(*found)
+    assert findings.hum is not None, "the rule holds only where hum explains as well"
+    where = where_outside(*findings.hum)
     says = " ".join(effect.says for effect in findings.effects)
     says += f" Or it is none of the drive's: at the speed recorded hum of the mains, {1 / where['period_s']:.4g} Hz, "
     says += "explains as much."
