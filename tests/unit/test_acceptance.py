@@ -15,7 +15,7 @@ from hdopt.diagnosis.search import acceptance
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import Candidate, joint_fit
 from hdopt.diagnosis.search.high_order import is_part_of_a_pulse, strong_ripple
-from hdopt.diagnosis.search.refinement import otherwise_acceptable, shortened, trimmed
+from hdopt.diagnosis.search.refinement import is_of_another_kind, otherwise_acceptable, shortened, trimmed
 from hdopt.diagnosis.search.subset_search import acceptable_first
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.drive.geometry import ARCMIN
@@ -163,6 +163,21 @@ def test_a_name_that_may_not_be_said_this_way_may_be_in_another(study):
     assert all("zones" in other.terms[0].shape for other in others)
     assert others[0].terms[0].shape["ball_to_pitch_ratio"] == pytest.approx(0.1267, abs=2e-4)
     assert others[0].objective < wrong.objective
+
+
+@pytest.mark.parametrize(
+    ("shape", "width", "differs"),
+    [
+        ({"frequency_hz": 21.0, "foot": "error"}, 2, True),
+        ({"frequency_hz": 21.0, "foot": "whole_motion"}, 2, False),
+        ({"frequency_hz": 14.0, "foot": "whole_motion"}, 4, True),
+        ({"foot": "whole_motion"}, 2, True),
+    ],
+)
+def test_a_variant_is_of_another_kind_by_more_than_numbers(shape, width, differs):
+    """Fault caught: the error as what swings a spring is never tried where the whole motion may not be said."""
+    whole = Term("resonance", {"frequency_hz": 14.0, "foot": "whole_motion"}, columns=np.zeros((3, 2)))
+    assert is_of_another_kind(Term("resonance", shape, columns=np.zeros((3, width))), whole) is differs
 
 
 def test_a_run_of_waves_is_tried_shorter(study):

@@ -1,7 +1,10 @@
 """What the rules look at, from numbers that are known: gains, ripples, rivals, remainders, confidence."""
 
+import json
+import lzma
 from dataclasses import replace
 from math import exp
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -32,11 +35,13 @@ from hdopt.diagnosis.verdict.residual_structure import (
     clearly_unexplained,
     left_over_passes,
     outside_share,
+    power_together,
 )
 from hdopt.diagnosis.verdict.rivals import beside_told, hum_as_good, placebo_as_good, rivals, scale_is_as_good
 from hdopt.diagnosis.verdict.rules import rule_for
 from hdopt.effects.term import Term
 
+PROOF = Path(__file__).parents[2] / "docs" / "proof"
 SWING = np.array([1.0, -1.0] * 50)
 """Of power one."""
 
@@ -227,6 +232,66 @@ def test_hum_that_explains_as_well(others, there):
 def test_hum_that_is_found_is_no_rival_of_itself():
     best, other = candidate({"_mains": 1.0, "hysteresis": 1.0}), candidate({"lost_motion": 1.0, "_mains": 1.0}, 99.0)
     assert hum_as_good(evidence(best, other), None) is None
+
+
+def opposed(powers):
+    """A set of effects by the power of each, every second against the others."""
+    best = candidate(powers)
+    sizes = [(-1) ** i * np.sqrt(power) for i, power in enumerate(powers.values())]
+    best.fit.contribution = lambda i: sizes[i] * SWING
+    best.fit.problem = SimpleNamespace(base=None)
+    return best
+
+
+@pytest.mark.parametrize(
+    ("powers", "together"),
+    [
+        ({"hysteresis": 0.25}, 1.0),
+        ({"output_coupling": 1.0, "cs_tooth_harmonics": 0.81}, 0.01 / 1.81),
+        ({"output_coupling": 1.0, SCALE: 1.0, "cs_tooth_harmonics": 1.0}, 2.0),
+        ({SCALE: 1.0}, 1.0),
+    ],
+)
+def test_what_effects_do_together(powers, together):
+    """Of the whole, a scale aside: two of 1.0 and 0.9 arcmin against each other leave 0.1. Faults caught: amplitudes
+    added for powers, what is told counted."""
+    assert power_together(opposed(powers)) == pytest.approx(together)
+
+
+def test_effects_that_cancel_are_no_names(monkeypatch):
+    """Its sentence says what they leave together, 0.1 arcmin, and how large they would be."""
+    monkeypatch.setattr(rules, "main_orders", lambda fit, contribution: [])
+    found = evidence(opposed({"output_coupling": 1.0, "cs_tooth_harmonics": 0.81}))
+    facts = replace(NAMED, together=0.01 / 1.81)
+    said = rule_for(facts).consequence(SimpleNamespace(evidence=found, facts=facts))
+    assert (said.verdict, said.effects, said.where["domain"]) == ("unknown", (), "order")
+    assert said.where["rms_arcmin"] == pytest.approx(0.1)
+    assert "resembles output_coupling and cs_tooth_harmonics" in said.says and "1.3 arcmin rms" in said.says
+
+
+def test_what_stands_beside_a_far_drive_is_no_name(monkeypatch):
+    """The axis 0.044 mm off where 0.03 is the prior's standard deviation: a warning alone left a plain name."""
+    monkeypatch.setattr(rules, "main_orders", lambda fit, contribution: [])
+    best = opposed({"bearing_pass": 0.16})
+    best.fit.problem = SimpleNamespace(base=object(), prior=np.full(12, 0.03), settings=DEFAULT)
+    best.fit.errors = np.r_[-0.044, np.zeros(11)]
+    facts = replace(NAMED, far_base=True)
+    said = rule_for(facts).consequence(SimpleNamespace(evidence=evidence(best), facts=facts))
+    assert (said.verdict, said.effects) == ("unknown", ())
+    assert said.where["rms_arcmin"] == pytest.approx(0.4)
+    assert "resembles bearing_pass" in said.says and "axis eccentricity x -0.044 mm" in said.says
+
+
+@pytest.mark.parametrize("run", sorted(path.name[:7] for path in PROOF.glob("run-*.keys.jsonl.xz")))
+def test_effects_that_were_hidden_together_do_not_cancel(run):
+    """The threshold below which names are refused, held against every pair and triple that was ever drawn: one."""
+    keys = [json.loads(line) for line in lzma.open(PROOF / f"{run}.keys.jsonl.xz", "rt")]
+    of_several = [key for key in keys if len(key["effects"]) > 1]
+    shares = [
+        key["hidden_rms_arcmin"] ** 2 / sum(part**2 for part in key["part_rms_arcmin"].values()) for key in of_several
+    ]
+    cancel = [share for share in shares if share < 2 * DEFAULT.verdict.together]
+    assert len(cancel) == (run == "run-016")
 
 
 def told_and_more(gain=160.0, power=1.0, told=SCALE, of="hysteresis", worth=100.0):

@@ -91,6 +91,11 @@ def is_far(fit: Fit) -> Mask:
     return np.asarray(np.abs(fit.errors) > fit.problem.settings.base.far * fit.problem.prior)
 
 
+def far_errors(fit: Fit) -> str:
+    """The base's errors in `fit` that lie far outside the tolerances of its kind, in words, each with its size."""
+    return ", ".join(f"{CARTESIAN_NAMES[i]} {fit.errors[i]:.3g} mm" for i in np.flatnonzero(is_far(fit)))
+
+
 @dataclass(frozen=True)
 class BaseEstimate:
     """The base's errors as a drive's: parameters with intervals, and combinations that the recording leaves open."""

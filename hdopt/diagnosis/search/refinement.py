@@ -48,9 +48,22 @@ def otherwise_acceptable(fit: Fit, skip: Sequence[str], order_range: tuple[float
         others = [fit.terms[j] for j in fit.all_but(i)]
         probe = FitProbe(fit, keep=fit.all_but(i), order_range=order_range)
         for variant in search_terms(probe, skip, only=[term.effect]):
-            if variant.width != term.width or variant.shape.keys() != term.shape.keys():
+            if is_of_another_kind(variant, term):
                 found.append(joint_fit(fit, [*others, variant]))
     return [fit for fit in found if is_acceptable(fit)]
+
+
+def is_of_another_kind(variant: Term, term: Term) -> bool:
+    """Whether a `variant` of the effect of `term` differs from it by more than numbers: in width, in what describes it,
+    or in a category, as the shaft of an encoder or what moves the foot of a spring.
+    """
+
+    def kind(one: Term) -> tuple[object, ...]:
+        return one.width, *(
+            (name, value if isinstance(value, str) else "") for name, value in sorted(one.shape.items())
+        )
+
+    return kind(variant) != kind(term)
 
 
 def widened_where_it_pays(fit: Fit, base: Fit, inflation: float, order_range: tuple[float, float]) -> Fit:

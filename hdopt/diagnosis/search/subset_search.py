@@ -124,8 +124,11 @@ def leading_evidence(state: SearchState) -> float:
 
 def refit_known(state: SearchState) -> SearchState:
     """The leaders of an earlier search, refitted on these rows and this noise. `state` is where the work stands."""
+    if not state.plan.known:
+        return state
     iterations = state.base.problem.settings.fit.known_iterations
-    return state.taking(each(lambda fit: refine(fit, iterations), state.plan.known))
+    known = tuple(each(lambda fit: refine(fit, iterations), state.plan.known))
+    return replace(state, plan=replace(state.plan, known=known)).taking(known)
 
 
 def explore_base(state: SearchState) -> SearchState:
@@ -370,18 +373,19 @@ STAGES_AGAIN = (refit_known, *(stage for stage in STAGES if stage not in FOR_OTH
 
 
 def ranked(state: SearchState) -> list[Candidate]:
-    """All sets and the base alone in order of evidence, with acceptable variants of leaders that are not acceptable.
-    `state` is where the work stands.
+    """All sets and the base alone in order of evidence, with acceptable variants of leaders that are not acceptable,
+    those that led an earlier search among them. `state` is where the work stands.
     """
     top = state.top_gain
     candidates = [state.weigh(fit, top) for fit in state.fits.values()]
     candidates.append(Candidate(state.base, 0.0, 0.0))
     candidates = in_order(candidates)
-    for candidate in candidates[: state.settings.leaders]:
+    for candidate in candidates[: state.settings.otherwise]:
         if not candidate.fit.terms or is_acceptable(candidate.fit):
             break
+        alike = (fit for fit in state.plan.known if names_of(fit) == names_of(candidate.fit) and is_acceptable(fit))
         others = otherwise_acceptable(candidate.fit, state.plan.skip, state.order_range)
-        candidates += [state.weigh(fit, top) for fit in others]
+        candidates += [state.weigh(fit, top) for fit in (*alike, *others)]
     return in_order(candidates)
 
 
@@ -397,13 +401,25 @@ def complete_and_wide(state: SearchState, candidates: list[Candidate]) -> list[C
 def in_last_order(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
     """`candidates` in order of evidence, as they stand once sets that need not pay for inexact shapes came before
     others, and the first is as wide as pays. Several effects that came first because none of them bends do not where
-    one of them bends then. `state` is where the work stands.
+    one of them bends then, unless it bends to no more than the others' inexact shapes leave. `state` is where the work
+    stands.
     """
     stiff = several_first(state, candidates)
     found = fewest_and_wide(state, stiff)
-    if stiff[0] is candidates[0] or not has_bending(found[0].fit):
+    if stiff[0] is candidates[0] or not has_bending(found[0].fit) or bends_to_misfit(state, stiff[0], found[0]):
         return found
     return fewest_and_wide(state, candidates)
+
+
+def bends_to_misfit(state: SearchState, stiff: Candidate, wide: Candidate) -> bool:
+    """Whether a `wide` variant of the `stiff` set has its effects, and explains no more beyond it than the slightly
+    wrong shape of any of its effects may leave. `state` is where the work stands.
+    """
+    if set(wide.effects) != set(stiff.effects):
+        return False
+    beyond = stiff.fit.objective - wide.fit.objective
+    carried = min(fewer.objective - stiff.fit.objective for fewer in without_each(stiff.fit))
+    return beyond < state.scale.settings.discrepancy * carried
 
 
 def fewest_and_wide(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:

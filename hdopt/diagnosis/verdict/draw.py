@@ -10,7 +10,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.localization import locate
-from hdopt.diagnosis.inference.base_fit import base_estimate, beat_warning, is_far
+from hdopt.diagnosis.inference.base_fit import base_estimate, beat_warning, far_errors
 from hdopt.diagnosis.inference.catalogue import NEW_ZERO, SKEW, VARYING_CONTACT, is_effect
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.nuisance import estimated, notes
@@ -22,7 +22,6 @@ from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.diagnosis.verdict.rules import rule_for
 from hdopt.effects import EFFECTS
 from hdopt.effects.declared import Quantity
-from hdopt.kinematics.cartesian import CARTESIAN_NAMES
 
 MICRO = 1e6
 """Millionths in one."""
@@ -159,10 +158,9 @@ def _coefficients(evidence: Evidence, effect: str) -> list[Array]:
 
 def base_notes(model: Fit) -> tuple[str, ...]:
     """A base of `model` far outside the errors that its prior allows."""
-    far = is_far(model)
-    if not far.any():
+    listed = far_errors(model)
+    if not listed:
         return ()
-    listed = ", ".join(f"{CARTESIAN_NAMES[i]} {model.errors[i]:.3g} mm" for i in np.flatnonzero(far))
     return (f"the fitted drive lies far outside the tolerances of its kind ({listed}): check drive, ratio and units",)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding
+from hdopt.diagnosis.inference.base_fit import is_far
 from hdopt.diagnosis.inference.catalogue import TOLD
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.neighbour_noise import is_a_walk
@@ -24,6 +25,7 @@ from hdopt.diagnosis.verdict.residual_structure import (
     left_over_passes,
     momentary,
     outside_share,
+    power_together,
     resolution,
     term_powers,
     unsteady,
@@ -55,7 +57,9 @@ class Facts:
     `turns_suffice`: turns can be held out; `too_little`: the record cannot say even that the base is
     adequate. `rivals`: other sets that are as good, placebo and
     perfect imitations among them; `scale_as_good`: so is a ratio or gain that is off, alone, and
-    `hum_as_good`: hum of the mains in an effect's place. `heldout_over_floor`:
+    `hum_as_good`: hum of the mains in an effect's place. `far_base`: the drive that is fitted beside what is said lies
+    far outside the tolerances of its kind; `together`: power of what the best set's effects do together, over the sum
+    of what each does. `heldout_over_floor`:
     error on turns that were hidden from the fit (cross-validated where none could be spared) over what a generic basis
     leaves; `found_again`: what is said is preferred without those turns too; `noise_over_neighbours`: cross-validated
     error over the noise that neighbouring samples and the sensors' steps show; `walk`: what is left is as rough at
@@ -82,6 +86,8 @@ class Facts:
     rivals: Sets
     scale_as_good: bool = False
     hum_as_good: bool = False
+    far_base: bool = False
+    together: float = 1.0
     log_evidence: float = 0.0
     unseen_gain: float = math.inf
     heldout_over_floor: float = 1.0
@@ -190,6 +196,8 @@ def find(evidence: Evidence) -> Findings:
         rivals=(),
         scale_as_good=scale_is_as_good(evidence),
         hum_as_good=hum is not None,
+        far_base=bool(is_far(best.fit).any()),
+        together=power_together(best),
         log_evidence=best.log_bayes_factor,
         unseen_gain=unseen_gain(evidence),
         heldout_over_floor=unseen_rms(evidence) / evidence.noise_floor,

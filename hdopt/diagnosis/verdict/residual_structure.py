@@ -37,6 +37,16 @@ def effect_powers(candidate: Candidate) -> list[float]:
     return [power for power, name in zip(powers, candidate.effects, strict=True) if name not in TOLD]
 
 
+def power_together(candidate: Candidate) -> float:
+    """Power of what the effects of `candidate` (but a scale or clock that is off) do together, over the sum of what
+    each does: about 1 where they have nothing to do with each other, 0 where they cancel; 1 without effects.
+    """
+    fit = candidate.fit
+    parts = [fit.contribution(i) for i, name in enumerate(candidate.effects) if name not in TOLD]
+    apart = sum(effect_powers(candidate))
+    return float(np.var(np.sum(parts, axis=0))) / apart if apart > 0 else 1.0
+
+
 def momentary(evidence: Evidence) -> bool:
     """Whether something that happened at one moment only, and that no held-out turn can show again, is most of what
     is there, and more than sensors and model resolve. `evidence` is that of the diagnosis.

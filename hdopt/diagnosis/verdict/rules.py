@@ -10,6 +10,7 @@ import numpy as np
 
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding
+from hdopt.diagnosis.inference.base_fit import far_errors
 from hdopt.diagnosis.inference.catalogue import TOLD, properties_of
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.verdict.facts import Facts, Findings, sparse, unseen_rms
@@ -160,6 +161,20 @@ def hum_explains_as_well(facts: Facts) -> bool:
     return facts.said and facts.hum_as_good
 
 
+def effects_cancel(facts: Facts) -> bool:
+    """Effects are named that nearly cancel each other: two that have nothing to do with each other do not, but what
+    stands for something else may. `facts` are those of the recording.
+    """
+    return facts.named and facts.together < facts.settings.together
+
+
+def drive_is_far(facts: Facts) -> bool:
+    """Effects are named beside a drive far outside the tolerances of its kind, which stands for something that is left
+    out. `facts` are those of the recording.
+    """
+    return facts.named and facts.far_base
+
+
 def others_are_as_good(facts: Facts) -> bool:
     """Effects are named, and another set explains as well. `facts` are those of the recording."""
     return facts.said and bool(facts.rivals)
@@ -282,6 +297,41 @@ def unconfirmed(findings: Findings) -> Conclusion:
         f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that most resembles {likeness(best)}; but turns "
         "that no stage saw do not bear that out: what it is, is not known.",
         separating_test=MORE_TURNS,
+        where=where,
+    )
+
+
+def balanced(findings: Findings) -> Conclusion:
+    """Something is there, and what explains it is a balance of effects. `findings` hold the facts and the evidence
+    behind them.
+    """
+    best = findings.evidence.selection.best
+    apart = sum(effect_powers(best))
+    together = findings.facts.together * apart
+    where = where_largest(best, together, findings.evidence)
+    return Conclusion(
+        "unknown",
+        f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that most resembles {likeness(best)}; but these "
+        f"would each be much larger, {math.sqrt(apart):.2g} arcmin rms, and nearly cancel each other: what it is, is "
+        "not known.",
+        separating_test=MORE_TURNS,
+        where=where,
+    )
+
+
+def beside_a_far_drive(findings: Findings) -> Conclusion:
+    """Something is there, and the drive beside what most resembles it is none of its kind. `findings` hold the facts
+    and the evidence behind them.
+    """
+    evidence = findings.evidence
+    best = evidence.selection.best
+    where = where_largest(best, sum(effect_powers(best)), evidence)
+    return Conclusion(
+        "unknown",
+        f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that most resembles {likeness(best)}; but the "
+        f"drive beside it would lie far outside the tolerances of its kind ({far_errors(best.fit)}), and may stand for "
+        "something that is left out: what it is, is not known.",
+        separating_test="check drive, ratio and units, or measure that error of the drive itself, and record again",
         where=where,
     )
 
@@ -414,6 +464,8 @@ RULES = (
     Rule("not found again", not_found_again, unstable),
     Rule("misses unseen turns", misses_unseen, unstable),
     Rule("hum explains as well", hum_explains_as_well, may_be_hum),
+    Rule("effects cancel", effects_cancel, balanced),
+    Rule("drive is far", drive_is_far, beside_a_far_drive),
     Rule("others are as good", others_are_as_good, ambiguous),
     Rule("named", lambda facts: facts.said, named),
     Rule("more than is told", more_than_is_told, more),
