@@ -33,6 +33,9 @@ FEW, MOST_OF_FEW = tuple(range(2, 13)), 3
 
 LEAST_OF_FEW = 0.15
 """Size of the smallest of a few harmonics over the largest: less is what another shape leaves."""
+MOST_OF_TEETH = 0.75
+"""Waves over teeth: places of z teeth have z/2 waves at most, which a load that passes from tooth to tooth repeats
+above that; z waves are the mesh."""
 SAID = 4
 """Waves that the sentence lists."""
 SHORT_RUN, SHOWN_OF_A_RUN = 4, 0.5
@@ -77,7 +80,9 @@ class CircularSplineToothHarmonics(Effect):
     )
 
     def search(self, probe: Probe) -> Sequence[Term]:
-        limit = min(0.5 * probe.samples.rows_per_turn, 1.5 * probe.samples.highest_order)
+        samples = probe.samples
+        teeth = 2 * samples.ratio
+        limit = min(0.5 * samples.rows_per_turn, 1.5 * samples.highest_order, MOST_OF_TEETH * teeth)
         runs = [run for run in RUNS if run[-1] <= limit]
         terms = widest_that_pays(probe, terms_at(self, probe.samples, [shape_of(run) for run in runs]))
         few = [members for members in self._strongest_few(probe, limit) if self.stands_alone(members)]

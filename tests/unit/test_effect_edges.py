@@ -13,10 +13,11 @@ from test_windup_curves import fit_of
 
 from hdopt.diagnosis.inference.fit import refine
 from hdopt.diagnosis.inference.residual_gains import FitProbe
-from hdopt.effects import EFFECTS
+from hdopt.effects import EFFECTS, cs_tooth_harmonics
 from hdopt.effects import hysteresis as friction
 from hdopt.effects._friction_torque import friction_columns
 from hdopt.effects._zone_harmonics import strongest_few
+from hdopt.effects.cs_tooth_harmonics import CircularSplineToothHarmonics
 from hdopt.effects.declared import REQUIRED, Numbers, Quantity, Sines
 from hdopt.effects.encoder_interpolation import beside_the_mesh
 from hdopt.effects.estimate import FitEstimate
@@ -380,3 +381,17 @@ def test_a_defect_of_the_output_is_looked_for_in_parts_of_its_widest():
     effect = EFFECTS["local_tooth_defect"]
     found = effect._candidates(probe, theta, TURN * RATIO, Seat.OUTPUT)
     assert sorted({w for _, w in found}) == pytest.approx([1.2, 2.5, 5.0, 10.0, 15.0, 30.0, 60.0, 120.0, 240.0])
+
+
+@pytest.mark.parametrize("effect", ["cs_tooth_harmonics", "fs_tooth_harmonics"])
+@pytest.mark.parametrize(("ratio", "most"), [(30.0, 40), (50.0, 70), (160.0, 70)])
+def test_waves_of_the_teeth_do_not_reach_to_the_mesh(monkeypatch, effect, ratio, most):
+    """60 teeth have 30 waves, and what a load that passes from tooth to tooth makes of them: 70 were tried, which took
+    up the mesh of 62 (case 547 of run-018). Fault caught: no bound from the number of teeth."""
+    offered = []
+    monkeypatch.setattr(cs_tooth_harmonics, "widest_that_pays", lambda probe, terms: offered.extend(terms) or [])
+    monkeypatch.setattr(cs_tooth_harmonics, "terms_at", lambda effect, samples, shapes: shapes)
+    samples = SimpleNamespace(ratio=ratio, rows_per_turn=800.0, highest_order=300.0)
+    monkeypatch.setattr(CircularSplineToothHarmonics, "_strongest_few", lambda self, probe, limit: [])
+    assert EFFECTS[effect].search(SimpleNamespace(samples=samples)) == []
+    assert max(cs_tooth_harmonics.members_of(shape)[-1] for shape in offered) == most

@@ -175,9 +175,22 @@ def test_sines_that_take_up_nearly_all_complete_a_set_that_leaves_far_more(in_ro
 def test_what_bends_to_nothing_is_sines_or_turns_and_has_few_coefficients(monkeypatch):
     monkeypatch.setattr(completing, "leaves_nothing", lambda term: term.effect == "sine")
     monkeypatch.setattr(completing, "kind_of", lambda term: "load" if term.effect == "friction" else "turning")
+    begun = of(9.0, "delay")
     for term, may in ((Effect("sine", 9), True), (Effect("lobes", 4), True), (Effect("teeth", 5), False)):
-        assert completing.may_complete(term, narrow=4) is may
-    assert not completing.may_complete(Effect("friction", 1), narrow=4)
+        assert completing.may_complete(term, begun) is may
+    assert not completing.may_complete(Effect("friction", 1), begun)
+
+
+def test_a_pulse_beside_many_waves_is_what_they_leave_of_steps(monkeypatch):
+    """Forty waves of segments leave the edge of one, which a narrow pulse takes up: a damaged tooth was named. Sines of
+    known orders and what does not turn may stand beside them. Fault caught: either way of completing a set lets it."""
+    monkeypatch.setattr(completing, "leaves_nothing", lambda term: term.effect == "sine")
+    monkeypatch.setattr(completing, "kind_of", lambda term: "load" if term.effect == "friction" else "turning")
+    monkeypatch.setattr(completing, "is_driven", lambda term: False)
+    few, many = (Told(9.0, (Effect("waves", width),)) for width in (8, 78))
+    one_more = [(name, fit) for name in ("tooth", "sine", "friction") for fit in (few, many)]
+    assert [completing.may_be_one_more(Effect(name), fit) for name, fit in one_more] == [True, False, *[True] * 4]
+    assert [completing.may_complete(Effect(name), fit) for name, fit in one_more[:4]] == [True, False, True, True]
 
 
 def test_of_two_completed_sets_the_better_and_nothing_where_the_base_leads(in_rows):

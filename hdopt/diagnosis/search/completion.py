@@ -4,7 +4,9 @@ A set of effects pays a share of all that it explains for each effect (`search.p
 must not be named. So a delay that took the place of a friction and a delay leads these two, though it leaves what no
 noise does. A set that leaves more than noise, or whose drive lies far outside its tolerances, leaves physics out; where
 one plain effect more takes up nearly all of that, or brings the drive home, that is no misfit of a shape, which would
-be left beside it. Such sets do not pay for being inexact against the set that they complete.
+be left beside it. Such sets do not pay for being inexact against the set that they complete. What many waves of the
+teeth leave of steps from tooth to tooth is a pulse, though: beside a term that bends to anything only sines of known
+orders and what does not turn with the drive complete a set.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import Candidate, from_new_drives, in_order, joint_fit, paid_for_freedom
 from hdopt.diagnosis.search.penalty import kind_of, leaves_nothing
 from hdopt.diagnosis.search.search_state import Names, SearchState, names_of
+from hdopt.diagnosis.search.several_for_one import has_bending
 from hdopt.effects.term import Term
 from hdopt.parallel.shared_memory import each
 
@@ -50,7 +53,7 @@ def far_more_taken_up(state: SearchState, candidates: list[Candidate]) -> list[C
     found = []
     for candidate in candidates[1:]:
         beside = [term for term in candidate.fit.terms if term.effect not in first.effects]
-        if set(first.effects) < set(candidate.effects) and all(may_complete(term, settings.narrow) for term in beside):
+        if set(first.effects) < set(candidate.effects) and all(may_complete(t, first.fit) for t in beside):
             if state.above_noise(candidate.fit) <= settings.complete * left:
                 found.append(without_inexactness(state, first, candidate))
     return found
@@ -93,7 +96,7 @@ def with_one_more(state: SearchState, fit: Fit, fills: Callable[[Fit], bool], si
     draws are its own.
     """
     probe, settings = state.probe(fit), state.settings
-    pool = [term for term in state.terms_for(probe, *names_of(fit)) if may_be_one_more(term, settings.narrow)]
+    pool = [term for term in state.terms_for(probe, *names_of(fit)) if may_be_one_more(term, fit)]
     pool = sorted((t for t in pool if leaves_nothing(t) or not sines_alone), key=probe.gain, reverse=True)
     pool = [*pool[: settings.most_plain], *(t for t in pool[settings.most_plain :] if leaves_nothing(t))]
     fits = sorted(each(lambda term: joint_fit(fit, [*fit.terms, term]), pool), key=lambda one: one.objective)
@@ -107,10 +110,17 @@ def with_one_more(state: SearchState, fit: Fit, fills: Callable[[Fit], bool], si
     return list(best.values())
 
 
-def may_be_one_more(term: Term, narrow: int) -> bool:
-    """Whether `term` is physics of no more than `narrow` coefficients, that neither swings nor stands for lines that
-    could be another effect's."""
-    return term.width <= narrow and not (is_outside(term.effect) or term.doubtful or is_driven(term))
+def may_be_one_more(term: Term, fit: Fit) -> bool:
+    """Whether `term` beside `fit` is physics of few coefficients, that neither swings nor stands for lines that could
+    be another effect's, nor could be what a term of `fit` that bends to anything leaves of itself."""
+    plain = term.width <= fit.problem.settings.search.narrow and not (is_outside(term.effect) or term.doubtful)
+    return plain and not is_driven(term) and not may_be_left(term, fit)
+
+
+def may_be_left(term: Term, fit: Fit) -> bool:
+    """Whether `term` could be what a term of `fit` that bends to anything leaves of itself: it turns with the drive,
+    and is no sines of known orders."""
+    return kind_of(term) == "turning" and not leaves_nothing(term) and has_bending(fit)
 
 
 def follows_its_laws(fit: Fit, state: SearchState) -> bool:
@@ -119,10 +129,11 @@ def follows_its_laws(fit: Fit, state: SearchState) -> bool:
     return other_law(fit, state.inflation).log_evidence <= fit.problem.settings.verdict.other_law
 
 
-def may_complete(term: Term, narrow: int) -> bool:
-    """Whether `term` is sines at lines that are known, or turns with the drive and has no more than `narrow`
-    coefficients: it bends to nothing."""
-    return leaves_nothing(term) or (kind_of(term) == "turning" and term.width <= narrow)
+def may_complete(term: Term, fit: Fit) -> bool:
+    """Whether `term` beside `fit` is sines at lines that are known, or turns with the drive, has few coefficients and
+    is not what a term of `fit` leaves of itself: it bends to nothing."""
+    few = kind_of(term) == "turning" and term.width <= fit.problem.settings.search.narrow
+    return leaves_nothing(term) or (few and not may_be_left(term, fit))
 
 
 def without_inexactness(state: SearchState, first: Candidate, more: Candidate) -> Candidate:
