@@ -619,11 +619,11 @@ class VerdictSettings:
     )
     smallest_weight: float = threshold(-60.0, "1", "choice: log weight below which a candidate is none")
     right_alone: float = threshold(
-        4.45, "1", "measured: log odds that a name alone is right, at the floor; 412 names of runs 014 to 017"
+        3.59, "1", "measured: log odds that a name alone is right, at the floor; 894 names of runs 014 to 018"
     )
-    right_less_a_name: float = threshold(0.57, "1", "measured: how much less they are for each name beside it")
+    right_less_a_name: float = threshold(0.31, "1", "measured: how much less they are for each name beside it")
     right_less_over_floor: float = threshold(
-        31.0, "1", "measured: how much less they are by the log of the held-out error over the noise floor"
+        24.0, "1", "measured: how much less they are by the log of the held-out error over the noise floor"
     )
     right_most_over: float = threshold(
         1.1, "1", "choice: held-out error over noise floor up to which that was learned; more is as much"

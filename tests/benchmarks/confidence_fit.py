@@ -20,7 +20,7 @@ from hdopt.bench import registry
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.verdict.named_effect import chance_right
 
-RUNS = ("run-014", "run-015", "run-016", "run-017")
+RUNS = ("run-014", "run-015", "run-016", "run-017", "run-018")
 FEATURES = ("names beside it", "log of held-out error over the floor")
 CAP = 0.97
 """What all names had before they were told apart."""

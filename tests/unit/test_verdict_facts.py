@@ -423,12 +423,12 @@ def test_confidence_is_the_weight_of_the_sets_that_hold_an_effect():
 @pytest.mark.parametrize(
     ("names", "left", "floor", "odds"),
     [
-        (1, 1.0, 1.0, 4.45),
-        (1, 0.9, 1.0, 4.45),
-        (3, 1.0, 1.0, 4.45 - 2 * 0.57),
-        (1, 1.05, 1.0, 4.45 - 31.0 * np.log(1.05)),
-        (2, 2.1, 2.0, 4.45 - 0.57 - 31.0 * np.log(1.05)),
-        (1, 1.4, 1.0, 4.45 - 31.0 * np.log(1.1)),
+        (1, 1.0, 1.0, 3.59),
+        (1, 0.9, 1.0, 3.59),
+        (3, 1.0, 1.0, 3.59 - 2 * 0.31),
+        (1, 1.05, 1.0, 3.59 - 24.0 * np.log(1.05)),
+        (2, 2.1, 2.0, 3.59 - 0.31 - 24.0 * np.log(1.05)),
+        (1, 1.4, 1.0, 3.59 - 24.0 * np.log(1.1)),
     ],
 )
 def test_no_name_is_surer_than_such_names_were_right(names, left, floor, odds):

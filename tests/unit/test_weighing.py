@@ -102,7 +102,7 @@ def test_candidates_stand_in_the_order_of_their_evidence():
         base="base",
         top_gain=900.0,
         weigh=lambda fit, top: made[fit],
-        settings=SimpleNamespace(leaders=0),
+        settings=SimpleNamespace(leaders=0, otherwise=0),
     )
     state.fits = {name: name for name in made}
     assert [candidate.fit for candidate in ranked(state)] == ["plain", "wide", "base"]
