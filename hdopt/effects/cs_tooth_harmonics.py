@@ -34,8 +34,8 @@ FEW, MOST_OF_FEW = tuple(range(2, 13)), 3
 LEAST_OF_FEW = 0.15
 """Size of the smallest of a few harmonics over the largest: less is what another shape leaves."""
 MOST_OF_TEETH = 0.75
-"""Waves over teeth: places of z teeth have z/2 waves at most, which a load that passes from tooth to tooth repeats
-above that; z waves are the mesh."""
+"""Waves over the flexspline's teeth, 2 N: places of z teeth have z/2 waves at most, which a load that passes from tooth
+to tooth repeats above that; z waves are the mesh."""
 SAID = 4
 """Waves that the sentence lists."""
 SHORT_RUN, SHOWN_OF_A_RUN = 4, 0.5
@@ -81,12 +81,12 @@ class CircularSplineToothHarmonics(Effect):
 
     def search(self, probe: Probe) -> Sequence[Term]:
         samples = probe.samples
-        teeth = 2 * samples.ratio
-        limit = min(0.5 * samples.rows_per_turn, 1.5 * samples.highest_order, MOST_OF_TEETH * teeth)
+        fewest_teeth = 2 * samples.ratio
+        limit = min(0.5 * samples.rows_per_turn, 1.5 * samples.highest_order, MOST_OF_TEETH * fewest_teeth)
         runs = [run for run in RUNS if run[-1] <= limit]
-        terms = widest_that_pays(probe, terms_at(self, probe.samples, [shape_of(run) for run in runs]))
+        terms = widest_that_pays(probe, terms_at(self, samples, [shape_of(run) for run in runs]))
         few = [members for members in self._strongest_few(probe, limit) if self.stands_alone(members)]
-        return [*terms, *terms_at(self, probe.samples, [shape_of(members) for members in few if members not in RUNS])]
+        return [*terms, *terms_at(self, samples, [shape_of(members) for members in few if members not in RUNS])]
 
     def _strongest_few(self, probe: Probe, limit: float) -> list[tuple[int, ...]]:
         members = tuple(h for h in FEW if h <= limit)

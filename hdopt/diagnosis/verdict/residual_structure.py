@@ -43,8 +43,8 @@ def power_together(candidate: Candidate) -> float:
     """
     fit = candidate.fit
     parts = [fit.contribution(i) for i, name in enumerate(candidate.effects) if name not in TOLD]
-    apart = sum(effect_powers(candidate))
-    return float(np.var(np.sum(parts, axis=0))) / apart if apart > 0 else 1.0
+    apart = sum(float(np.var(part)) for part in parts)
+    return float(np.var(sum(parts))) / apart if apart > 0 else 1.0
 
 
 def momentary(evidence: Evidence) -> bool:

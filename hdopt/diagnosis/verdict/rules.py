@@ -290,15 +290,8 @@ def unconfirmed(findings: Findings) -> Conclusion:
     """
     evidence = findings.evidence
     gain = evidence.base_held_out.variance - evidence.extended_held_out.variance
-    best = evidence.selection.best
-    where = where_largest(best, max(gain, 0.0), evidence)
-    return Conclusion(
-        "unknown",
-        f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that most resembles {likeness(best)}; but turns "
-        "that no stage saw do not bear that out: what it is, is not known.",
-        separating_test=MORE_TURNS,
-        where=where,
-    )
+    but = "; but turns that no stage saw do not bear that out"
+    return no_more_than_like(evidence.selection.best, max(gain, 0.0), but, MORE_TURNS, evidence)
 
 
 def balanced(findings: Findings) -> Conclusion:
@@ -307,31 +300,33 @@ def balanced(findings: Findings) -> Conclusion:
     """
     best = findings.evidence.selection.best
     apart = sum(effect_powers(best))
-    together = findings.facts.together * apart
-    where = where_largest(best, together, findings.evidence)
-    return Conclusion(
-        "unknown",
-        f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that most resembles {likeness(best)}; but these "
-        f"would each be much larger, {math.sqrt(apart):.2g} arcmin rms, and nearly cancel each other: what it is, is "
-        "not known.",
-        separating_test=MORE_TURNS,
-        where=where,
-    )
+    but = f"; but these would each be much larger, {math.sqrt(apart):.2g} arcmin rms, and nearly cancel each other"
+    return no_more_than_like(best, findings.facts.together * apart, but, MORE_TURNS, findings.evidence)
 
 
 def beside_a_far_drive(findings: Findings) -> Conclusion:
     """Something is there, and the drive beside what most resembles it is none of its kind. `findings` hold the facts
     and the evidence behind them.
     """
-    evidence = findings.evidence
-    best = evidence.selection.best
-    where = where_largest(best, sum(effect_powers(best)), evidence)
+    best = findings.evidence.selection.best
+    but = (
+        f"; but the drive beside it would lie far outside the tolerances of its kind ({far_errors(best.fit)}), and may "
+        "stand for something that is left out"
+    )
+    test = "check drive, ratio and units, or measure that error of the drive itself, and record again"
+    return no_more_than_like(best, sum(effect_powers(best)), but, test, findings.evidence)
+
+
+def no_more_than_like(candidate: Candidate, power: float, but: str, test: str, evidence: Evidence) -> Conclusion:
+    """Something of a `power` (arcmin^2) is in the `evidence` that most resembles the effects of `candidate`, and why
+    that is no name (`but`, a part of the sentence); the `test` would tell what it is.
+    """
+    where = where_largest(candidate, power, evidence)
     return Conclusion(
         "unknown",
-        f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that most resembles {likeness(best)}; but the "
-        f"drive beside it would lie far outside the tolerances of its kind ({far_errors(best.fit)}), and may stand for "
-        "something that is left out: what it is, is not known.",
-        separating_test="check drive, ratio and units, or measure that error of the drive itself, and record again",
+        f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that most resembles {likeness(candidate)}{but}: "
+        "what it is, is not known.",
+        separating_test=test,
         where=where,
     )
 
@@ -370,14 +365,9 @@ def more(findings: Findings) -> Conclusion:
     """
     best = findings.more
     assert best is not None, "the rule holds only where something adds"
-    where = where_largest(best, sum(effect_powers(best)), findings.evidence)
-    return Conclusion(
-        "unknown",
-        f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that most resembles {likeness(best)}, beside or in "
-        "place of the instruments' error that the warnings tell: what it is, is not known.",
-        separating_test="put right what the warnings tell of the instruments, and record again",
-        where=where,
-    )
+    but = ", beside or in place of the instruments' error that the warnings tell"
+    test = "put right what the warnings tell of the instruments, and record again"
+    return no_more_than_like(best, sum(effect_powers(best)), but, test, findings.evidence)
 
 
 def ambiguous(findings: Findings) -> Conclusion:
