@@ -300,7 +300,7 @@ def balanced(findings: Findings) -> Conclusion:
     """
     best = findings.evidence.selection.best
     apart = sum(effect_powers(best))
-    but = f"; but these would each be much larger, {math.sqrt(apart):.2g} arcmin rms, and nearly cancel each other"
+    but = f"; but these nearly cancel each other, and would come to {math.sqrt(apart):.2g} arcmin rms if they did not"
     return no_more_than_like(best, findings.facts.together * apart, but, MORE_TURNS, findings.evidence)
 
 
