@@ -31,6 +31,8 @@ OVER_EVERY = {
     "settings": ("unit/test_threshold_sensitivity.py",),
 }
 """By folder or module: properties over all that is registered there, which do not name each of its files."""
+OVER_ALL = ("unit/test_architecture.py",)
+"""Properties of all sources, which are asked last: that values are frozen, that imports run one way."""
 MOST_TEST_FILES = 6
 """A mutant that survives costs the quick tests of so many files."""
 
@@ -107,7 +109,7 @@ def tests_of(file: str) -> tuple[str, ...]:
 
     First come the file of its name and those over all that its folder registers, then those that the faults made by
     hand in it name, most often named first, then unit and validation tests that import it; where there are none of
-    these, those that import what imports it.
+    these, those that import what imports it. Last come those over all sources, where any other is asked.
     """
     named = Counter(
         test.split("::")[0] for room in rooms() for one in faults_of(room) if one.file == file for test in one.tests
@@ -119,9 +121,10 @@ def tests_of(file: str) -> tuple[str, ...]:
         *(test for name in (Path(file).parent.name, Path(file).stem) for test in OVER_EVERY.get(name, ())),
     ]
     found = [*over_every, *(test for test, _ in named.most_common()), *_tests_importing(file, tests)]
-    for other in [] if len(found) > len(over_every) else _importing(file, ROOT.glob("hdopt/*/*.py")):
+    for other in [] if len(found) > len(over_every) else _importing(file, ROOT.glob("hdopt/*/**/*.py")):
         found += _tests_importing(str(other.relative_to(ROOT)), tests)
-    return tuple(islice(dict.fromkeys(found), MOST_TEST_FILES))
+    chosen = tuple(islice(dict.fromkeys(found), MOST_TEST_FILES))
+    return (*chosen, *OVER_ALL) if chosen else ()
 
 
 def _tests_importing(file: str, tests: Iterable[Path]) -> list[str]:
@@ -129,8 +132,9 @@ def _tests_importing(file: str, tests: Iterable[Path]) -> list[str]:
 
 
 def _importing(file: str, among: Iterable[Path]) -> list[Path]:
-    """Those files `among` that import the module `file`, in the order of their names."""
-    module = file.removesuffix(".py").replace("/", ".")
+    """Those files `among` that import the module `file` or name it, in the order of their names."""
+    module = file.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
     package, _, name = module.rpartition(".")
-    takes = re.compile(rf"^(from {re.escape(module)} import|from {re.escape(package)} import .*\b{name}\b)", re.M)
+    imports = rf"from {re.escape(module)} import|from {re.escape(package)} import .*\b{name}\b"
+    takes = re.compile(rf"^\s*({imports})|\b{re.escape(module)}\b", re.M)
     return [path for path in sorted(among) if takes.search(path.read_text("utf-8"))]

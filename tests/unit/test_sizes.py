@@ -32,7 +32,9 @@ def test_the_shipped_drive_raises_no_doubt():
     assert doubts(DRIVE) == ()
 
 
-@pytest.mark.parametrize(("modules", "doubted"), [(0.79, True), (0.81, False), (1.0, False), (1.19, False), (1.21, True)])
+@pytest.mark.parametrize(
+    ("modules", "doubted"), [(0.79, True), (0.81, False), (1.0, False), (1.19, False), (1.21, True)]
+)
 def test_a_deflection_is_usual_from_four_fifths_to_six_fifths_of_the_module(modules, doubted):
     """Would catch a deflection that is not taken over the module, or another border."""
     found = doubts(bent_by(modules))
