@@ -27,7 +27,8 @@ from hdopt.effects.probe import Probe, widest_that_pays
 from hdopt.effects.term import Shape, Term
 
 RUNS: tuple[tuple[int, ...], ...] = ((2,), (3,), *(tuple(range(2, k + 1)) for k in (3, 4, 5, 8, 14, 24, 40, 70)))
-"""Sets of harmonics without a gap, as of a pitch deviation of any shape, the first alone among them."""
+"""Sets of harmonics without a gap, as of a pitch deviation of any shape, the first alone among them. One more reaches
+as far as the rows do: each tooth's own error makes waves of every length."""
 FEW, MOST_OF_FEW = tuple(range(2, 13)), 3
 """Harmonics of which also a few may stand out alone, as of cutter, chuck and machine table, and how many."""
 
@@ -53,6 +54,11 @@ SINES = Sines(
 def members_of(shape: Shape) -> tuple[int, ...]:
     """The harmonics that a shape holds, in rising order."""
     return tuple(shape["members"])
+
+
+def has_no_gap(members: tuple[int, ...]) -> bool:
+    """Whether these harmonics, `members`, are a run, not a few that stand out alone."""
+    return members in RUNS or members == tuple(range(2, members[-1] + 1))
 
 
 def shape_of(members: Iterable[int]) -> Shape:
@@ -84,9 +90,11 @@ class CircularSplineToothHarmonics(Effect):
         fewest_teeth = 2 * samples.ratio
         limit = min(0.5 * samples.rows_per_turn, 1.5 * samples.highest_order, MOST_OF_TEETH * fewest_teeth)
         runs = [run for run in RUNS if run[-1] <= limit]
+        if runs and runs[-1][-1] < int(limit) < RUNS[-1][-1]:
+            runs.append(tuple(range(2, int(limit) + 1)))
         terms = widest_that_pays(probe, terms_at(self, samples, [shape_of(run) for run in runs]))
         few = [members for members in self._strongest_few(probe, limit) if self.stands_alone(members)]
-        return [*terms, *terms_at(self, samples, [shape_of(members) for members in few if members not in RUNS])]
+        return [*terms, *terms_at(self, samples, [shape_of(members) for members in few if not has_no_gap(members)])]
 
     def _strongest_few(self, probe: Probe, limit: float) -> list[tuple[int, ...]]:
         members = tuple(h for h in FEW if h <= limit)
@@ -107,7 +115,7 @@ class CircularSplineToothHarmonics(Effect):
         members = members_of(term.shape)
         size = np.hypot(estimate.values[0 : term.width : 2], estimate.values[1 : term.width : 2])
         shown = size > LEAST_OF_FEW * size.max()
-        if members not in RUNS:
+        if not has_no_gap(members):
             return bool(np.all(shown))
         return len(members) > SHORT_RUN or bool(np.mean(shown) >= SHOWN_OF_A_RUN)
 
@@ -116,19 +124,19 @@ class CircularSplineToothHarmonics(Effect):
         members = members_of(term.shape)
         size = np.hypot(coefficients[0::2], coefficients[1::2])
         left = tuple(h for h, s in zip(members, size, strict=True) if s > LEAST_OF_FEW * size.max())
-        return shape_of(left) if members not in RUNS and self.stands_alone(left) and left != members else None
+        return shape_of(left) if not has_no_gap(members) and self.stands_alone(left) and left != members else None
 
     def shortened(self, term: Term) -> Sequence[Shape]:
         """Shapes of shorter runs than the term's own, the longest first."""
         members = members_of(term.shape)
-        if members not in RUNS:
+        if not has_no_gap(members):
             return []
         return [shape_of(run) for run in reversed(RUNS) if len(run) > 1 and run[-1] < members[-1]]
 
     def term(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
         members = members_of(shape)
         trials = float(len(RUNS))
-        if members not in RUNS:
+        if not has_no_gap(members):
             trials *= math.comb(len(FEW), len(members))
         return Term(self.id, dict(shape), met=Waves(self.spline, members), trials=trials)
 

@@ -39,8 +39,11 @@ class Probe(Protocol):
     def gain(self, term: Term) -> float:
         """Drop of the weighted sum of squares, in units of the noise variance, when `term` joins the fit."""
 
+    def gains(self, terms: Sequence[Term]) -> list[float]:
+        """The same drop of each of `terms` by itself."""
+
     def solve(self, term: Term) -> tuple[float, Array]:
-        """The same drop, and the coefficients (p,) that bring it."""
+        """That of one, and the coefficients (p,) that bring it."""
 
     def table(self, term: Term) -> tuple[Array, Array]:
         """Inner products of the term's columns with each other and with the residual, the refitted base taken out."""
@@ -67,9 +70,13 @@ def widest_that_pays(probe: Probe, terms: Sequence[Term]) -> list[Term]:
 
 def best_terms(probe: Probe, terms: Sequence[Term], keep: int = 1) -> list[Term]:
     """The `keep` of `terms` with the largest gain on the residual of `probe`, after paying for freedom and odds."""
+    if len(terms) < 2:
+        return list(terms)[:keep]
     cost = math.log(max(len(probe.residual), 2))
-    ranked = sorted(terms, key=lambda term: probe.gain(term) - cost * term.freedom + 2 * term.odds, reverse=True)
-    return ranked[:keep]
+    gains = zip(terms, probe.gains(terms), strict=True)
+    scores = [gain - cost * term.freedom + 2 * term.odds for term, gain in gains]
+    ranked = sorted(range(len(terms)), key=scores.__getitem__, reverse=True)
+    return [terms[i] for i in ranked[:keep]]
 
 
 def strongest_orders(probe: Probe, count: int, lowest: float = 0.2, highest: float | None = None) -> list[float]:

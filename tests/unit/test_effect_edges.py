@@ -383,15 +383,44 @@ def test_a_defect_of_the_output_is_looked_for_in_parts_of_its_widest():
     assert sorted({w for _, w in found}) == pytest.approx([1.2, 2.5, 5.0, 10.0, 15.0, 30.0, 60.0, 120.0, 240.0])
 
 
-@pytest.mark.parametrize("effect", ["cs_tooth_harmonics", "fs_tooth_harmonics"])
-@pytest.mark.parametrize(("ratio", "most"), [(30.0, 40), (50.0, 70), (160.0, 70)])
-def test_waves_of_the_teeth_do_not_reach_to_the_mesh(monkeypatch, effect, ratio, most):
-    """60 teeth have 30 waves, and what a load that passes from tooth to tooth makes of them: 70 were tried, which took
-    up the mesh of 62 (case 547 of run-018). Fault caught: no bound from the number of teeth."""
+def runs_offered(monkeypatch, effect, **samples):
+    """The runs of waves that a search looks at, in their order."""
     offered = []
     monkeypatch.setattr(cs_tooth_harmonics, "widest_that_pays", lambda probe, terms: offered.extend(terms) or [])
     monkeypatch.setattr(cs_tooth_harmonics, "terms_at", lambda effect, samples, shapes: shapes)
-    samples = SimpleNamespace(ratio=ratio, rows_per_turn=800.0, highest_order=300.0)
     monkeypatch.setattr(CircularSplineToothHarmonics, "_strongest_few", lambda self, probe, limit: [])
-    assert EFFECTS[effect].search(SimpleNamespace(samples=samples)) == []
-    assert max(cs_tooth_harmonics.members_of(shape)[-1] for shape in offered) == most
+    assert EFFECTS[effect].search(SimpleNamespace(samples=SimpleNamespace(**samples))) == []
+    return [cs_tooth_harmonics.members_of(shape) for shape in offered]
+
+
+@pytest.mark.parametrize("effect", ["cs_tooth_harmonics", "fs_tooth_harmonics"])
+@pytest.mark.parametrize(("ratio", "most"), [(30.0, 45), (50.0, 70), (160.0, 70)])
+def test_waves_of_the_teeth_do_not_reach_to_the_mesh(monkeypatch, effect, ratio, most):
+    """60 teeth have 30 waves, and what a load that passes from tooth to tooth makes of them: 70 were tried, which took
+    up the mesh of 62 (case 547 of run-018). Fault caught: no bound from the number of teeth."""
+    runs = runs_offered(monkeypatch, effect, ratio=ratio, rows_per_turn=800.0, highest_order=300.0)
+    assert max(run[-1] for run in runs) == most
+
+
+@pytest.mark.parametrize("effect", ["cs_tooth_harmonics", "fs_tooth_harmonics"])
+@pytest.mark.parametrize(
+    ("rows", "longest"), [(16.0, [5, 8]), (17.9, [5, 8]), (18.0, [8, 9]), (80.0, [24, 40]), (111.0, [40, 55])]
+)
+def test_waves_of_the_teeth_reach_as_far_as_the_rows(monkeypatch, effect, rows, longest):
+    """Each tooth's own error makes waves of every length: of 111 rows a turn 40 were tried, and what the others left
+    was named an encoder of 46 lines or a damaged tooth (cases 456 and 517 of run-018). Faults caught: the last run left
+    out, a run twice, one beyond half the rows."""
+    runs = runs_offered(monkeypatch, effect, ratio=100.0, rows_per_turn=rows, highest_order=rows / 3)
+    assert [run[-1] for run in runs][-2:] == longest
+    assert all(cs_tooth_harmonics.has_no_gap(run) for run in runs)
+    assert len(set(runs)) == len(runs)
+
+
+@pytest.mark.parametrize(
+    ("members", "run"),
+    [((2,), True), ((3,), True), ((4,), False), ((2, 3), True), ((3, 4), False), (tuple(range(2, 56)), True)],
+)
+def test_a_run_of_waves_begins_with_the_second(members, run):
+    """Fault caught: a run that ends with the rows taken for a few waves that stand out alone, which must all be as
+    large as its largest."""
+    assert cs_tooth_harmonics.has_no_gap(members) == run

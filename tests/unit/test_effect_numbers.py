@@ -217,13 +217,16 @@ class Known:
     """A probe whose gains and spectrum are written down."""
 
     def __init__(self, gains=(), amplitude=None, rows=1000):
-        self.gains, self.amplitude = gains, amplitude
+        self.written, self.amplitude = gains, amplitude
         self.residual = np.zeros(rows)
         self.samples = SimpleNamespace(span_turns=20.0, rows_per_turn=100.0)
         self.order_range = (0.0, 45.0)
 
     def gain(self, term):
-        return self.gains[term.shape["at"]]
+        return self.written[term.shape["at"]]
+
+    def gains(self, terms):
+        return [self.gain(term) for term in terms]
 
     def spectrum(self, orders):
         return self.amplitude(np.asarray(orders))

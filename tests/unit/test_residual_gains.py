@@ -7,6 +7,7 @@ import pytest
 
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.settings import DEFAULT
+from hdopt.effects.term import Term
 
 N, SIGMA = 60, 0.2
 
@@ -19,6 +20,8 @@ def probe_of(design, precision, residual, weights=None):
     fit = SimpleNamespace(terms=(), problem=problem, motion=None, residual=residual)
     fit.white_design = lambda keep: fit.problem.noise.whiten(design)
     fit.prior_precision = lambda width: precision
+    fit.columns_of = lambda term, keep: term.columns
+    problem.whitened = {}
     return FitProbe(fit)
 
 
@@ -56,3 +59,26 @@ def test_noise_with_the_signs_of_turns_is_projected_as_the_residual_is():
     assert flipped.white_residual == pytest.approx(probe.project(signs * probe.white_residual))
     other = probe.on(2 * residual)
     assert other.white_residual == pytest.approx(2 * probe.white_residual)
+
+
+@pytest.mark.parametrize("widths", [(1,), (1, 2, 1, 1, 3), (7, 1, 1, 1, 1, 1, 9, 2), (5, 5, 5), (4, 4)])
+def test_the_gain_of_each_of_many_terms_is_the_drop_that_it_alone_brings(widths):
+    """Against a least-squares fit with and without its columns, beside a fit of four. Faults caught: columns that stand
+    beside each other in one product mixed up, a term left out where they no longer fit side by side, and one wider
+    than what is fitted."""
+    rng = np.random.default_rng(4)
+    design, residual, weights = rng.normal(size=(N, 4)), rng.normal(size=N), rng.uniform(0.5, 2.0, N)
+    terms = [Term("output_coupling", {}, columns=rng.normal(size=(N, width)) + design[:, :1]) for width in widths]
+
+    def left(*columns):
+        white = weights[:, None] * np.column_stack([design, *columns])
+        return float(np.linalg.lstsq(white, weights * residual)[1][0])
+
+    probe = probe_of(design, np.zeros(4), residual, weights)
+    drops = [(left() - left(term.columns)) / SIGMA**2 for term in terms]
+    assert probe.gains(terms) == pytest.approx(drops, rel=1e-4)
+    assert probe.gains(terms) == pytest.approx([probe.gain(term) for term in terms], rel=1e-12)
+
+
+def test_no_terms_gain_nothing():
+    assert probe_of(np.ones((N, 1)), np.zeros(1), np.arange(N)).gains([]) == []

@@ -113,7 +113,10 @@ class FitProbe:
 
     def solve(self, term: Term) -> tuple[float, Array]:
         """Drop of the weighted sum of squares, in noise variances, and the coefficients that bring it."""
-        gram, absorbed, moment = self._products(term)
+        return self._solved(*self._products(term))
+
+    def _solved(self, gram: Array, absorbed: Array, moment: Array) -> tuple[float, Array]:
+        """`solve` of a term with such `_products`."""
         scale = np.sqrt(np.maximum(np.diag(gram), TINY))
         # A column that the base absorbs to a millionth has nothing left to say.
         gram = (gram - absorbed) / (scale[:, None] * scale)
@@ -124,6 +127,29 @@ class FitProbe:
     def gain(self, term: Term) -> float:
         """Drop of the weighted sum of squares, in noise variances, when `term` joins the fit."""
         return self.solve(term)[0]
+
+    def gains(self, terms: Sequence[Term]) -> list[float]:
+        """`gain` of each of `terms` by itself. What is fitted already is gone through once for as many columns as it
+        has itself, which for many narrow terms beside a wide fit takes a tenth of the time.
+        """
+        most, found, at = self.basis.shape[1], [], 0
+        while at < len(terms):
+            end, width = at + 1, terms[at].width
+            while end < len(terms) and width + terms[end].width <= most:
+                width += terms[end].width
+                end += 1
+            found += self._gains_at_once(terms[at:end])
+            at = end
+        return found
+
+    def _gains_at_once(self, terms: Sequence[Term]) -> list[float]:
+        """`gains` of so few `terms` that their columns may stand beside each other."""
+        whitened = [self._whitened(term) for term in terms]
+        columns = np.concatenate([white.T for white, _ in whitened])
+        absorbed, moments = self.basis.T @ columns.T, columns @ self.white_residual
+        ends = np.cumsum([len(gram) for _, gram in whitened])[:-1]
+        parts = zip(whitened, np.split(absorbed, ends, axis=1), np.split(moments, ends), strict=True)
+        return [self._solved(gram, part.T @ part, moment)[0] for (_, gram), part, moment in parts]
 
     @cached_property
     def _by_input(self) -> tuple[Array, float]:
