@@ -80,7 +80,7 @@ def test_an_addendum_is_usual_from_half_to_four_fifths_of_the_module(name, modul
     found = doubts(with_sizes(**{name: modules * MODULE}))
     assert bool(found) == doubted
     if doubted:
-        assert f"{name}_mm is {modules:.3g} times the module of {MODULE:g} mm" in found[0]
+        assert f"{name}_mm is {modules:.3g} times the module of {MODULE:g} mm, where 0.5 to 0.8 is usual" in found[0]
         assert found[0].endswith("look whether it was written for another module")
 
 
