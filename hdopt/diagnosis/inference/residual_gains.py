@@ -5,14 +5,14 @@ spectrum.
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.diagnosis.inference.base_excitation import excites, is_driven
-from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.inference.fit import Fit, side_by_side
 from hdopt.diagnosis.inference.normal_equations import solved
 from hdopt.diagnosis.numerical import RANK, RIDGE, TINY
 from hdopt.effects.term import Term
@@ -84,9 +84,9 @@ class FitProbe:
         """The term's columns, whitened."""
         return self.noise.whiten(self.fit.columns_of(term, self.keep))
 
-    def columns(self, term: Term) -> Array:
-        """The term's columns, whitened and projected."""
-        return self.project(self.white_columns(term))
+    def columns(self, *terms: Term) -> Array:
+        """The columns of `terms` beside each other, whitened and projected."""
+        return self.project(side_by_side([self.white_columns(term) for term in terms]))
 
     def _whitened(self, term: Term) -> tuple[Array, Array]:
         """The term's whitened columns and their inner products."""
@@ -102,18 +102,24 @@ class FitProbe:
 
     def table(self, term: Term) -> tuple[Array, Array]:
         """Inner products of the term's columns, with the fit projected out, with each other and with the residual."""
-        gram, absorbed, moment = self._products(term)
+        ((gram, absorbed, moment),) = self._products([term])
         return gram - absorbed, moment
 
-    def _products(self, term: Term) -> tuple[Array, Array, Array]:
-        """Of the term's columns with each other, the part of it that the fit absorbs, and with the residual."""
-        white, gram = self._whitened(term)
-        absorbed = self.basis.T @ white
-        return gram, absorbed.T @ absorbed, white.T @ self.white_residual
+    def _products(self, terms: Sequence[Term]) -> Iterator[tuple[Array, Array, Array]]:
+        """Of each term's columns with each other, the part of it that the fit absorbs, and with the residual: all
+        `terms` in one product with what is fitted.
+        """
+        whitened = [self._whitened(term) for term in terms]
+        columns = np.concatenate([white.T for white, _ in whitened])
+        absorbed, moments = self.basis.T @ columns.T, columns @ self.white_residual
+        ends = np.cumsum([len(gram) for _, gram in whitened])[:-1]
+        parts = zip(whitened, np.split(absorbed, ends, axis=1), np.split(moments, ends), strict=True)
+        return ((gram, part.T @ part, moment) for (_, gram), part, moment in parts)
 
     def solve(self, term: Term) -> tuple[float, Array]:
         """Drop of the weighted sum of squares, in noise variances, and the coefficients that bring it."""
-        return self._solved(*self._products(term))
+        ((gram, absorbed, moment),) = self._products([term])
+        return self._solved(gram, absorbed, moment)
 
     def _solved(self, gram: Array, absorbed: Array, moment: Array) -> tuple[float, Array]:
         """`solve` of a term with such `_products`."""
@@ -130,7 +136,7 @@ class FitProbe:
 
     def gains(self, terms: Sequence[Term]) -> list[float]:
         """`gain` of each of `terms` by itself. What is fitted already is gone through once for as many columns as it
-        has itself, which for many narrow terms beside a wide fit takes a tenth of the time.
+        has itself, not once for each term.
         """
         most, found, at = self.basis.shape[1], [], 0
         while at < len(terms):
@@ -138,18 +144,9 @@ class FitProbe:
             while end < len(terms) and width + terms[end].width <= most:
                 width += terms[end].width
                 end += 1
-            found += self._gains_at_once(terms[at:end])
+            found += [self._solved(*products)[0] for products in self._products(terms[at:end])]
             at = end
         return found
-
-    def _gains_at_once(self, terms: Sequence[Term]) -> list[float]:
-        """`gains` of so few `terms` that their columns may stand beside each other."""
-        whitened = [self._whitened(term) for term in terms]
-        columns = np.concatenate([white.T for white, _ in whitened])
-        absorbed, moments = self.basis.T @ columns.T, columns @ self.white_residual
-        ends = np.cumsum([len(gram) for _, gram in whitened])[:-1]
-        parts = zip(whitened, np.split(absorbed, ends, axis=1), np.split(moments, ends), strict=True)
-        return [self._solved(gram, part.T @ part, moment)[0] for (_, gram), part, moment in parts]
 
     @cached_property
     def _by_input(self) -> tuple[Array, float]:

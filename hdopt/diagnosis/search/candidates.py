@@ -9,7 +9,7 @@ import numpy as np
 
 from hdopt.diagnosis.inference.base_fit import fit_base, is_far
 from hdopt.diagnosis.inference.catalogue import is_outside
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, extend, refine, side_by_side
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, extend, refine
 from hdopt.diagnosis.inference.normal_equations import gains_of_subsets, solved
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import SMALL_RIDGE, TINY
@@ -120,9 +120,8 @@ class _SubsetGains:
     """Gains, in noise variances, of any subsets of terms from one table of inner products."""
 
     def __init__(self, probe: FitProbe, terms: Sequence[Term]):
-        columns = [probe.white_columns(term) for term in terms]
-        self.ends = np.cumsum([0, *(block.shape[1] for block in columns)])
-        matrix = probe.project(side_by_side(columns))
+        self.ends = np.cumsum([0, *(term.width for term in terms)])
+        matrix = probe.columns(*terms)
         gram, moment = matrix.T @ matrix, matrix.T @ probe.white_residual
         scale = np.sqrt(np.maximum(np.diag(gram), TINY))
         self.gram, self.moment = gram / np.outer(scale, scale), moment / scale
@@ -141,7 +140,7 @@ def joint_fit(start: Fit, terms: Sequence[Term], rng: np.random.Generator | None
     """`terms` fitted together with the base, from `start` on; with `rng` also from new random drives."""
     probe = FitProbe(replace(start, terms=(), coefficients=()), keep=())
     bare = extend(replace_terms(start, ()), terms)
-    columns = probe.project(side_by_side([probe.white_columns(term) for term in terms]))
+    columns = probe.columns(*terms)
     gram = columns.T @ columns
     target = probe.project(start.problem.noise.whiten(start.residual + start.contributions))
     # A tooth in a zone that never drives moves nothing, and takes no coefficient.
