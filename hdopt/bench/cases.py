@@ -51,6 +51,9 @@ Sized: TypeAlias = tuple[Hidden, list[Array]]
 Parameters: TypeAlias = dict[str, dict[str, Any]]
 """Name -> {value, unit, identifiable}."""
 
+DEFINITIONS = 2
+"""Of the parameters in a key: raised where one comes to mean something else (`marking.SETTLED`)."""
+
 TROUBLES = ("gaps", "coloured", "ripple", "short", "one way", "coarse", "clock")
 
 # One of each pair is a special case of the other, as far as any recording goes.
@@ -114,6 +117,7 @@ class Key:
     beside_detectable: bool = False
     beside_true: tuple[str, ...] = ()  # names of the catalogue that would be true of it
     redrawn: int = 0
+    definitions: int = DEFINITIONS  # of the parameters, as `marking.SETTLED` counts them
 
     def to_dict(self) -> dict[str, Any]:
         return asdict(self)
@@ -174,7 +178,8 @@ class Simulated:
     def parameters(self) -> dict[str, Parameters]:
         """True parameters of the catalogue's physics in it: id -> name -> {value, unit, identifiable}."""
         top = self.torque_gain * max(float(np.abs(s.run.torque).max()) for s in self.setups)
-        return {physics.id: _parameters(physics, top) for physics in self.hidden if physics.id}
+        pairs = zip(self.hidden, self.waves, strict=True)
+        return {h.id: _parameters(h, top, self.setups, waves) for h, waves in pairs if h.id}
 
 
 def _simulate(spec: Spec, rng: np.random.Generator, last: bool = False) -> Simulated | None:
@@ -352,8 +357,8 @@ def _weigh_beside(spec: Spec, drawn: Simulated, rng: np.random.Generator) -> dic
     }
 
 
-def _parameters(physics: Hidden, top_torque: float) -> Parameters:
-    found = physics.truth_under(top_torque) if isinstance(physics, Windup) else physics.truth()
+def _parameters(physics: Hidden, top_torque: float, setups: Sequence[Setup], waves: Sequence[Array]) -> Parameters:
+    found = physics.truth_under(top_torque) if isinstance(physics, Windup) else physics.truth_in(setups, waves)
     return {name: asdict(parameter) for name, parameter in found.items()}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -11,7 +12,7 @@ from hdopt.bench.arrays import Array
 from hdopt.bench.gears import CSF, Gear
 from hdopt.bench.geometry import Zones, at_angle
 from hdopt.bench.motion import TURN, Run
-from hdopt.bench.signal_chain import Hidden, Parameter
+from hdopt.bench.signal_chain import Hidden, Parameter, Setup
 
 
 def long_wave_array(rng: np.random.Generator, teeth: int, kind: str) -> Array:
@@ -135,12 +136,28 @@ class LocalDefect(Hidden):
             array[(self.tooth + offset) % array.size] += self.sign * part * self.scale * 1e-3
         return (array, fs_mm) if self.variant == "cs" else (cs_mm, array)
 
+    @property
+    def angle(self) -> float:
+        """Angle of the tooth on its spline, rad."""
+        return TURN * self.tooth / (self.teeth_round or (CSF.cs_teeth if self.variant == "cs" else CSF.fs_teeth))
+
     def truth(self) -> dict[str, Parameter]:
-        teeth = self.teeth_round or (CSF.cs_teeth if self.variant == "cs" else CSF.fs_teeth)
         return {
-            "angle_deg": Parameter(360 * self.tooth / teeth, "deg"),
+            "angle_deg": Parameter(360 * self.angle / TURN, "deg"),
             "height": Parameter(self.sign * self.scale, "um"),
         }
+
+    def truth_in(self, setups: Sequence[Setup], waves: Sequence[Array]) -> dict[str, Parameter]:
+        """The tooth passes both ends of the wave generator, half a turn apart, and the end that drives shows it: the
+        centre of the pulse is the input angle at which more of it shows."""
+        near, far = 0.0, 0.0
+        for setup, wave in zip(setups, waves, strict=True):
+            wave = wave - np.median(wave)  # most of a turn shows nothing of it
+            zones = setup.zones.cs_angle if self.variant == "cs" else setup.zones.fs_angle
+            first, second = (np.cos(zone - self.angle) > 0.9 for zone in zones)
+            near, far = near + float(wave[first] @ wave[first]), far + float(wave[second] @ wave[second])
+        at = self.angle if near >= far else self.angle + TURN / 2
+        return self.truth() | {"angle_deg": Parameter(360 * (at % TURN) / TURN, "deg")}
 
 
 @dataclass(frozen=True)

@@ -123,7 +123,7 @@ class Hysteresis(Hidden):
     def truth(self) -> dict[str, Parameter]:
         return {
             "half_loop_arcmin": Parameter(self.scale, "arcmin"),
-            "transition_deg": Parameter(np.rad2deg(self.reversal_path(1 - np.exp(-1))), "deg"),
+            "transition_deg": Parameter(np.rad2deg(self.reversal_path(0.9)), "deg"),
         }
 
 

@@ -21,7 +21,7 @@ from hdopt.bench.arrays import Array
 from hdopt.bench.marking import (
     CLAIMS,
     COMPARED,
-    OPEN_DEFINITIONS,
+    SETTLED,
     check_answer,
     covered,
     credit,
@@ -112,7 +112,8 @@ def _collect(
     grave = [case for case in hidden if case.severity >= thresholds.EXACT_SET_FROM_SEVERITY]
     outside = [case for case in cases if case.outside]
     gains = [case.improvement for case in hidden if np.isfinite(case.improvement)]
-    fixed = {n: hits for n, hits in coverage.items() if n.split(".")[1] not in OPEN_DEFINITIONS}
+    definitions = min((key.get("definitions", 1) for key in keys), default=1)
+    fixed = {n: hits for n, hits in coverage.items() if SETTLED.get(n.split(".")[1], 1) <= definitions}
     reliability = _reliability(statements)
     counts = sorted({len(case.truth) for case in hidden})
     return Scores(

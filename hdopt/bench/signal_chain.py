@@ -77,6 +77,10 @@ class Hidden:
     def clock(self, time: Array, input_angle: Array, output_angle: Array) -> tuple[Array, Array]:
         return input_angle, output_angle
 
+    def truth_in(self, setups: Sequence[Setup], waves: Sequence[Array]) -> dict[str, Parameter]:
+        """`truth` as the `waves` that it makes in recordings (`setups`) show it, where that says more."""
+        return self.truth()
+
     def truth(self) -> dict[str, Parameter]:
         """Parameters, name to Parameter."""
         return {}

@@ -102,6 +102,11 @@ class Explanation(ABC):
         for most. Where one of these explains better, it is not this effect that is there."""
         return ()
 
+    def other_forms(self, shape: Shape) -> Sequence[Shape]:
+        """Shapes of the same physics in other forms, of which a real part may have any: an interval takes in what each
+        that explains as well says. None for most."""
+        return ()
+
     def tooth_by_tooth(self, term: Term, coefficients: Array, ratio: float) -> Sequence[Shape]:
         """Shapes of the same with a height of every tooth's own, all alike, from which a fit of them begins: those of
         `term` in the zones with these `coefficients`, on a drive of this `ratio`. None for most."""
@@ -301,6 +306,13 @@ class Effect(Explanation):
             elif quantity.whole and quantity.key in term.shape:
                 found[quantity.name] = counted(term.shape[quantity.key])
         return found
+
+    def as_seen(
+        self, parameters: dict[str, Parameter], term: Term, conditions: Conditions, contribution: Array
+    ) -> dict[str, Parameter]:
+        """The `parameters` of a fitted `term` as the recordings show them, by their rows (`conditions`) and what the
+        term adds there, `contribution` (n,) arcmin. The same for most."""
+        return parameters
 
     def categories(self, shape: Shape) -> dict[str, str]:
         """The categories of a fitted shape by their declared names, such as the shaft of an encoder."""

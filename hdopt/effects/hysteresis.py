@@ -1,15 +1,17 @@
 """Pre-sliding friction: after each reversal the error crosses over gradually, and not at all with speed.
 
 The friction state z follows the output travel s alone, whatever the speed: from z_rev at a reversal towards the
-direction d, within a length delta, by one of the laws of `_friction_law` (Dahl, Maxwell-slip, Bouc-Wen).
-The error takes half_loop times z. Units: half_loop arcmin, delta deg of output angle. Prior: 0 to 5 arcmin, delta from
-a sample to 10 deg, far more than the windup by which a drive's friction is overcome. Where the input is locked the loop
-is one of torque and windup: `_friction_torque`.
+direction d, by one of the laws of `_friction_law` (Dahl, Maxwell-slip, Bouc-Wen), each in units of its own length.
+The error takes half_loop times z. Stated is the transition, the output angle after a full reversal at which 90 % of the
+loop is crossed: 0.7 to 2.6 lengths. Units: half_loop arcmin, transition deg of output angle. Prior: 0 to 5 arcmin, a
+length from a sample to 10 deg, far more than the windup by which a drive's friction is overcome. Where the input is
+locked the loop is one of torque and windup: `_friction_torque`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,8 +28,11 @@ from hdopt.effects.term import Shape, Term
 
 SHARES = (0.02, 0.05, 0.1, 0.15, 0.25, 0.4)
 """Friction torques and knees that a search tries, as shares of the torque reached."""
+SHORTEST_ROWS = 2.0
+"""Shortest length of a law, in rows: a crossing within fewer cannot be told from play."""
 LONGEST_DEG = 10.0
-"""Longest crossing, deg of output: friction that takes longer to turn over would be a drift of something else."""
+"""Longest length of a law, deg of output: what takes longer to turn over would be a drift of something else."""
+LONGEST_TRANSITION_DEG = LONGEST_DEG * max(law.transition for law in LAWS.values())
 
 
 class Hysteresis(Effect):
@@ -45,9 +50,9 @@ class Hysteresis(Effect):
         Quantity(
             "transition_deg",
             "deg",
-            "output angle after a reversal within which it crosses",
+            "output angle after a reversal at which 90 % of the loop is crossed",
             "δ",
-            (1e-3, LONGEST_DEG),
+            (1e-3, LONGEST_TRANSITION_DEG),
             above=0.0,
         ),
         Category("model", Law, "the law of the crossing", default=Law.DAHL),
@@ -56,6 +61,7 @@ class Hysteresis(Effect):
         {"half_loop_arcmin": 0.2, "transition_deg": 1.5, "model": "dahl"},
         {"half_loop_arcmin": 0.2, "transition_deg": 1.5, "model": "maxwell_slip"},
         {"half_loop_arcmin": 0.2, "transition_deg": 1.5, "model": "bouc_wen_square"},
+        {"half_loop_arcmin": 0.2, "transition_deg": 1.5, "model": "maxwell_slip_wide"},
     )
 
     def search(self, probe: Probe) -> Sequence[Term]:
@@ -65,7 +71,7 @@ class Hysteresis(Effect):
             sizes = [{"friction_nm": f * reached, "knee_nm": k * reached} for f in SHARES for k in SHARES]
             return best_terms(probe, [self.term(samples, size) for size in sizes])
         longest = float(np.max(samples.travel))
-        shortest = max(3 * float(np.median(np.abs(np.diff(samples.travel)))), 1e-4 * longest)
+        shortest = max(3 * _row(samples), 1e-4 * longest)
         lengths = np.geomspace(0.7 * shortest, max(0.14 * min(longest, 5 * LONGEST_DEG), shortest), 14)
         dahl, maxwell, *others = (
             best_terms(probe, terms_at(self, samples, [self._shape(law, half) for half in lengths]))[0] for law in NAMES
@@ -75,7 +81,7 @@ class Hysteresis(Effect):
     @staticmethod
     def _shape(law: Law, half: float) -> Shape:
         """Shape by the name of the law, with full reversals half crossed after `half` (deg)."""
-        return {"transition_deg": float(half / LAWS[law].half), "model": law}
+        return {"transition_deg": float(half / LAWS[law].half * LAWS[law].transition), "model": law}
 
     def term(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
         if conditions.locked:
@@ -84,25 +90,35 @@ class Hysteresis(Effect):
             columns = friction_columns(conditions, kept["friction_nm"], kept["knee_nm"])
             steps = {name: 0.005 * reached for name in kept}
             return Term(self.id, kept, columns=columns, steps=steps, trials=float(len(SHARES) ** 2))
-        # A crossing faster than a few rows cannot be told from play.
-        longest, row = float(np.max(conditions.travel)), float(np.median(np.abs(np.diff(conditions.travel))))
-        delta = min(max(shape["transition_deg"], 2 * row), 0.25 * longest, max(LONGEST_DEG, 2 * row))
-        parts = [friction_state(conditions, delta, shape["model"])]
+        longest, row = float(np.max(conditions.travel)), _row(conditions)
+        of_length = LAWS[shape["model"]].transition
+        shortest = SHORTEST_ROWS * row
+        length = min(max(shape["transition_deg"] / of_length, shortest), 0.25 * longest, max(LONGEST_DEG, shortest))
+        transition = length * of_length
+        parts = [friction_state(conditions, transition, shape["model"])]
         if conditions.first.any():
             # The state at the start of a recording is unknown: it fades over the same length.
-            parts.append(np.where(conditions.first, np.exp(-conditions.travel / delta), 0.0))
+            parts.append(np.where(conditions.first, np.exp(-conditions.travel / length), 0.0))
         return Term(
             self.id,
-            {"transition_deg": delta, "model": shape["model"]},
+            {"transition_deg": transition, "model": shape["model"]},
             columns=np.column_stack(parts),
-            steps={"transition_deg": 0.02 * delta},
+            steps={"transition_deg": 0.02 * transition},
             trials=14.0 * len(LAWS),
         )
 
     def every_part_shows(self, term: Term, estimate: FitEstimate) -> bool:
-        """Whether it crosses over within the longest crossing: what is drawn to that end relaxes, in time or far
+        """Whether it crosses over within the longest length: what is drawn to that end relaxes, in time or far
         travel, and is no friction."""
-        return float(term.shape.get("transition_deg", 0.0)) < LONGEST_DEG
+        if "transition_deg" not in term.shape:
+            return True
+        return float(term.shape["transition_deg"]) < (1 - 1e-9) * LONGEST_DEG * LAWS[term.shape["model"]].transition
+
+    def other_forms(self, shape: Shape) -> Sequence[Shape]:
+        """The other laws of the crossing."""
+        if "transition_deg" not in shape:
+            return ()
+        return [{**shape, "model": law} for law in NAMES if law != shape["model"]]
 
     def other_laws(self, conditions: Conditions, term: Term) -> Sequence[Array]:
         return columns_by_speed(conditions, term)
@@ -124,6 +140,15 @@ class Hysteresis(Effect):
             "transition_deg": estimate.parameter(at, "deg"),
         }
 
+    def as_seen(
+        self, parameters: dict[str, Parameter], term: Term, conditions: Conditions, contribution: Array
+    ) -> dict[str, Parameter]:
+        """A crossing that may last no longer than the rows resolve may be as short as it likes."""
+        found = parameters.get("transition_deg")
+        if found is None or found.low > SHORTEST_ROWS * _row(conditions) * LAWS[term.shape["model"]].transition:
+            return parameters
+        return {**parameters, "transition_deg": replace(found, low=0.0)}
+
     def sentence(self, shape: Shape, parameters: Mapping[str, Parameter], rms_arcmin: float) -> str:
         if "friction_torque" in parameters:
             return (
@@ -132,15 +157,20 @@ class Hysteresis(Effect):
             )
         return (
             f"Friction: the two directions lie {2 * parameters['half_loop_arcmin'].value:.2g} arcmin apart; after a "
-            f"reversal the error crosses over within about {parameters['transition_deg'].value:.2g} deg of output."
+            f"reversal nine tenths of it are crossed within {parameters['transition_deg'].value:.2g} deg of output."
         )
 
 
-def friction_state(conditions: Conditions, delta: float, law: Law) -> Array:
-    """Friction state z in -1..1 along the `conditions`, (n,), by `law` with the length `delta` (deg of output); each
-    pass starts from where the one before it ended.
+def _row(conditions: Conditions) -> float:
+    """Travel of the output from row to row of the `conditions`, deg."""
+    return float(np.median(np.abs(np.diff(conditions.travel))))
+
+
+def friction_state(conditions: Conditions, transition: float, law: Law) -> Array:
+    """Friction state z in -1..1 along the `conditions`, (n,), by `law`, of which 90 % of a full reversal is crossed
+    after `transition` (deg of output); each pass starts from where the one before it ended.
     """
-    cross = LAWS[law].cross
+    cross, length = LAWS[law].cross, transition / LAWS[law].transition
     state = np.empty(len(conditions))
     last = 0.0
     for rows in passes_of(conditions):
@@ -148,6 +178,6 @@ def friction_state(conditions: Conditions, delta: float, law: Law) -> Array:
         if conditions.first[rows.start]:
             state[rows] = direction
         else:
-            state[rows] = direction * cross(direction * last, conditions.travel[rows] / delta)
+            state[rows] = direction * cross(direction * last, conditions.travel[rows] / length)
         last = float(state[rows.stop - 1])
     return state

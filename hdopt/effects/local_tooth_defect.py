@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from enum import StrEnum
 
 import numpy as np
@@ -246,6 +247,23 @@ class LocalToothDefect(Effect):
         if seat.twice:
             found["height_half_a_turn_on_arcmin"] = estimate.parameter(1, "arcmin")
         return found
+
+    def as_seen(
+        self, parameters: dict[str, Parameter], term: Term, conditions: Conditions, contribution: Array
+    ) -> dict[str, Parameter]:
+        """Of a tooth that the driving zone meets the angle at which more of its pulse shows: in the fit zone 1 meets it
+        at its angle, and zone 2 half a turn on."""
+        if not term.shape["on"].in_zones:
+            return parameters
+        coordinate, period = self.coordinate(conditions, term.shape["on"])
+        off = off_centre(coordinate, term.shape["centre"], period)
+        near = np.abs(off) < period / 4
+        if np.sum(contribution[near] ** 2) >= np.sum(contribution[~near] ** 2):
+            return parameters
+        one = parameters["angle_deg"]
+        way = 180.0 if one.value < 180 else -180.0
+        there = replace(one, value=one.value + way, low=one.low + way, high=one.high + way)
+        return {**parameters, "angle_deg": there}
 
     def sentence(self, shape: Shape, parameters: Mapping[str, Parameter], rms_arcmin: float) -> str:
         angle = parameters["angle_deg"].value % 360

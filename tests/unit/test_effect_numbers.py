@@ -12,7 +12,7 @@ import pytest
 from test_effect_physics import RATE, RATIO, TURN, moving, spanned
 
 from hdopt.effects import EFFECTS
-from hdopt.effects._friction_law import Law
+from hdopt.effects._friction_law import LAWS, Law
 from hdopt.effects.base import Effect
 from hdopt.effects.declared import Category, Quantity, Shaft
 from hdopt.effects.estimate import FitEstimate, Parameter
@@ -54,24 +54,55 @@ def test_friction_does_not_know_where_a_recording_began():
     """Beside the state that it would have had run in, what was else fades over the same length until the first
     reversal; a recording that begins with one has none of it."""
     c = moving()
-    columns = EFFECTS["hysteresis"].term(c, {"transition_deg": 5.0, "model": Law.DAHL}).columns
+    columns = EFFECTS["hysteresis"].term(c, {"transition_deg": 5.0 * np.log(10), "model": Law.DAHL}).columns
     np.testing.assert_allclose(columns[:, 1], np.where(c.first, np.exp(-c.travel / 5.0), 0.0))
     none = EFFECTS["hysteresis"].term(moving(first=np.zeros(len(c), bool)), {"transition_deg": 5.0, "model": Law.DAHL})
     assert none.width == 1
 
 
-@pytest.mark.parametrize(("asked", "is_friction"), [(0.5, True), (9.9, True), (10.0, False), (40.0, False)])
-def test_friction_that_is_drawn_to_its_longest_crossing_is_none(asked, is_friction):
-    """In passes of sixty input turns, long enough for any crossing. Fault caught: what relaxes for minutes
-    after a reversal, named friction that crosses over within 10 deg (case 33 of run-014).
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(("lengths", "is_friction"), [(0.5, True), (9.9, True), (10.0, False), (40.0, False)])
+def test_friction_that_is_drawn_to_its_longest_crossing_is_none(lengths, is_friction, law):
+    """In passes of sixty input turns, long enough for any crossing of so many deg of a law's length. Fault caught: what
+    relaxes for minutes after a reversal, named friction that crosses over within 10 deg (case 33 of run-014).
     """
     hysteresis = EFFECTS["hysteresis"]
     rows = moving(passes=(60, 60))
     assert 0.25 * rows.travel.max() > 40
-    term = hysteresis.term(rows, {"transition_deg": asked, "model": Law.DAHL})
+    term = hysteresis.term(rows, {"transition_deg": lengths * LAWS[law].transition, "model": law})
     nothing = FitEstimate(np.zeros(term.freedom), np.eye(term.freedom))
     assert hysteresis.has_parts
     assert hysteresis.every_part_shows(term, nothing) is is_friction
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(("low_in_rows", "shown"), [(1.9, 0.0), (2.1, 2.1)])
+def test_a_crossing_within_two_rows_may_be_as_short_as_it_likes(low_in_rows, shown, law):
+    """Rows lie 3 deg of input apart. Fault caught: an interval that ends where the fit may go no further."""
+    rows = moving()
+    row = 360 / RATE / RATIO * LAWS[law].transition
+    term = EFFECTS["hysteresis"].term(rows, {"transition_deg": 3 * row, "model": law})
+    said = {"transition_deg": Parameter(3 * row, low_in_rows * row, 4 * row, "deg")}
+    seen = EFFECTS["hysteresis"].as_seen(said, term, rows, np.zeros(len(rows)))
+    assert seen["transition_deg"].low == pytest.approx(shown * row)
+    assert seen["transition_deg"].high == pytest.approx(4 * row)
+
+
+@pytest.mark.parametrize(("on", "way"), [("circular_spline", 1.0), ("flexspline", 1 + 1 / RATIO)])
+@pytest.mark.parametrize("shown_deg", [40.0, 220.0])
+def test_the_angle_of_a_tooth_is_where_its_pulse_shows(on, way, shown_deg):
+    """A fit may have zone 1 meet the tooth at 40 deg and show its pulse only half a turn on, where zone 2 drives.
+    Fault caught: the angle in the fit's own zone 1.
+    """
+    rows = moving((30, 6))  # long enough for a flexspline's tooth to go half round
+    term = EFFECTS["local_tooth_defect"].term(rows, {"centre": np.radians(40.0), "width_deg": 3.0, "on": Seat(on)})
+    off = np.mod(np.degrees(rows.theta) * way - shown_deg + 180, 360) - 180
+    said = {"angle_deg": Parameter(40.0, 39.0, 41.5, "deg"), "width_deg": Parameter(3.0, 2.0, 4.0, "deg")}
+    seen = EFFECTS["local_tooth_defect"].as_seen(said, term, rows, -np.exp(-0.5 * (off / 3.0) ** 2))
+    assert seen["angle_deg"] == Parameter(shown_deg, shown_deg - 1.0, shown_deg + 1.5, "deg")
+    assert seen["width_deg"] == said["width_deg"]
+    once = EFFECTS["local_tooth_defect"].term(rows, {**term.shape, "on": Seat(f"{on}_once")})
+    assert EFFECTS["local_tooth_defect"].as_seen(said, once, rows, -np.exp(-0.5 * (off / 3.0) ** 2)) == said
 
 
 def test_both_directions_lie_a_whole_loop_apart():

@@ -1,7 +1,7 @@
 """What each effect does at known conditions, from its source's equation written out by hand."""
 
 from dataclasses import replace
-from math import exp, pi, radians, sqrt, tan
+from math import exp, log, pi, radians, sqrt, tan
 from types import SimpleNamespace
 
 import numpy as np
@@ -156,10 +156,11 @@ def fitting(n, **changes):
 
 
 def test_friction_crosses_over_with_the_travel_and_remembers_a_short_pass():
-    """Dahl 1968: 1 - (1 - y) exp(-s/delta) along the motion, from where the pass before ended."""
+    """Dahl 1968: 1 - (1 - y) exp(-s/delta) along the motion, from where the pass before ended; 90 % of the loop after
+    ln 10 delta."""
     c = moving((6, 2, 6))
     delta = 20.0
-    found = friction_state(c, delta, Law.DAHL)
+    found = friction_state(c, log(10) * delta, Law.DAHL)
     ends = np.flatnonzero(np.diff(c.direction)) + 1
     there, back, again = np.split(np.arange(len(c)), ends)
     assert found[there] == pytest.approx(1.0)

@@ -101,7 +101,7 @@ PARTS = {
     "channel_delay": lambda t, way: way * 0.002 * math.pi / 80 * 10800 / math.pi,
     "lost_motion": lambda t, way: way * 0.15 + 0 * t,
     "hysteresis": lambda t, way: (
-        way * 0.2 * (1 - 2 * np.exp(-np.degrees(t if way > 0 else 160 * np.pi - t) / 80 / 1.5))
+        way * 0.2 * (1 - 2 * np.exp(-np.degrees(t if way > 0 else 160 * np.pi - t) / 80 / (1.5 / np.log(10))))
     ),
     "torsional_windup": lambda t, way: (14 / 31000 + 6 / 50000) * 10800 / math.pi + 0 * t,
     "thermal_drift": lambda t, way: 0.15 + 0 * t,

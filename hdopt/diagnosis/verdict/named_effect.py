@@ -12,7 +12,7 @@ from hdopt.arrays import Array
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.inference.catalogue import is_effect
 from hdopt.diagnosis.inference.fit import Fit
-from hdopt.diagnosis.inference.profile_interval import profiled_estimates
+from hdopt.diagnosis.inference.other_forms import estimates_over_forms
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.inference.settled_shapes import estimates_by_profile
 from hdopt.diagnosis.numerical import TINY
@@ -107,7 +107,7 @@ def describe(candidate: Candidate, evidence: Evidence, high: bool = False) -> li
     fit = candidate.fit
     # A root of a jagged profile is the edge of a jag: with the input locked, places are compared instead.
     locked = fit.problem.rows.locked
-    estimates = estimates_by_profile(fit, evidence.inflation) if locked else profiled_estimates(fit)
+    estimates = estimates_by_profile(fit, evidence.inflation) if locked else estimates_over_forms(fit)
     confidence = {} if high else confidences(evidence)
     apart = {} if high else evidence_apart(evidence)
     base_power = evidence.base_held_out.variance
@@ -118,7 +118,7 @@ def describe(candidate: Candidate, evidence: Evidence, high: bool = False) -> li
         effect = EFFECTS[term.effect]
         contribution = fit.contribution(index)
         rms = float(np.std(contribution))
-        parameters = effect.parameters(term, estimate)
+        parameters = effect.as_seen(effect.parameters(term, estimate), term, fit.problem.rows, contribution)
         if evidence.orientation.turned:
             parameters = as_counted(parameters, term)
         found.append(
