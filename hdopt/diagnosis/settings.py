@@ -93,7 +93,21 @@ class BaseSettings:
         "choice: three times the shipped tolerances, as far as the closed form holds; beyond them its second-order "
         "terms would imitate physics that is not there",
     )
+    box_over_tolerance: float = threshold(
+        3.0, "1", "choice: bounds of the errors over the shipped tolerances, as above"
+    )
     far: float = threshold(1.4, "1", "choice: an error over its prior from which the study's tolerances are left")
+    surely_outside: float = threshold(
+        1.2,
+        "1",
+        "choice: lower end of an error's interval over its tolerance; drives within theirs came out beyond it in one "
+        "of some fifty right answers looked at (126 of run-018)",
+    )
+    surely_far: float = threshold(
+        2.0,
+        "1",
+        "choice: the same, from which no effect is named beside it (577 of run-018, 16 of run-019, both wrong)",
+    )
     prior_arcmin: float = threshold(
         0.3, "arcmin", "choice: rms up to which the prior holds; the prior of a larger error grows with it"
     )

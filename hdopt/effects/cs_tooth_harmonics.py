@@ -96,6 +96,11 @@ class CircularSplineToothHarmonics(Effect):
         few = [members for members in self._strongest_few(probe, limit) if self.stands_alone(members)]
         return [*terms, *terms_at(self, samples, [shape_of(members) for members in few if not has_no_gap(members)])]
 
+    def beyond_search(self, probe: Probe) -> Sequence[Term]:
+        """Each wave of the circular spline alone: what lobes of its ring make too, and the search leaves to them."""
+        lone = [shape_of((h,)) for h in FEW if h <= 0.4 * probe.samples.rows_per_turn]
+        return terms_at(self, probe.samples, lone) if self.spline is Spline.CIRCULAR else ()
+
     def _strongest_few(self, probe: Probe, limit: float) -> list[tuple[int, ...]]:
         members = tuple(h for h in FEW if h <= limit)
         if len(members) < 2:

@@ -1,30 +1,94 @@
 """The base's errors as a drive's, their intervals and what a record leaves open, against what is worked out by hand."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hdopt.diagnosis.inference import base_fit
-from hdopt.diagnosis.inference.base_fit import base_estimate, beat_warning, open_combinations
+from hdopt.diagnosis.inference.base_fit import (
+    base_estimate,
+    beat_warning,
+    beyond_tolerances,
+    far_errors,
+    open_combinations,
+)
 from hdopt.diagnosis.settings import DEFAULT
 
 HALF_WIDTH = 5.0
 PRIOR = np.full(12, 0.05)
 
 
-def estimated(errors, spread):
-    """Of Cartesian errors (12,) mm with these standard deviations (12,) mm; zeros have their coefficients too."""
+def fitted(errors, spread):
+    """A fit of Cartesian errors (12,) mm with these standard deviations (12,) mm; zeros have their coefficients too."""
     covariance = np.diag(np.r_[np.square(spread), 7.0])
-    problem = SimpleNamespace(base=SimpleNamespace(half_width=HALF_WIDTH), settings=DEFAULT, prior=PRIOR)
-    return base_estimate(
-        SimpleNamespace(
-            problem=problem,
-            errors=np.asarray(errors, float),
-            covariance=lambda: covariance,
-            base_value=np.array([-0.3, 0.3]),
-        )
+    base = SimpleNamespace(half_width=HALF_WIDTH)
+    problem = SimpleNamespace(base=base, settings=DEFAULT, prior=PRIOR, box=np.array(DEFAULT.base.box_mm))
+    return SimpleNamespace(
+        problem=problem,
+        errors=np.asarray(errors, float),
+        covariance=lambda: covariance,
+        base_value=np.array([-0.3, 0.3]),
     )
+
+
+def estimated(errors, spread):
+    """What `fitted` says of the drive."""
+    return base_estimate(fitted(errors, spread))
+
+
+SHIPPED = {
+    "axis_eccentricity_mm": ((0, 1), 0.015),
+    "axis_tilt_x_deg": ((2,), math.degrees(math.atan(0.047 / 3 / HALF_WIDTH))),
+    "axis_tilt_y_deg": ((3,), math.degrees(math.atan(0.047 / 3 / HALF_WIDTH))),
+    "wg_eccentricity_mm": ((4, 5), 0.0075),
+    "wg_tilt_major_deg": ((6,), math.degrees(math.atan(0.008 / HALF_WIDTH))),
+    "wg_tilt_minor_deg": ((7,), math.degrees(math.atan(0.008 / HALF_WIDTH))),
+    "cs_tooth_amplitude_mm": ((8, 9), 0.003),
+    "fs_tooth_amplitude_mm": ((10, 11), 0.003),
+}
+"""Errors with a size: their Cartesian parts, and the tolerance of csf-25-80 that a third of the bounds stands for."""
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("name", SHIPPED)
+def test_what_is_surely_beyond_its_tolerance(name, sign):
+    """Each error by itself at 1.5 times its tolerance, known to a twentieth of it: surely 1.4 times. Faults caught: a
+    tilt of one sign, the value in place of the lower end of its interval, one part of a vector alone."""
+    parts, allowed = SHIPPED[name]
+    length = np.array(DEFAULT.base.box_mm)[parts[0]] / 3
+    errors, spread = np.full(12, 1e-5), np.full(12, 1e-6)
+    errors[list(parts)] = sign * 1.5 * length / math.sqrt(len(parts))
+    spread[list(parts)] = 0.05 * length
+    (found,) = beyond_tolerances(fitted(errors, spread), 1.2)
+    assert (found.name, found.unit) == (name, name.rsplit("_", 1)[1])
+    assert found.allowed == pytest.approx(allowed, rel=1e-3)
+    assert found.size == pytest.approx(1.5 * allowed, rel=1e-3)
+    assert found.times == pytest.approx(1.5 - 1.96 * 0.05, rel=2e-3)
+    assert beyond_tolerances(fitted(errors, spread), 1.41) == []
+    assert f"{name} {found.size:.2g}" in str(found)
+
+
+def test_the_farthest_comes_first_and_a_gear_without_a_base_has_none():
+    errors = np.full(12, 1e-5)
+    errors[6], errors[8] = 0.02, 0.009
+    found = beyond_tolerances(fitted(errors, np.full(12, 1e-6)), 1.2)
+    assert [one.name for one in found] == ["cs_tooth_amplitude_mm", "wg_tilt_major_deg"]
+    bare = fitted(errors, np.full(12, 1e-6))
+    bare.problem.base = None
+    assert beyond_tolerances(bare, 1.2) == []
+
+
+def test_far_is_over_its_prior_or_surely_twice_its_tolerance():
+    errors = np.full(12, 1e-5)
+    assert far_errors(fitted(errors, np.full(12, 1e-6))) == ""
+    errors[6] = 1.9 * 0.008
+    assert far_errors(fitted(errors, np.full(12, 1e-6))) == ""
+    errors[6] = 2.1 * 0.008
+    assert far_errors(fitted(errors, np.full(12, 1e-6))).startswith("wg_tilt_major_deg 0.19 deg, tolerance 0.092")
+    errors[0] = 0.08
+    assert far_errors(fitted(errors, np.full(12, 1e-6))) == "axis eccentricity x 0.08 mm"
 
 
 def test_intervals_of_a_length_and_its_direction_are_those_of_its_two_parts():

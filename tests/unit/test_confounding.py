@@ -37,7 +37,7 @@ SHAPES = {
     "output_coupling": {"shaft": Shaft.OUTPUT, "orders": (2,)},
     "channel_delay": {},
     "lost_motion": {"ramp_arcmin": 0.3},
-    "hysteresis": {"transition_deg": 1.5, "model": Law.DAHL},
+    "hysteresis": {"transition_deg": 1.5 * np.log(10), "model": Law.DAHL},
     "thermal_drift": {"time_constant_s": 100.0},
     "torsional_windup": {},
 }
@@ -92,6 +92,17 @@ def test_alike_on_one_record(study, name, other, imitates):
     assert pair.imitates > imitates
     assert pair.angle_deg < 5
     assert pair.separating == EFFECTS[name].separating
+
+
+@pytest.mark.parametrize("lobes", range(2, 13))
+def test_lobes_are_a_lone_wave_of_the_teeth_however_many(study, lobes):
+    """The same columns: nothing holds them apart. Fault caught: from six lobes on a run of waves pays for its
+    coefficients, and the lobes were named though one wave of the teeth is as good (case 218 of run-018)."""
+    name = "circular_spline_lobing"
+    hidden = {name: lambda state: 0.12 * np.sin(lobes * state["theta"] + 0.3)}
+    pair = against(study, name, "cs_tooth_harmonics", shapes={name: {"lobes": lobes}}, hidden=hidden)
+    assert pair.imitates > 0.999
+    assert pair.evidence_apart < 0.1
 
 
 @pytest.mark.parametrize(("name", "other"), [("lost_motion", "channel_delay"), ("channel_delay", "lost_motion")])

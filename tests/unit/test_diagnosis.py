@@ -126,7 +126,7 @@ SPEEDS = {"hysteresis": (1.0, 2.0)}
 @pytest.mark.parametrize(
     ("name", "parameters"),
     [
-        ("hysteresis", {"half_loop_arcmin": 0.15, "transition_deg": 1.5}),
+        ("hysteresis", {"half_loop_arcmin": 0.15, "transition_deg": 1.5 * math.log(10)}),
         ("thermal_drift", {"time_constant_s": 100.0}),
     ],
 )

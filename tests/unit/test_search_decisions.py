@@ -48,6 +48,7 @@ class Told:
     motion: object = None
     may_be_said: bool = True
     far: bool = False
+    outside: float = 0.0
 
     def all_but(self, index):
         return tuple(i for i in range(len(self.terms)) if i != index)
@@ -71,6 +72,7 @@ def weighed(monkeypatch):
     monkeypatch.setattr(search_state, "FitProbe", lambda fit, keep=None, order_range=None: (fit, keep))
     monkeypatch.setattr(search_state, "search_terms", lambda probe, skip: [Effect("found beside")])
     monkeypatch.setattr(completing, "is_far", lambda fit: np.array([False, fit.far]))
+    monkeypatch.setattr(completing, "beyond_tolerances", lambda fit, least: [fit.outside] * (fit.outside > least))
     for module in (subset_search, refinement, completing):
         monkeypatch.setattr(module, "is_acceptable", lambda fit: fit.may_be_said)
 
@@ -216,6 +218,7 @@ class Beside:
     met: object = None
     may_be_said: bool = True
     far: bool = False
+    outside: float = 0.0
     other_law: float = 0.0
 
 
@@ -233,7 +236,8 @@ def completion(monkeypatch, in_rows):
             fitted.append((term.effect, rng is not None))
             left = term.left if rng is None or term.left_anew is None else term.left_anew
             fit = in_rows(0.0, tuple(one.effect for one in terms), left).fit
-            return replace(fit, terms=tuple(terms), may_be_said=term.may_be_said, far=term.far or rng is None)
+            far = term.far or (rng is None and start.far)
+            return replace(fit, terms=tuple(terms), may_be_said=term.may_be_said, far=far, outside=term.outside)
 
         monkeypatch.setattr(completing, "joint_fit", joint_fit)
         monkeypatch.setattr(weighing, "joint_fit", joint_fit)
@@ -340,6 +344,55 @@ def test_sines_that_bring_a_far_drive_home_complete_a_set(completion, in_rows, m
     # A hundredth of what the best set that is known explains, three times the noise.
     assert found[0].log_bayes_factor == pytest.approx(900.0 + 0.1 * ROWS / 2 - 3.0 - 0.01 * 3.0 * ROWS / 2)
     assert completion(begun, Beside("sine", -0.1, far=True, left_anew=-0.11)) == [begun]
+
+
+SURELY = DEFAULT.base.surely_outside
+
+
+def outside(candidate, times):
+    """The `candidate` beside a drive with an error that is surely so many times its tolerance."""
+    return replace(candidate, fit=replace(candidate.fit, outside=times))
+
+
+def test_the_one_sine_that_brings_home_a_drive_surely_outside_completes_a_set(completion, in_rows):
+    """A tilted wave generator took up an eccentric encoder, and leaves noise alone. Fault caught: the encoder is not
+    looked for (case 577 of run-018)."""
+    begun = outside(in_rows(900.0, ("bearing",), 0.0), SURELY + 0.01)
+    found = completion(begun, Beside("sine", -0.1, outside=0.99), known=(begun.fit,))
+    assert [one.effects for one in found] == [("bearing", "sine"), ("bearing",)]
+    assert found[0].log_bayes_factor == pytest.approx(900.0 + 0.1 * ROWS / 2 - 3.0 - 0.01 * 3.0 * ROWS / 2)
+
+
+def test_sines_beside_sines_pay_nothing_for_what_shapes_leave(completion, in_rows):
+    """An encoder's lines leave nothing that an eccentric encoder could be (case 150 of run-018)."""
+    begun = outside(in_rows(900.0, ("cosine",), 0.0), SURELY + 0.01)
+    found = completion(begun, Beside("sine", -0.1, outside=0.99), known=(begun.fit,))
+    assert found[0].log_bayes_factor == pytest.approx(900.0 + 0.1 * ROWS / 2 - 3.0)
+
+
+@pytest.mark.parametrize(
+    ("times", "found"),
+    [
+        (SURELY - 0.01, [Beside("sine", -0.1)]),
+        (SURELY + 0.01, [Beside("sine", -0.1, outside=1.01)]),
+        (SURELY + 0.01, [Beside("sine", -0.1, far=True)]),
+        (SURELY + 0.01, [Beside("friction", -0.1)]),
+        (SURELY + 0.01, [Beside("sine", -0.1), Beside("cosine", -0.1)]),
+        (SURELY + 0.01, [Beside("sine", -0.03)]),
+    ],
+    ids=["not outside", "not home", "far instead", "no sine", "two would do", "not clear"],
+)
+def test_what_brings_no_drive_home(completion, in_rows, times, found):
+    """Two that would do: a mesh whose drive was not found is brought home by either (case 126 of run-018)."""
+    begun = outside(in_rows(900.0, ("bearing",), 0.0), times)
+    assert completion(begun, *found, known=(begun.fit,)) == [begun]
+
+
+def test_of_a_far_drive_every_sine_that_brings_it_home_is_told(completion, in_rows):
+    begun = in_rows(900.0, ("bearing",), 0.0)
+    begun = replace(begun, fit=replace(begun.fit, far=True))
+    found = completion(begun, Beside("sine", 0.0, left_anew=-0.2), Beside("cosine", 0.0, left_anew=-0.1))
+    assert [one.effects for one in found] == [("bearing", "sine"), ("bearing", "cosine"), ("bearing",)]
 
 
 def test_a_set_that_came_out_wider_is_completed_once_more(monkeypatch):

@@ -210,14 +210,25 @@ def test_a_parameter_outside_its_prior_is_no_plain_name(delay, warned):
         assert "delay_s 2.5 s lies outside of what drives and benches have" in notes[0]
 
 
-def test_a_drive_far_outside_its_tolerances_is_warned_of():
-    """An axis 0.06 mm off in a drive whose kind has 0.03 mm at most."""
-    problem = SimpleNamespace(base=object(), prior=np.full(12, 0.03), settings=DEFAULT)
-    errors = np.zeros(12)
-    assert base_notes(SimpleNamespace(problem=problem, errors=errors)) == ()
+@pytest.mark.parametrize(
+    ("tilt_mm", "said"),
+    [(0.009, None), (0.0101, "lies outside the tolerances of its kind"), (0.017, "lies far outside the tolerances")],
+)
+def test_a_drive_outside_its_tolerances_is_warned_of(tilt_mm, said):
+    """A wave generator tilted by 1.1, 1.26 and 2.1 times the 0.1 deg of its kind, surely."""
+    base = SimpleNamespace(half_width=4.5)
+    problem = SimpleNamespace(base=base, prior=np.full(12, 0.03), settings=DEFAULT, box=np.array(DEFAULT.base.box_mm))
+    errors = np.full(12, 1e-5)
+    errors[6] = tilt_mm
+    fit = SimpleNamespace(
+        problem=problem, errors=errors, covariance=lambda: 1e-12 * np.eye(13), base_value=np.array([-0.3, 0.3])
+    )
+    notes = base_notes(fit)
+    assert bool(notes) is (said is not None)
+    if said:
+        assert said in notes[0] and "wg_tilt_major_deg" in notes[0] and "tolerance 0.1" in notes[0]
     errors[0] = 0.06
-    (note,) = base_notes(SimpleNamespace(problem=problem, errors=errors))
-    assert "axis eccentricity x 0.06 mm" in note
+    assert "axis eccentricity x 0.06 mm" in base_notes(fit)[0]
 
 
 @pytest.mark.parametrize(("own_gain", "named"), [(430.0, True), (0.5, False)])

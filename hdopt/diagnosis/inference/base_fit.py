@@ -23,6 +23,18 @@ from hdopt.effects.term import Term
 from hdopt.kinematics.cartesian import CARTESIAN_NAMES, PARAMETERS, to_drive_errors
 from hdopt.recordings.rows import Rows
 
+SIZES = {
+    "axis_eccentricity_mm": "axis eccentricity x",
+    "axis_tilt_x_deg": "axis tilt x",
+    "axis_tilt_y_deg": "axis tilt y",
+    "wg_eccentricity_mm": "wave-generator eccentricity along its major axis",
+    "wg_tilt_major_deg": "wave-generator tilt major",
+    "wg_tilt_minor_deg": "wave-generator tilt minor",
+    "cs_tooth_amplitude_mm": "CS tooth sine",
+    "fs_tooth_amplitude_mm": "FS tooth sine",
+}
+"""Errors of the drive that have a size, each with the Cartesian error that has its bound."""
+
 
 def fit_base(
     problem: FitProblem,
@@ -92,8 +104,49 @@ def is_far(fit: Fit) -> Mask:
 
 
 def far_errors(fit: Fit) -> str:
-    """The base's errors in `fit` that lie far outside the tolerances of its kind, in words, each with its size."""
-    return ", ".join(f"{CARTESIAN_NAMES[i]} {fit.errors[i]:.3g} mm" for i in np.flatnonzero(is_far(fit)))
+    """The base's errors in `fit` that lie far outside the tolerances of its kind, in words, each with its size: those
+    over their prior, or where none is those that are surely twice their tolerance; "" where neither is."""
+    if (far := is_far(fit)).any():
+        return ", ".join(f"{CARTESIAN_NAMES[i]} {fit.errors[i]:.3g} mm" for i in np.flatnonzero(far))
+    return ", ".join(str(one) for one in beyond_tolerances(fit, fit.problem.settings.base.surely_far))
+
+
+@dataclass(frozen=True)
+class BeyondTolerance:
+    """An error of the drive that is surely larger than the shipped study allows: its study key, its size and the lower
+    end of its 95 % interval, both in `unit`, and what is allowed."""
+
+    name: str
+    size: float
+    surely: float
+    allowed: float
+    unit: str
+
+    @property
+    def times(self) -> float:
+        """How many times the tolerance it surely is."""
+        return self.surely / self.allowed
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.size:.2g} {self.unit}, tolerance {self.allowed:.2g}"
+
+
+def beyond_tolerances(fit: Fit, least: float) -> list[BeyondTolerance]:
+    """Errors of the drive in `fit` that are surely larger than `least` times what the shipped study allows, the
+    farthest first; of a gear without a base none. What a recording leaves open is not beyond anything."""
+    base, settings = fit.problem.base, fit.problem.settings.base
+    if base is None:
+        return []
+    found = []
+    parameters = base_estimate(fit).parameters
+    for name, cartesian in SIZES.items():
+        one = parameters[name]
+        length = fit.problem.box[CARTESIAN_NAMES.index(cartesian)] / settings.box_over_tolerance
+        allowed = length if one.unit == "mm" else math.degrees(math.atan(length / base.half_width))
+        surely = max(abs(one.value) - (one.high - one.value), 0.0)
+        if surely > least * allowed:
+            found.append(BeyondTolerance(name, abs(one.value), surely, float(allowed), one.unit))
+    return sorted(found, key=lambda one: one.times, reverse=True)
 
 
 @dataclass(frozen=True)

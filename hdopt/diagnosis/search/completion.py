@@ -17,7 +17,7 @@ from dataclasses import replace
 
 from hdopt.diagnosis.checks.other_laws import other_law
 from hdopt.diagnosis.inference.base_excitation import is_driven
-from hdopt.diagnosis.inference.base_fit import is_far
+from hdopt.diagnosis.inference.base_fit import beyond_tolerances, is_far
 from hdopt.diagnosis.inference.catalogue import is_outside
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.search.acceptance import is_acceptable
@@ -61,11 +61,11 @@ def far_more_taken_up(state: SearchState, candidates: list[Candidate]) -> list[C
 
 def by_one_plain_effect(state: SearchState, first: Candidate) -> list[Candidate]:
     """Sets that complete the `first`, one of physics, by one plain effect more: where it leaves more than noise, any
-    that takes up nearly all of that; where its drive lies far outside its tolerances, sines of known orders that bring
-    it home. `state` is where the work stands.
+    that takes up nearly all of that; where its drive lies outside its tolerances, sines of known orders that bring it
+    home. `state` is where the work stands.
     """
     settings, fit = state.settings, first.fit
-    left, far = state.above_noise(fit), bool(is_far(fit).any())
+    left, far = state.above_noise(fit), is_outside_tolerances(fit)
     leaves_more = left >= settings.leaves_more * state.scale.rows
     if first.outside or len(fit.terms) >= settings.most_effects or not (leaves_more or far):
         return []
@@ -73,20 +73,36 @@ def by_one_plain_effect(state: SearchState, first: Candidate) -> list[Candidate]
     def fills(more: Fit) -> bool:
         return leaves_more and state.above_noise(more) <= settings.complete * left
 
-    def brings_home(more: Fit) -> bool:
-        beside = (term for term in more.terms if term.effect not in first.effects)
-        return far and not is_far(more).any() and all(leaves_nothing(term) for term in beside)
-
+    made = with_one_more(state, fit, fills, sines_alone=not leaves_more)
+    home = [more for more in made if brings_home(more, first)] if far else []
+    if len(home) > 1 and not is_far(fit).any():
+        home = []  # Several would do: none of them is told by that.
+    inexact = not all(leaves_nothing(term) for term in fit.terms)
+    share = inexact * state.scale.settings.other_kind * state.top_gain / state.inflation / 2
     found = []
-    for more in with_one_more(state, fit, fills, sines_alone=not leaves_more):
+    for more in made:
         one = without_inexactness(state, first, state.weigh(more, state.top_gain))
         if not fills(more):
-            share = state.scale.settings.other_kind * state.top_gain / state.inflation / 2
             one = replace(one, log_bayes_factor=one.log_bayes_factor - share)
         ahead = one.log_bayes_factor - first.log_bayes_factor > settings.clearly
-        if ahead and (fills(more) or brings_home(more)) and is_acceptable(more) and follows_its_laws(more, state):
+        completes = fills(more) or any(more is one for one in home)
+        if ahead and completes and is_acceptable(more) and follows_its_laws(more, state):
             found.append(one)
     return found
+
+
+def is_outside_tolerances(fit: Fit) -> bool:
+    """Whether the drive in `fit` lies outside the tolerances of its kind: far, or surely."""
+    return bool(is_far(fit).any() or beyond_tolerances(fit, fit.problem.settings.base.surely_outside))
+
+
+def brings_home(more: Fit, first: Candidate) -> bool:
+    """Whether what `more` has beside the `first`, whose drive lies outside its tolerances, is sines of known orders,
+    and the drive beside them lies within."""
+    beside = (term for term in more.terms if term.effect not in first.effects)
+    if is_far(more).any() or not all(leaves_nothing(term) for term in beside):
+        return False
+    return bool(is_far(first.fit).any()) or not beyond_tolerances(more, 1.0)
 
 
 def with_one_more(state: SearchState, fit: Fit, fills: Callable[[Fit], bool], sines_alone: bool) -> list[Fit]:

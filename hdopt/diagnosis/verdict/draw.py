@@ -10,7 +10,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.localization import locate
-from hdopt.diagnosis.inference.base_fit import base_estimate, beat_warning, far_errors
+from hdopt.diagnosis.inference.base_fit import base_estimate, beat_warning, beyond_tolerances, far_errors
 from hdopt.diagnosis.inference.catalogue import NEW_ZERO, SKEW, VARYING_CONTACT, is_effect
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.nuisance import estimated, notes
@@ -157,11 +157,18 @@ def _coefficients(evidence: Evidence, effect: str) -> list[Array]:
 
 
 def base_notes(model: Fit) -> tuple[str, ...]:
-    """A base of `model` far outside the errors that its prior allows."""
-    listed = far_errors(model)
-    if not listed:
+    """A base of `model` outside the tolerances of its kind, or far outside."""
+    if listed := far_errors(model):
+        return (
+            f"the fitted drive lies far outside the tolerances of its kind ({listed}): check drive, ratio and units",
+        )
+    outside = beyond_tolerances(model, model.problem.settings.base.surely_outside)
+    if not outside:
         return ()
-    return (f"the fitted drive lies far outside the tolerances of its kind ({listed}): check drive, ratio and units",)
+    return (
+        f"the fitted drive lies outside the tolerances of its kind ({', '.join(map(str, outside))}): measure that "
+        "error itself; an input encoder off its centre can look the same, and turned against its shaft tells",
+    )
 
 
 def prior_notes(effects: Sequence[NamedEffect]) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding
-from hdopt.diagnosis.inference.base_fit import is_far
+from hdopt.diagnosis.inference.base_fit import far_errors
 from hdopt.diagnosis.inference.catalogue import TOLD
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.neighbour_noise import is_a_walk
@@ -196,7 +196,7 @@ def find(evidence: Evidence) -> Findings:
         rivals=(),
         scale_as_good=scale_is_as_good(evidence),
         hum_as_good=hum is not None,
-        far_base=bool(is_far(best.fit).any()),
+        far_base=far_errors(best.fit) != "",
         together=power_together(best),
         log_evidence=best.log_bayes_factor,
         unseen_gain=unseen_gain(evidence),
