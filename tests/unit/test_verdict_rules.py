@@ -18,6 +18,7 @@ from hdopt.diagnosis.verdict.draw import (
     prior_notes,
     scale_notes,
     skew_notes,
+    taken_up_notes,
     zero_notes,
 )
 from hdopt.diagnosis.verdict.facts import Facts, resolution
@@ -229,6 +230,19 @@ def test_a_drive_outside_its_tolerances_is_warned_of(tilt_mm, said):
         assert said in notes[0] and "wg_tilt_major_deg" in notes[0] and "tolerance 0.1" in notes[0]
     errors[0] = 0.06
     assert "axis eccentricity x 0.06 mm" in base_notes(fit)[0]
+
+
+@pytest.mark.parametrize(
+    ("limit", "best", "told"), [(0.31, (), True), (0.29, (), False), (0.31, ("resonance",), False)]
+)
+def test_what_the_drive_takes_up_whole_is_told(limit, best, told):
+    """The error recorded is 0.3 arcmin rms. Faults caught: `adequate` without a word of an eccentric input encoder that
+    no size of could show; a word of what is named, or of what is no effect."""
+    rows = SimpleNamespace(error=np.array([-0.3, 0.3, -0.3, 0.3]) + 5.0)
+    selection = SimpleNamespace(best=SimpleNamespace(effects=best))
+    limits = {"resonance": limit, "_varying_contact": 9.0, "lost_motion": 0.01}
+    notes = taken_up_notes(SimpleNamespace(rows=rows, selection=selection, below_detection=limits))
+    assert [note.split()[0] for note in notes] == ["resonance"] * told
 
 
 @pytest.mark.parametrize(("own_gain", "named"), [(430.0, True), (0.5, False)])

@@ -60,6 +60,7 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
             *base_notes(model),
             *prior_notes(conclusion.effects),
             *beat_notes(evidence),
+            *taken_up_notes(evidence),
             *(f"{name} cannot be seen here: it needs {need}" for name, need in evidence.lacking.items()),
         ),
         says=conclusion.says,
@@ -168,6 +169,19 @@ def base_notes(model: Fit) -> tuple[str, ...]:
     return (
         f"the fitted drive lies outside the tolerances of its kind ({', '.join(map(str, outside))}): measure that "
         "error itself; an input encoder off its centre can look the same, and turned against its shaft tells",
+    )
+
+
+def taken_up_notes(evidence: Evidence) -> tuple[str, ...]:
+    """Effects that would not have been seen if they made all of the error recorded: the drive's own errors make the
+    same, as a tilted wave generator does of an eccentric input encoder. `evidence` is that of the diagnosis.
+    """
+    most = float(np.std(evidence.rows.error))
+    return tuple(
+        f"{name} cannot be seen here: of a size that made the whole error ({most:.2g} arcmin rms) the drive's own "
+        "errors would take it up"
+        for name, limit in evidence.below_detection.items()
+        if is_effect(name) and limit > most and name not in evidence.selection.best.effects
     )
 
 
