@@ -284,8 +284,8 @@ def test_what_stands_beside_a_far_drive_is_no_name(monkeypatch):
 
 @pytest.mark.parametrize("run", sorted(path.name[:7] for path in PROOF.glob("run-*.keys.jsonl.xz")))
 def test_effects_that_were_hidden_together_do_not_cancel(run):
-    """The threshold below which names are refused, held against every pair and triple that was ever drawn: three, a delay
-    against play each."""
+    """The threshold below which names are refused, held against every pair and triple that was ever drawn: three, a
+    delay against play each."""
     keys = [json.loads(line) for line in lzma.open(PROOF / f"{run}.keys.jsonl.xz", "rt")]
     of_several = [key for key in keys if len(key["effects"]) > 1]
     shares = [
