@@ -154,7 +154,7 @@ class LocalDefect(Hidden):
         for setup, wave in zip(setups, waves, strict=True):
             wave = wave - np.median(wave)  # most of a turn shows nothing of it
             zones = setup.zones.cs_angle if self.variant == "cs" else setup.zones.fs_angle
-            first, second = (np.cos(zone - self.angle) > 0.9 for zone in zones)
+            first, second = (np.cos(zone - self.angle) > 0.9 for zone in zones)  # within 26 deg of the tooth
             near, far = near + float(wave[first] @ wave[first]), far + float(wave[second] @ wave[second])
         at = self.angle if near >= far else self.angle + TURN / 2
         return self.truth() | {"angle_deg": Parameter(360 * (at % TURN) / TURN, "deg")}

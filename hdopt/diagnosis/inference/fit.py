@@ -246,6 +246,11 @@ class Fit:
         return _moved(self, inverse[:, at] * (change / max(float(inverse[at, at]), TINY)), True)
 
     def covariance(self) -> Array:
+        """`_robust_covariance`, worked out once."""
+        return self._robust_covariance
+
+    @cached_property
+    def _robust_covariance(self) -> Array:
         """Covariance of all parameters, robust against what the noise model misses: the larger, parameter by parameter,
         of the model-based one and the sandwich over whole turns, whose variance is as much larger as makes +-1.96
         standard deviations hold 95 %: it is known from few turns that do not hang together."""
@@ -436,6 +441,13 @@ def _at_shape(fit: Fit, term: Term, shape: Shape) -> Term:
     shifted = fit.problem.explanations[term.effect].term(fit.problem.rows, shape, fit.motion)
     free = {name: shifted.steps[name] for name in term.steps}  # a parameter that is held stays so
     return replace(shifted, trials=term.trials, odds=term.odds, steps=free)
+
+
+def in_shape(fit: Fit, index: int, shape: Shape) -> Fit:
+    """`fit` with term `index` at another `shape`, all else as it stands."""
+    terms = list(fit.terms)
+    terms[index] = _at_shape(fit, terms[index], shape)
+    return evaluate(fit.problem, fit.errors, fit.offsets, terms, fit.coefficients)
 
 
 def extend(fit: Fit, terms: Sequence[Term]) -> Fit:

@@ -12,11 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from hdopt.diagnosis.inference.fit import Fit, evaluate
+from hdopt.diagnosis.inference.fit import Fit, in_shape
 from hdopt.diagnosis.inference.profile_interval import profiled_estimates, settle
 from hdopt.diagnosis.numerical import NORMAL_95
 from hdopt.effects.estimate import FitEstimate
-from hdopt.effects.term import Shape
 
 
 def estimates_over_forms(fit: Fit) -> list[FitEstimate]:
@@ -39,7 +38,7 @@ def _over_forms(fit: Fit, index: int, estimate: FitEstimate) -> FitEstimate:
     best = settle(fit).objective
     profiles = dict(estimate.profiles)
     for shape in shapes:
-        other = settle(_in_form(fit, index, shape))
+        other = settle(in_shape(fit, index, shape))
         left = NORMAL_95**2 - (other.objective - best) / unit
         if left <= 0:
             continue
@@ -50,12 +49,3 @@ def _over_forms(fit: Fit, index: int, estimate: FitEstimate) -> FitEstimate:
             value = float(of_form.values[at])
             profiles[at] = min(here.low, value - half), max(here.high, value + half)
     return replace(estimate, profiles=profiles)
-
-
-def _in_form(fit: Fit, index: int, shape: Shape) -> Fit:
-    """`fit` with term `index` in the form of `shape`, not yet refined."""
-    problem, term = fit.problem, fit.terms[index]
-    made = problem.explanations[term.effect].term(problem.rows, shape, fit.motion)
-    terms = list(fit.terms)
-    terms[index] = replace(made, trials=term.trials, odds=term.odds)
-    return evaluate(problem, fit.errors, fit.offsets, terms, fit.coefficients)

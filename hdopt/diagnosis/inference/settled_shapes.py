@@ -10,11 +10,9 @@ least; and its interval ends where the profile has risen for good (Venzon, Moolg
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
+from hdopt.diagnosis.inference.fit import Fit, in_shape, refine
 from hdopt.diagnosis.numerical import NORMAL_95
 from hdopt.effects.estimate import FitEstimate
 
@@ -44,11 +42,8 @@ def _moved_alone(fit: Fit, index: int, name: str) -> Fit:
 
 def _at(fit: Fit, index: int, name: str, value: float) -> Fit:
     """`fit` with the shape `name` of term `index` at `value`, and all that is linear solved anew."""
-    problem, old = fit.problem, fit.terms[index]
-    moved = problem.explanations[old.effect].term(problem.rows, {**old.shape, name: value}, fit.motion)
-    terms = [replace(moved, trials=old.trials, odds=old.odds) if i == index else t for i, t in enumerate(fit.terms)]
-    shifted = evaluate(problem, fit.errors, fit.offsets, terms, fit.coefficients)
-    return refine(shifted, problem.settings.fit.settled_iterations, move_shapes=False)
+    shifted = in_shape(fit, index, {**fit.terms[index].shape, name: value})
+    return refine(shifted, fit.problem.settings.fit.settled_iterations, move_shapes=False)
 
 
 def profile_sigma(fit: Fit, index: int, name: str, inflation: float = 1.0) -> float:

@@ -65,9 +65,11 @@ def by_one_plain_effect(state: SearchState, first: Candidate) -> list[Candidate]
     home. `state` is where the work stands.
     """
     settings, fit = state.settings, first.fit
+    if first.outside or len(fit.terms) >= settings.most_effects:
+        return []
     left, far = state.above_noise(fit), is_outside_tolerances(fit)
     leaves_more = left >= settings.leaves_more * state.scale.rows
-    if first.outside or len(fit.terms) >= settings.most_effects or not (leaves_more or far):
+    if not (leaves_more or far):
         return []
 
     def fills(more: Fit) -> bool:
@@ -85,7 +87,7 @@ def by_one_plain_effect(state: SearchState, first: Candidate) -> list[Candidate]
         if not fills(more):
             one = replace(one, log_bayes_factor=one.log_bayes_factor - share)
         ahead = one.log_bayes_factor - first.log_bayes_factor > settings.clearly
-        completes = fills(more) or any(more is one for one in home)
+        completes = fills(more) or any(more is fit_at_home for fit_at_home in home)
         if ahead and completes and is_acceptable(more) and follows_its_laws(more, state):
             found.append(one)
     return found
