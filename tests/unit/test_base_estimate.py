@@ -15,6 +15,7 @@ from hdopt.diagnosis.inference.base_fit import (
     open_combinations,
 )
 from hdopt.diagnosis.settings import DEFAULT
+from hdopt.parallel.engine import engine_in_force
 
 HALF_WIDTH = 5.0
 PRIOR = np.full(12, 0.05)
@@ -173,10 +174,9 @@ def test_a_short_record_says_how_much_worse_it_tells_the_splines_apart(turns):
         assert beat_warning(rows_over(enough)) is None
 
 
-@pytest.fixture
-def started(monkeypatch):
-    """A fit of the base whose thinned objective is least at a first error of 0.03 mm, and all rows say the
-    contrary; the drives that were tried."""
+def fit_from_starts(monkeypatch, on_thinned_rows):
+    """A fit of the base whose thinned objective is `on_thinned_rows` of the first error, mm, and on all rows the less
+    the farther that is from 0.03 mm; the drives that were tried."""
     tried = []
 
     class Problem(SimpleNamespace):
@@ -186,9 +186,9 @@ def started(monkeypatch):
     def evaluate(problem, errors, offsets, terms, coefficients):
         if problem.thin:
             tried.append(errors)
-        off = abs(errors[0] - 0.03)
+        objective = on_thinned_rows(errors[0]) if problem.thin else 2.0 - abs(errors[0] - 0.03)
         fields = {"problem": problem, "errors": errors, "offsets": offsets, "coefficients": coefficients}
-        return SimpleNamespace(objective=1.0 + off if problem.thin else 2.0 - off, terms=terms, **fields)
+        return SimpleNamespace(objective=objective, terms=terms, **fields)
 
     monkeypatch.setattr(base_fit, "evaluate", evaluate)
     monkeypatch.setattr(base_fit, "refine", lambda fit, *rest, **more: fit)
@@ -196,7 +196,29 @@ def started(monkeypatch):
     problem = Problem(
         base="a base", thin=False, settings=DEFAULT, nuisance=np.ones((9, 1)), rows=np.zeros(9), prior=PRIOR
     )
-    return base_fit.fit_base(problem, np.random.default_rng(1), starts=16), np.array(tried)
+    with engine_in_force("process"):  # so that drives are listed in the order in which they are drawn
+        return base_fit.fit_base(problem, np.random.default_rng(1), starts=16), np.array(tried)
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """Of objectives on thinned rows that are least at a first error of 0.03 mm: all rows say the contrary."""
+    return fit_from_starts(monkeypatch, lambda error: 1.0 + abs(error - 0.03))
+
+
+@pytest.mark.parametrize(("met", "starts"), [(8, 8), (4, 8), (3, 9), (1, 16)])
+def test_starts_end_where_enough_of_them_have_met(monkeypatch, met, starts):
+    """So many (`met`) of the first eight in one minimum, and the ninth; of the others none. Faults caught: starts that
+    go on after the fourth, or end before."""
+    numbers = iter(range(16))
+
+    def objective(error):
+        number = next(numbers)
+        alike = number < met or (number == 8 and met == 3)
+        return 1.0 if alike else 2.0 + number
+
+    _, tried = fit_from_starts(monkeypatch, objective)
+    assert len(tried) == starts
 
 
 def test_the_best_of_the_drives_kept_is_the_best_on_all_rows(started):

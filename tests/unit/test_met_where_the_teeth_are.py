@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from cases import random_errors
 from effect_examples import EXAMPLES, NAMES
+from scipy.special import erf
 
 from hdopt.bench.gears import CSF
 from hdopt.bench.geometry import ARCMIN, BaseErrors, at_angle, find_zones, zone_deviation_mm
@@ -16,7 +17,7 @@ from hdopt.diagnosis.inference.noise import Noise
 from hdopt.drive.errors import DriveErrors
 from hdopt.effects import EFFECTS
 from hdopt.effects.local_tooth_defect import Seat
-from hdopt.effects.met import Pulse, Spline, ToothForms
+from hdopt.effects.met import Pulse, Spline, ToothForms, gaussian
 from hdopt.effects.sines import sine_columns, sine_sum
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.recordings.rows import Rows
@@ -313,6 +314,20 @@ def test_a_pulse_in_means_of_neighbours_is_its_mean(row):
     sides = [pulse.added(angle + side, 0, np.array([0.004]))[0] for side in (-step, step)]
     # Third derivative at most 3 * 0.004/sigma^3, by step^2/6.
     np.testing.assert_allclose(slope, (sides[1] - sides[0]) / (2 * step), atol=1e-8)
+
+
+@pytest.mark.parametrize("row", [0.0, 0.1, 2.0])
+def test_a_pulse_is_the_same_all_round(row):
+    """Against SciPy's error function at every distance: where it ends, it is less than rounding of its height, or of
+    the mean over a wide row. Fault caught: an end that shows."""
+    sigma, off = 0.1, np.linspace(-3.0, 3.0, 6001)
+    if row:
+        scale = np.sqrt(2) * sigma
+        area = erf((off + row / 2) / scale) - erf((off - row / 2) / scale)
+        expected = np.sqrt(np.pi) / 2 * scale / row * area
+    else:
+        expected = np.exp(-0.5 * (off / sigma) ** 2)
+    np.testing.assert_allclose(gaussian(off, sigma, row), expected, atol=1e-15)
 
 
 def test_rows_that_are_means_are_wide_for_a_pulse():

@@ -7,6 +7,7 @@ from hdopt.diagnosis.inference.normal_equations import (
     GroupedColumns,
     bordered,
     gains_of_subsets,
+    orthonormal,
     solved,
     sums_of_groups,
 )
@@ -32,6 +33,28 @@ def test_rounding_that_leaves_a_matrix_not_positive_stops_nothing():
 def test_a_singular_matrix_is_refused():
     with pytest.raises(np.linalg.LinAlgError):
         solved(np.zeros((2, 2)), np.ones(2))
+
+
+@pytest.mark.parametrize("apart", [1.0, 1e-3, 1e-4, 1e-6])
+def test_a_basis_is_orthonormal_and_spans_its_columns(apart):
+    """Columns of which two lie so far (`apart`) from each other. Faults caught: one pass alone, orthogonal to 1e-9 at
+    1e-4; factors of what hangs together more closely."""
+    columns = np.random.default_rng(8).normal(size=(200, 6))
+    columns[:, 5] = columns[:, 4] + apart * columns[:, 5]
+    basis = orthonormal(columns)
+    np.testing.assert_allclose(basis.T @ basis, np.eye(6), atol=1e-13)
+    # What rounding of the columns leaves of their small difference.
+    np.testing.assert_allclose(basis @ (basis.T @ columns), columns, atol=1e-14 / apart + 1e-13)
+
+
+def test_a_basis_leaves_out_what_is_rounding():
+    """A column that is the sum of others, to the last digit or to a hundredth of what counts."""
+    columns = np.random.default_rng(9).normal(size=(200, 5))
+    for rest in (0.0, 1e-9):
+        twice = np.column_stack([columns, columns[:, :2].sum(1) + rest * columns[:, 2] ** 2])
+        basis = orthonormal(twice)
+        assert basis.shape == (200, 5)
+        np.testing.assert_allclose(basis @ (basis.T @ columns), columns, atol=1e-7)
 
 
 def test_gains_of_subsets_are_those_of_their_columns(columns):

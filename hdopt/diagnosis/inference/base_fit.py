@@ -21,6 +21,7 @@ from hdopt.effects.estimate import Parameter
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Term
 from hdopt.kinematics.cartesian import CARTESIAN_NAMES, PARAMETERS, to_drive_errors
+from hdopt.parallel.shared_memory import each
 from hdopt.recordings.rows import Rows
 
 SIZES = {
@@ -57,22 +58,31 @@ def fit_base(
     mask[::stride] = True
     thin = problem.only(mask)
     thin_terms = [thinned(term, mask) for term in terms]
-    candidates: list[Fit] = []
-    for index in range(starts):
+
+    def started(errors: Array) -> Fit:
+        start = _solve_offsets(evaluate(thin, errors, offsets, thin_terms, zeros))
+        return refine(start, settings.start_iterations, settings.start_tolerance, move_shapes=False)
+
+    def drawn() -> Array:
         errors = rng.normal(size=PARAMETERS) * problem.prior
-        errors = errors * rng.uniform(settings.smallest_start, settings.largest_start)
-        start = evaluate(thin, errors, offsets, thin_terms, zeros)
-        start = _solve_offsets(start)
-        candidates.append(refine(start, settings.start_iterations, settings.start_tolerance, move_shapes=False))
-        candidates.sort(key=lambda fit: fit.objective)
-        # Enough starts have met in the same best minimum.
-        met = sum(c.objective < settings.same_minimum * candidates[0].objective for c in candidates)
-        if index + 1 >= settings.fewest_starts and met >= settings.same_minimum_starts:
-            break
-    finals = []
-    for candidate in candidates[: settings.kept_starts]:
+        return errors * rng.uniform(settings.smallest_start, settings.largest_start)
+
+    def met_again() -> bool:
+        """Whether enough starts have met in the same best minimum."""
+        least = settings.same_minimum * min(fit.objective for fit in candidates)
+        return sum(fit.objective < least for fit in candidates) >= settings.same_minimum_starts
+
+    # As many at once as are made in any case; then one by one.
+    candidates = each(started, [drawn() for _ in range(min(starts, settings.fewest_starts))])
+    while len(candidates) < starts and not met_again():
+        candidates.append(started(drawn()))
+    candidates.sort(key=lambda fit: fit.objective)
+
+    def finished(candidate: Fit) -> Fit:
         full = evaluate(problem, candidate.errors, candidate.offsets, terms, candidate.coefficients)
-        finals.append(refine(full, settings.full_iterations, move_shapes=False))
+        return refine(full, settings.full_iterations, move_shapes=False)
+
+    finals = each(finished, candidates[: settings.kept_starts])
     if near is not None:
         again = evaluate(problem, near.errors, near.offsets, terms, near.coefficients if near.terms else zeros)
         finals.append(refine(again, settings.full_iterations, move_shapes=False))

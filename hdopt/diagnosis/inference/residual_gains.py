@@ -13,8 +13,8 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.diagnosis.inference.base_excitation import excites, is_driven
 from hdopt.diagnosis.inference.fit import Fit, side_by_side
-from hdopt.diagnosis.inference.normal_equations import solved
-from hdopt.diagnosis.numerical import RANK, RIDGE, TINY
+from hdopt.diagnosis.inference.normal_equations import orthonormal, solved
+from hdopt.diagnosis.numerical import RIDGE, TINY
 from hdopt.effects.term import Term
 from hdopt.recordings.read import TURN
 
@@ -43,9 +43,8 @@ class FitProbe:
         prior = np.sqrt(fit.prior_precision(white.shape[1])) * self.noise.sigma
         augmented = np.vstack([white, np.diag(prior)])
         scale = np.sqrt((augmented**2).sum(0))
-        basis, size, _ = np.linalg.svd(augmented / np.where(scale > 0, scale, 1), full_matrices=False)
-        rank = int(np.sum(size > RANK * size[0]))
-        self.basis = np.asfortranarray(basis[: len(white), :rank])
+        basis = orthonormal(augmented / np.where(scale > 0, scale, 1))
+        self.basis = np.asfortranarray(basis[: len(white)])
         self.white_residual = self.project(self.noise.whiten(self.residual))
 
     def flipped(self, signs: Array) -> FitProbe:
