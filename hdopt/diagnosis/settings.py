@@ -96,6 +96,11 @@ class BaseSettings:
     box_over_tolerance: float = threshold(
         3.0, "1", "choice: bounds of the errors over the shipped tolerances, as above"
     )
+    stated_tolerances: tuple[tuple[str, float], ...] = threshold(
+        (),
+        "mm, deg",
+        "choice: largest errors that a study allows, by their keys; where it is silent the shipped ones hold",
+    )
     far: float = threshold(1.4, "1", "choice: an error over its prior from which the study's tolerances are left")
     surely_outside: float = threshold(
         1.2,

@@ -12,6 +12,7 @@ from hdopt.files import write_text
 from hdopt.workflow.output_files import Files, checked_files
 from hdopt.workflow.placed import recordings_named
 from hdopt.workflow.recorded_drive import AnyDrive, AnyRecordings, recorded_drive
+from hdopt.workflow.stated_tolerances import with_tolerances_of
 
 if TYPE_CHECKING:
     from hdopt.diagnosis.settings import DiagnosisSettings
@@ -37,8 +38,8 @@ def diagnose(
     path of a study file; None for a gear of `ratio` without a harmonic-drive model. `columns` says which column of a
     file is what (as `--columns`); a bench file goes in with `recorded_drive`. `nuisance` ("drift", "time-warp") is
     fitted beside every model and never named. The same `seed` gives the same answer. `settings` are the thresholds
-    (None: as shipped). `files` to write: {"report": PATH} an HTML page, {"study": PATH} a study with the drive's fitted
-    errors and the effects found.
+    (None: as shipped); a fitted drive that surely lies outside the [tolerances] of its study is warned of. `files` to
+    write: {"report": PATH} an HTML page, {"study": PATH} a study with the drive's fitted errors and the effects found.
 
     Raises `HdoptError` where there is no recording, the ratio is unknown or contradicts the drive's, or a recording
     cannot be used; and before any work where a file cannot be written.
@@ -49,6 +50,7 @@ def diagnose(
         raise HdoptError("a fitted study starts from a study; give `drive` as a study, a shipped name or a path")
     read = source.recordings(recordings)
     known = source.ratio if source.ratio is not None or not read else read[0].ratio
+    settings = with_tolerances_of(source.study, settings)
     found = diagnose_records(read, source.drive, known, None, seed, nuisance, settings)
     write_diagnosis(found, wanted, [recording.name for recording in read], drive)
     return found

@@ -1,6 +1,7 @@
 """The base's errors as a drive's, their intervals and what a record leaves open, against what is worked out by hand."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,17 +16,20 @@ from hdopt.diagnosis.inference.base_fit import (
     open_combinations,
 )
 from hdopt.diagnosis.settings import DEFAULT
+from hdopt.diagnosis.verdict.draw import base_notes
 from hdopt.parallel.engine import engine_in_force
 
 HALF_WIDTH = 5.0
 PRIOR = np.full(12, 0.05)
 
 
-def fitted(errors, spread):
-    """A fit of Cartesian errors (12,) mm with these standard deviations (12,) mm; zeros have their coefficients too."""
+def fitted(errors, spread, stated=()):
+    """A fit of Cartesian errors (12,) mm with these standard deviations (12,) mm; zeros have their coefficients too.
+    `stated` are the tolerances of its study."""
     covariance = np.diag(np.r_[np.square(spread), 7.0])
     base = SimpleNamespace(half_width=HALF_WIDTH)
-    problem = SimpleNamespace(base=base, settings=DEFAULT, prior=PRIOR, box=np.array(DEFAULT.base.box_mm))
+    settings = replace(DEFAULT, base=replace(DEFAULT.base, stated_tolerances=tuple(stated)))
+    problem = SimpleNamespace(base=base, settings=settings, prior=PRIOR, box=np.array(DEFAULT.base.box_mm))
     return SimpleNamespace(
         problem=problem,
         errors=np.asarray(errors, float),
@@ -69,6 +73,36 @@ def test_what_is_surely_beyond_its_tolerance(name, sign):
     assert found.times == pytest.approx(1.5 - 1.96 * 0.05, rel=2e-3)
     assert beyond_tolerances(fitted(errors, spread), 1.41) == []
     assert f"{name} {found.size:.2g}" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("stated", "of_kind", "of_study"), [(0.002, 0.015, 0.002), (0.03, 0.03, 0.03), (None, 0.015, 0.015)]
+)
+def test_what_a_study_states_is_asked_of_the_drive(stated, of_kind, of_study):
+    """An eccentricity just over what is allowed by the study, and by drives of its kind, which are as good as the
+    shipped ones or as bad as the study lets them be. Faults caught: a study's tolerance that is not read, one that is
+    tight taken for what parts can be, one that is wide ignored."""
+    tolerances = () if stated is None else (("axis_eccentricity_mm", stated), ("wg_eccentricity_mm", 1e-4))
+    spread = np.full(12, 1e-9)
+    for asked, allowed in ((False, of_kind), (True, of_study)):
+        for size, found in ((1.01, ["axis_eccentricity_mm"]), (0.99, [])):
+            errors = np.full(12, 1e-6)
+            errors[0] = size * allowed
+            fit = fitted(errors, spread, tolerances)
+            assert [one.name for one in beyond_tolerances(fit, 1.0, of_study=asked)] == found
+            assert all(one.allowed == pytest.approx(allowed) for one in beyond_tolerances(fit, 1.0, of_study=asked))
+
+
+def test_the_warning_says_whose_tolerances():
+    errors = np.full(12, 1e-6)
+    errors[0] = 0.01
+    spread = np.full(12, 1e-9)
+    (said,) = base_notes(fitted(errors, spread, [("axis_eccentricity_mm", 0.005)]))
+    assert "outside the tolerances of its study (axis_eccentricity_mm 0.01 mm, tolerance 0.005)" in said
+    assert base_notes(fitted(errors, spread, [("axis_eccentricity_mm", 0.03)])) == ()
+    errors[0] = 0.02
+    (said,) = base_notes(fitted(errors, spread, [("wg_eccentricity_mm", 0.03)]))
+    assert "outside the tolerances of its kind (axis_eccentricity_mm 0.02 mm, tolerance 0.015)" in said
 
 
 def test_the_farthest_comes_first_and_a_gear_without_a_base_has_none():

@@ -123,8 +123,8 @@ def far_errors(fit: Fit) -> str:
 
 @dataclass(frozen=True)
 class BeyondTolerance:
-    """An error of the drive that is surely larger than the shipped study allows: its study key, its size and the lower
-    end of its 95 % interval, both in `unit`, and what is allowed."""
+    """An error of the drive that is surely larger than is allowed: its study key, its size and the lower end of its
+    95 % interval, both in `unit`, and what is `allowed`."""
 
     name: str
     size: float
@@ -141,18 +141,25 @@ class BeyondTolerance:
         return f"{self.name} {self.size:.2g} {self.unit}, tolerance {self.allowed:.2g}"
 
 
-def beyond_tolerances(fit: Fit, least: float) -> list[BeyondTolerance]:
-    """Errors of the drive in `fit` that are surely larger than `least` times what the shipped study allows, the
-    farthest first; of a gear without a base none. What a recording leaves open is not beyond anything."""
+def beyond_tolerances(fit: Fit, least: float, of_study: bool = False) -> list[BeyondTolerance]:
+    """Errors of the drive in `fit` that are surely larger than `least` times what is allowed, the farthest first; of a
+    gear without a base none. What a recording leaves open is not beyond anything.
+
+    Allowed is what the drive's study states where it is asked for (`of_study`) and states it, else what drives of its
+    kind have: as the shipped study, or more where the drive's own states more. A part may be worse than its drawing and
+    no sign of other physics.
+    """
     base, settings = fit.problem.base, fit.problem.settings.base
     if base is None:
         return []
     found = []
-    parameters = base_estimate(fit).parameters
+    parameters, stated = base_estimate(fit).parameters, dict(settings.stated_tolerances)
     for name, cartesian in SIZES.items():
         one = parameters[name]
         length = fit.problem.box[CARTESIAN_NAMES.index(cartesian)] / settings.box_over_tolerance
-        allowed = length if one.unit == "mm" else math.degrees(math.atan(length / base.half_width))
+        of_kind = length if one.unit == "mm" else math.degrees(math.atan(length / base.half_width))
+        own = stated.get(name, of_kind)
+        allowed = own if of_study else max(own, of_kind)
         surely = max(abs(one.value) - (one.high - one.value), 0.0)
         if surely > least * allowed:
             found.append(BeyondTolerance(name, abs(one.value), surely, float(allowed), one.unit))

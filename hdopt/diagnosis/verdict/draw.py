@@ -158,16 +158,18 @@ def _coefficients(evidence: Evidence, effect: str) -> list[Array]:
 
 
 def base_notes(model: Fit) -> tuple[str, ...]:
-    """A base of `model` outside the tolerances of its kind, or far outside."""
+    """A base of `model` outside the tolerances of its study, or of its kind, or far outside the latter."""
     if listed := far_errors(model):
         return (
             f"the fitted drive lies far outside the tolerances of its kind ({listed}): check drive, ratio and units",
         )
-    outside = beyond_tolerances(model, model.problem.settings.base.surely_outside)
+    settings = model.problem.settings.base
+    outside = beyond_tolerances(model, settings.surely_outside, of_study=True)
     if not outside:
         return ()
+    whose = "its study" if {one.name for one in outside} & dict(settings.stated_tolerances).keys() else "its kind"
     return (
-        f"the fitted drive lies outside the tolerances of its kind ({', '.join(map(str, outside))}): measure that "
+        f"the fitted drive lies outside the tolerances of {whose} ({', '.join(map(str, outside))}): measure that "
         "error itself; an input encoder off its centre can look the same, and turned against its shaft tells",
     )
 
