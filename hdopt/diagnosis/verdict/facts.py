@@ -11,7 +11,7 @@ import numpy as np
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding
 from hdopt.diagnosis.inference.base_fit import far_errors
-from hdopt.diagnosis.inference.catalogue import TOLD
+from hdopt.diagnosis.inference.catalogue import TOLD, VARYING_CONTACT
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.neighbour_noise import is_a_walk
 from hdopt.diagnosis.numerical import TINY
@@ -22,6 +22,7 @@ from hdopt.diagnosis.verdict.residual_structure import (
     beaten_by_generic,
     clearly_unexplained,
     effect_powers,
+    gained_without_physics,
     left_over_passes,
     momentary,
     outside_share,
@@ -32,6 +33,7 @@ from hdopt.diagnosis.verdict.residual_structure import (
 )
 from hdopt.diagnosis.verdict.rivals import (
     Sets,
+    ahead_without_physics,
     beside_told,
     confounded_pairs,
     hum_as_good,
@@ -47,27 +49,28 @@ from hdopt.diagnosis.verdict.rivals import (
 class Facts:
     """What a recording shows.
 
-    `explained`: the best set has effects; `false_alarm_p`: the chance that noise alone does as well; `log_evidence` of
-    the best set in the noise as it was measured; `own_gain`: the held-out power that the effects themselves predict,
-    over what is left, and `unseen_gain` what turns that no stage saw show of it; `high`: orders above the rows stand
-    out. `outside_share` and `high_outside_share`: share of what the best set, and the set of high orders, explain that
-    descriptions without physics carry. `momentary`: something happened at one moment only; `unsteady`: something
-    changes in time as no noise does; `generic_wins`: a basis without physics clearly predicts better, with a t of
-    `generic_t`; `beaten_by_generic`: such a basis alone, without the effects, predicts better than they do.
-    `turns_suffice`: turns can be held out; `too_little`: the record cannot say even that the base is
-    adequate. `rivals`: other sets that are as good, placebo and
-    perfect imitations among them; `scale_as_good`: so is a ratio or gain that is off, alone, and
-    `hum_as_good`: hum of the mains in an effect's place. `far_base`: the drive that is fitted beside what is said lies
-    far outside the tolerances of its kind; `together`: power of what the best set's effects do together, over the sum
-    of what each does. `heldout_over_floor`:
-    error on turns that were hidden from the fit (cross-validated where none could be spared) over what a generic basis
-    leaves; `found_again`: what is said is preferred without those turns too; `noise_over_neighbours`: cross-validated
-    error over the noise that neighbouring samples and the sensors' steps show; `walk`: what is left is as rough at
-    every scale as a walk, which noise may be; `left_over_passes`: what is left over what differs
-    from pass to pass of one angle; `left_over_floor`: cross-validated error over what a generic basis leaves, 1 where
-    what is between is less than sensors and model resolve; `other_law`: log evidence by which another law than an
-    effect's own explains better. `above_resolution`: some effect is larger than what sensors
-    and model resolve.
+    `explained`: the best set has effects; `false_alarm_p`: the chance that noise alone does as well; `log_evidence`
+    of the best set in the noise as it was measured; `own_gain`: the held-out power that the effects themselves
+    predict, over what is left, and `unseen_gain` what turns that no stage saw show of it; `high`: orders above the
+    rows stand out. `outside_share` and `high_outside_share`: share of what the best set, and the set of high orders,
+    explain that descriptions without physics carry, of its power or, in the best set, of what it gains. `momentary`:
+    something happened at one moment only; `unsteady`: something changes in time as no noise does; `generic_wins`: a
+    basis without physics clearly predicts better, with a t of `generic_t`; `beaten_by_generic`: such a basis alone,
+    without the effects, predicts better than they do. `turns_suffice`: turns can be held out; `too_little`: the
+    record cannot say even that the base is adequate. `rivals`: other sets that are as good, placebo and perfect
+    imitations among them; `scale_as_good`: so is a ratio or gain that is off, alone, and `hum_as_good`: hum of the
+    mains in an effect's place. `described_better`: log evidence by which a description without physics explains more
+    than the best set, if the shapes of that are exact. `contact`: the largest wave of a k_e that varies round the
+    turn, as the best set has it. `far_base`: the drive that is fitted beside what is said lies far outside the
+    tolerances of its kind; `together`: power of what the best set's effects do together, over the sum of what each
+    does. `heldout_over_floor`: error on turns that were hidden from the fit (cross-validated where none could be
+    spared) over what a generic basis leaves; `found_again`: what is said is preferred without those turns too;
+    `noise_over_neighbours`: cross-validated error over the noise that neighbouring samples and the sensors' steps
+    show; `walk`: what is left is as rough at every scale as a walk, which noise may be; `left_over_passes`: what is
+    left over what differs from pass to pass of one angle; `left_over_floor`: cross-validated error over what a
+    generic basis leaves, 1 where what is between is less than sensors and model resolve; `other_law`: log evidence by
+    which another law than an effect's own explains better. `above_resolution`: some effect is larger than what
+    sensors and model resolve.
     """
 
     settings: VerdictSettings
@@ -86,6 +89,8 @@ class Facts:
     rivals: Sets
     scale_as_good: bool = False
     hum_as_good: bool = False
+    described_better: float = 0.0
+    contact: float = 0.0
     far_base: bool = False
     together: float = 1.0
     log_evidence: float = 0.0
@@ -186,7 +191,7 @@ def find(evidence: Evidence) -> Findings:
         false_alarm_p=evidence.false_alarm_p,
         own_gain=own_gain(evidence),
         high=high is not None,
-        outside_share=outside_share(best),
+        outside_share=max(outside_share(best), gained_without_physics(best)),
         high_outside_share=0.0 if high is None else outside_share(high),
         momentary=momentary(evidence),
         unsteady=unsteady(evidence) is not None,
@@ -196,6 +201,8 @@ def find(evidence: Evidence) -> Findings:
         rivals=(),
         scale_as_good=scale_is_as_good(evidence),
         hum_as_good=hum is not None,
+        described_better=ahead_without_physics(evidence),
+        contact=varying_contact(best.fit),
         far_base=far_errors(best.fit) != "",
         together=power_together(best),
         log_evidence=best.log_bayes_factor,
@@ -223,6 +230,12 @@ def find(evidence: Evidence) -> Findings:
     as_good = tuple(dict.fromkeys(as_good))[: settings.most_rivals]
     again = found_again(evidence, effects)
     return Findings(evidence, replace(facts, rivals=as_good, found_again=again), high, pairs, effects, more, hum)
+
+
+def varying_contact(fit: Fit) -> float:
+    """The largest wave round the turn of a k_e that varies in `fit`, as a share of k_e; 0 where none does."""
+    found = (c for term, c in zip(fit.terms, fit.coefficients, strict=True) if term.effect == VARYING_CONTACT)
+    return max((float(np.hypot(*c.reshape(-1, 2).T).max()) for c in found), default=0.0)
 
 
 def unseen_rms(evidence: Evidence) -> float:

@@ -10,7 +10,7 @@ from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.turn_by_turn import from_turn_to_turn
 from hdopt.diagnosis.inference.catalogue import TOLD, is_outside, properties_of
 from hdopt.diagnosis.inference.cross_validation import paired_chance
-from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
 from hdopt.diagnosis.inference.nonphysical_alternatives import Mains
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.search.candidates import Candidate
@@ -174,6 +174,21 @@ def outside_share(candidate: Candidate) -> float:
     power = term_powers(fit)
     outside = sum(p for p, term in zip(power, fit.terms, strict=True) if is_outside(term.effect))
     return outside / max(sum(power), TINY)
+
+
+def gained_without_physics(candidate: Candidate) -> float:
+    """Share of what the set `candidate` gains that is lost without its descriptions, the rest fitted again: effects
+    that are large beside each other and nearly cancel carry all the power, and a small step all that makes them fit.
+    """
+    fit = candidate.fit
+    keep = [i for i, term in enumerate(fit.terms) if not is_outside(term.effect)]
+    if len(keep) == len(fit.terms):
+        return 0.0
+    terms, parts = [fit.terms[i] for i in keep], [fit.coefficients[i] for i in keep]
+    fewer = evaluate(fit.problem, fit.errors, fit.offsets, terms, parts)
+    fewer = refine(fewer, fit.problem.settings.fit.again_iterations)
+    lost = (fewer.objective - fit.objective) / fit.problem.noise.sigma**2
+    return lost / max(candidate.gain, TINY)
 
 
 def clearly_unexplained(evidence: Evidence) -> bool:

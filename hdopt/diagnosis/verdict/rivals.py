@@ -14,6 +14,7 @@ from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.nonphysical_alternatives import Mains
 from hdopt.diagnosis.search.candidates import Candidate, paid_for_freedom, penalty_scale
 from hdopt.diagnosis.search.high_order import ripple_orders
+from hdopt.diagnosis.search.penalty import leaves_nothing
 from hdopt.diagnosis.settings import VerdictSettings
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.diagnosis.verdict.residual_structure import effect_powers
@@ -94,6 +95,19 @@ def beside_told(evidence: Evidence) -> tuple[Candidate | None, float]:
     best = max(more, key=evidence_of, default=told)
     apart = evidence_of(best) - evidence_of(told)
     return (best, apart) if apart > 0 else (None, 0.0)
+
+
+def ahead_without_physics(evidence: Evidence) -> float:
+    """By how much log evidence a description without physics explains more than the best set of the `evidence`, each
+    paying for its freedom and its search alone; 0 where none does, and where a term of the set may leave something by
+    its slightly wrong shape: of what is known to the last digit nothing is left that a description could take up.
+    """
+    best, *others = evidence.selection.candidates
+    if not all(leaves_nothing(term) for term in best.fit.terms):
+        return 0.0
+    scale = penalty_scale(evidence.selection.base.problem, evidence.inflation)
+    plain = (one for one in others if one.outside and not any(map(is_effect, one.effects)))
+    return max((paid_for_freedom(one, scale) - paid_for_freedom(best, scale) for one in plain), default=0.0)
 
 
 def placebo_as_good(evidence: Evidence, pairs: Sequence[Confounding]) -> Sets:

@@ -175,6 +175,20 @@ def drive_is_far(facts: Facts) -> bool:
     return facts.named and facts.far_base
 
 
+def contact_varies_too_much(facts: Facts) -> bool:
+    """The drive's own error would have to grow and shrink round the turn by more than a contact makes it. `facts` are
+    those of the recording.
+    """
+    return facts.turns_suffice and facts.significant and facts.contact > facts.settings.contact_as_built
+
+
+def is_described_better(facts: Facts) -> bool:
+    """Effects of exact shape are named, and a description without physics explains more. `facts` are those of the
+    recording.
+    """
+    return facts.named and facts.described_better > facts.settings.tie
+
+
 def others_are_as_good(facts: Facts) -> bool:
     """Effects are named, and another set explains as well. `facts` are those of the recording."""
     return facts.said and bool(facts.rivals)
@@ -317,6 +331,29 @@ def beside_a_far_drive(findings: Findings) -> Conclusion:
     return no_more_than_like(best, sum(effect_powers(best)), but, test, findings.evidence)
 
 
+def no_contact(findings: Findings) -> Conclusion:
+    """Something is there that follows the drive's own error, and no contact does so. `findings` hold the facts and the
+    evidence behind them.
+    """
+    best = findings.evidence.selection.best
+    but = (
+        f"; but the drive's own error would grow and shrink by {100 * findings.facts.contact:.2g} % round the turn, "
+        "more than teeth in contact make it"
+    )
+    test = "record again at another load: teeth in contact follow it, an encoder or a calculation does not"
+    gain = max(findings.evidence.base_held_out.variance - findings.evidence.extended_held_out.variance, 0.0)
+    return no_more_than_like(best, gain, but, test, findings.evidence)
+
+
+def described(findings: Findings) -> Conclusion:
+    """Something is there, and what it resembles has a shape that is known better than it fits. `findings` hold the
+    facts and the evidence behind them.
+    """
+    best = findings.evidence.selection.best
+    but = "; but a description without physics explains it clearly better, and the shape of what it resembles is exact"
+    return no_more_than_like(best, sum(effect_powers(best)), but, MORE_TURNS, findings.evidence)
+
+
 def no_more_than_like(candidate: Candidate, power: float, but: str, test: str, evidence: Evidence) -> Conclusion:
     """Something of a `power` (arcmin^2) is in the `evidence` that most resembles the effects of `candidate`, and why
     that is no name (`but`, a part of the sentence); the `test` would tell what it is.
@@ -456,6 +493,8 @@ RULES = (
     Rule("hum explains as well", hum_explains_as_well, may_be_hum),
     Rule("effects cancel", effects_cancel, balanced),
     Rule("drive is far", drive_is_far, beside_a_far_drive),
+    Rule("contact varies too much", contact_varies_too_much, no_contact),
+    Rule("described better", is_described_better, described),
     Rule("others are as good", others_are_as_good, ambiguous),
     Rule("named", lambda facts: facts.said, named),
     Rule("more than is told", more_than_is_told, more),
