@@ -179,12 +179,15 @@ def oriented(state: State, undecided: Callable[[State, State], State]) -> State:
 
 def preferences_beside(alone: Sequence[float], state: State, turned: Fit, rng: np.random.Generator) -> list[float]:
     """The preferences of the base of `state`, `alone` and beside smooth columns, of which `turned` is the fit turned
-    round; that beside waves of the teeth in place of both where there are such, by which bases that do without are
-    bent. `rng` draws new drives.
+    round. Where there are waves of the teeth, by which bases that do without are bent, that beside waves in place of
+    both; beside `alone`, where waves leave much more than noise too: it is not for what they hold that one way wins.
+    `rng` draws new drives.
     """
     if state.clean is None or state.wavy is None:
         return [*alone, *([] if state.clean is None else [preference(beside_smooth(state.clean), turned)])]
-    return [preference(state.wavy, beside_waves(turned, rng) or turned)]
+    other = beside_waves(turned, rng) or turned
+    better = min(state.wavy, other, key=lambda fit: fit.objective)
+    return [*(alone if is_left_wavy(better) else ()), preference(state.wavy, other)]
 
 
 def begin_turned(state: State) -> State:

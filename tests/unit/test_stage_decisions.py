@@ -112,10 +112,25 @@ def test_beside_waves_of_the_teeth_the_bent_bases_are_not_asked(monkeypatch):
     too, the way of the turned base without its waves.
     """
     state = state_of(Told("bent"), clean=Told("clean"), wavy=Told("wavy", 2.0))
+    monkeypatch.setattr(stages, "is_left_wavy", lambda fit: False)
     monkeypatch.setattr(stages, "beside_waves", lambda fit, rng: Told("turned, wavy", 6.0))
     assert stages.preferences_beside([-5.0], state, Told("turned", 40.0), None) == [pytest.approx(np.log(3.0))]
     monkeypatch.setattr(stages, "beside_waves", lambda fit, rng: None)
     assert stages.preferences_beside([-5.0], state, Told("turned", 40.0), None) == [pytest.approx(np.log(20.0))]
+
+
+@pytest.mark.parametrize(("counted", "turned"), [(2.0, 6.0), (6.0, 2.0)])
+def test_waves_that_leave_much_do_not_decide_alone(monkeypatch, counted, turned):
+    """The better of both ways leaves more than noise: the base alone must agree. Faults caught: a code wheel's lines at
+    the fifth wave, of which waves of the teeth left sixty times the noise, turned a recording round; the worse way, or
+    always the one as counted, asked for what it leaves."""
+    state = state_of(Told("bent"), clean=Told("clean"), wavy=Told("as counted", counted))
+    monkeypatch.setattr(stages, "beside_waves", lambda fit, rng: Told("turned", turned))
+    preferred = pytest.approx(np.log(turned / counted))
+    monkeypatch.setattr(stages, "is_left_wavy", lambda fit: fit.objective > 1.0)
+    assert stages.preferences_beside([-5.0], state, Told("", 40.0), None) == [-5.0, preferred]
+    monkeypatch.setattr(stages, "is_left_wavy", lambda fit: fit.objective > 4.0)
+    assert stages.preferences_beside([-5.0], state, Told("", 40.0), None) == [preferred]
 
 
 def test_what_is_left_counts_in_noise_variances_half(monkeypatch):
