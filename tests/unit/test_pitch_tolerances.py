@@ -1,6 +1,8 @@
 """Teeth drawn from tolerances of pitch: the class's numbers, the field's known answers, and what a study says of it."""
 
+import cmath
 import math
+import struct
 from dataclasses import replace
 
 import numpy as np
@@ -266,6 +268,32 @@ def test_the_splines_of_the_calibration_are_not_those_that_are_judged():
     judged, calibrated = _normal_pairs(u, 2), _normal_pairs(u, 2, CALIBRATION_SEED)
     together = np.corrcoef(judged.view(float).T, calibrated.view(float).T)[:4, 4:]
     assert np.abs(together).max() < 4.5 / np.sqrt(4000)  # 16 coefficients: 1e-4 of chance
+
+
+def splitmix64(state: int) -> int:
+    """The output of SplitMix64 at a `state` that was advanced already (Steele, Lea, Flood 2014, Figure 17)."""
+    word = state % 2**64
+    word = (word ^ (word >> 30)) * 0xBF58476D1CE4E5B9 % 2**64
+    word = (word ^ (word >> 27)) * 0x94D049BB133111EB % 2**64
+    return word ^ (word >> 31)
+
+
+def test_teeth_come_from_the_published_generator():
+    """First against outputs of SplitMix64 that were published (seed 1234567, Rosetta Code), then the words that one
+    number of a sample gives, and their pair by Box and Muller. Faults caught: a stream that begins at its second word,
+    words or bits left out."""
+    golden = 0x9E3779B97F4A7C15
+    published = [6457827717110365317, 3203168211198807973, 9817491932198370423, 4593380528125082431]
+    assert [splitmix64(1234567 + k * golden) for k in range(1, 5)] == published
+    u, stream, pairs = 0.3, 4, 2
+    (bits,) = struct.unpack("<Q", struct.pack("<d", u))
+    seed = splitmix64(bits + (stream + 1) * golden)
+    uniform = [((splitmix64(seed + k * golden) >> 11) + 0.5) / 2**53 for k in range(1, 2 * pairs + 1)]
+    expected = [
+        math.sqrt(-2 * math.log(one)) * cmath.exp(2j * math.pi * other)
+        for one, other in zip(uniform[:pairs], uniform[pairs:], strict=True)
+    ]
+    np.testing.assert_allclose(_normal_pairs(np.array([u]), pairs, stream)[0], expected, rtol=1e-12)
 
 
 def test_an_explorer_says_whose_teeth_are_drawn():

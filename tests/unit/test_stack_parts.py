@@ -215,6 +215,14 @@ def test_a_screening_samples_what_is_correlated():
 
 
 @pytest.mark.parametrize("method", METHODS)
+def test_a_method_takes_enough_points_as_a_rule(method):
+    """A power of two, as scrambled sequences want, twice what is refused as too small, or more. Fault caught: a rule of
+    two points, written 2 % 12."""
+    n = METHODS[method].n
+    assert n >= 256 and n & (n - 1) == 0
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_a_screening_of_too_few_points_is_refused(method):
     """128 are enough for any; the message says so, and how many the method takes as a rule."""
     uniform = Uniform(lower=0.0, upper=1.0)

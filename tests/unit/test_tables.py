@@ -6,6 +6,7 @@ import csv
 import io
 import math
 from importlib import import_module
+from types import SimpleNamespace
 
 import openpyxl
 import pandas as pd
@@ -18,6 +19,7 @@ from hdopt.cli import main
 from hdopt.cli.app import COMMANDS
 from hdopt.errors import HdoptError
 from hdopt.files import SPREADSHEET_FORMULA, to_csv, to_xlsx
+from hdopt.tolerance.results import SobolResult
 
 WILD = ["=SUM(A1:A9)", "+1+cmd|' /C calc'!A0", "-2+3", "@SUM(1)", '=HYPERLINK("x")']
 """Names that a spreadsheet would run, which a study or a file may give."""
@@ -219,6 +221,26 @@ def test_the_cloud_of_the_explorer_is_in_study_units(tmp_path):
             row["peak_to_peak_arcmin"],
             abs=1e-6,  # the kernel's own promise
         )
+
+
+@pytest.mark.parametrize(
+    ("sobol", "shapley", "names"),
+    [
+        (True, False, ["indices", "pairs"]),
+        (False, True, ["Shapley effects"]),
+        (True, True, ["indices", "pairs", "Shapley effects"]),
+    ],
+)
+def test_the_tables_of_sensitivities_are_those_that_were_asked_for(sobol, shapley, names):
+    """Fault caught: Shapley effects written where there are none, or left out where there are."""
+    frame = pd.DataFrame({"value": [0.5]}, index=pd.Index(["tilt"], name="input"))
+    pair = SimpleNamespace(value=0.1, low=0.0, high=0.2)
+    indices = SimpleNamespace(to_frame=lambda: frame, second={("tilt", "phase"): pair}) if sobol else None
+    effects = SimpleNamespace(to_frame=lambda: frame) if shapley else None
+    tables = SobolResult.tables(SimpleNamespace(sobol=indices, shapley=effects))
+    assert list(tables) == names
+    if sobol:
+        assert tables["pairs"].iloc[0].tolist() == ["tilt", "phase", 0.1, 0.0, 0.2]
 
 
 def test_the_tables_of_a_run_are_those_of_its_page(tmp_path):
