@@ -15,7 +15,7 @@ from hdopt.recordings import figures
 from hdopt.recordings.bench import load_bench
 from hdopt.recordings.capability import gauge, outliers, performance
 from hdopt.recordings.channels import mapped_channels, sensor_uncertainty_arcmin
-from hdopt.recordings.clocks import on_one_clock, seconds_of
+from hdopt.recordings.clocks import _bend, on_one_clock, seconds_of
 from hdopt.recordings.columns import Column, choose_columns, parse_columns
 from hdopt.recordings.decision import decide, parse_limits
 from hdopt.recordings.formats import ending
@@ -24,8 +24,8 @@ from hdopt.recordings.formats.text import find_layout
 from hdopt.recordings.orders import model_orders, order_spectrum
 from hdopt.recordings.passes import find_passes, synchronous_average
 from hdopt.recordings.ratio import measured_scale
-from hdopt.recordings.read import recording_from_table
-from hdopt.recordings.recording import Recording
+from hdopt.recordings.read import LARGEST_RATIO, _check_ratio, recording_from_table
+from hdopt.recordings.recording import Recording, turns_with_ends
 from hdopt.recordings.repairs import Checks, drop_incomplete_rows, drop_outliers, find_gaps, unwrap_counter
 from hdopt.recordings.rows import gather, quiet
 from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
@@ -574,3 +574,30 @@ def test_an_encoders_step_and_uncertainty_are_each_its_own(tmp_path):
     path.write_text('[columns.input]\ncolumn = "a"\nunit = "deg"\nstep_deg = 0.01\nuncertainty_arcsec = 7.0\n')
     column = load_bench(path).columns["input"]
     assert (column.step_deg, column.uncertainty_arcsec) == (0.01, 7.0)
+
+
+@pytest.mark.parametrize(("role", "values", "said"), [("input", 5, "3.4"), ("output", 7, "3.4"), ("torque", 7, "")])
+def test_a_straight_line_between_samples_misses_an_eighth_of_the_second_difference(role, values, said):
+    """A second difference of 0.008 rad: a thousandth of a radian is 3.438 arcmin. Fault caught: a ninth of it."""
+    angles = 0.5 * 0.008 * np.arange(values) ** 2
+    words = _bend(role, angles)
+    assert words == (f", missing about {said} arcmin at its shaft" if said else "")
+    assert _bend(role, angles[:4]) == ""
+
+
+def test_lines_above_a_table_may_be_more_than_its_rows():
+    """The width of a table is that of most lines of its second half. Fault caught: of nearly all lines."""
+    above = [f"{k};{k}" for k in range(230)]
+    rows = [f"{k};{2 * k};{3 * k}" for k in range(220)]
+    layout = find_layout([*above, *rows], "utf-8", "file")
+    assert (layout.first_row, len(layout.header)) == (230, 3)
+
+
+def test_the_largest_ratio_is_a_ratio():
+    _check_ratio(LARGEST_RATIO)
+    with pytest.raises(HdoptError, match="at most 100000"):
+        _check_ratio(np.nextafter(LARGEST_RATIO, np.inf))
+
+
+def test_turns_reach_as_far_beyond_either_end_as_neighbours_are_apart():
+    assert turns_with_ends(0.96, 0.02) == pytest.approx(1.0)
