@@ -16,8 +16,6 @@ SMALL_RIDGE = 1e-8
 """The same where the columns are fewer and scaled alike."""
 RANK = 1e-7
 """Singular values below this share of the largest are rounding."""
-CHOLESKY_RANK = 1e-5
-"""Factors' diagonal below this share of the largest: squaring costs the columns more than half of their digits."""
 SPAN_RANK = 1e-6
 """The same for what a projection left."""
 LEAST_SQUARES_RANK = 1e-8

@@ -13,7 +13,7 @@ from scipy.linalg.blas import dtrsm
 from scipy.linalg.lapack import dposv
 
 from hdopt.arrays import Array, Index
-from hdopt.diagnosis.numerical import CHOLESKY_RANK, RANK, SMALL_RIDGE
+from hdopt.diagnosis.numerical import RANK, SMALL_RIDGE
 
 
 def solved(matrix: Array, moment: Array) -> Array:
@@ -40,7 +40,8 @@ def orthonormal(columns: Array) -> Array:
             factor = np.linalg.cholesky(basis.T @ basis)
         except np.linalg.LinAlgError:
             return _independent(columns)
-        if np.min(np.diag(factor)) < CHOLESKY_RANK * np.max(np.diag(factor)):
+        power = np.diag(factor) ** 2
+        if power.min() < RANK * power.max():
             return _independent(columns)
         basis = dtrsm(1.0, factor, np.asfortranarray(basis), side=1, lower=1, trans_a=1)
     return np.asarray(basis, np.float64)
