@@ -699,9 +699,10 @@ def test_parts_that_do_not_show_may_cost_a_little_of_the_gain(monkeypatch, lost,
 
 
 def test_a_base_beside_the_leader_is_the_one_to_beat_where_it_is_better(monkeypatch):
-    monkeypatch.setattr(subset_search, "evaluate", lambda problem, errors, offsets, terms, parts: "bare")
+    monkeypatch.setattr(weighing, "evaluate", lambda problem, errors, offsets, terms, parts: (terms, parts))
     for alone, expected in ((0.5, 0.5), (2.0, 1.0)):
-        monkeypatch.setattr(subset_search, "refine", lambda fit, iterations, alone=alone: Told(0.0, objective=alone))
+        left = {((), ()): Told(0.0, objective=alone)}
+        monkeypatch.setattr(weighing, "refine", lambda fit, iterations, left=left: left[tuple(map(tuple, fit))])
         assert subset_search.base_beside_leader(state_of(of(9.0, "a"))).base.objective == expected
 
 

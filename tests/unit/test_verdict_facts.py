@@ -17,10 +17,11 @@ from hdopt.diagnosis.checks.repeated_passes import NOTHING_REPEATED, RepeatedPas
 from hdopt.diagnosis.inference.catalogue import SCALE, SKEW, VARYING_CONTACT
 from hdopt.diagnosis.inference.cross_validation import HeldOut
 from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut
+from hdopt.diagnosis.search import candidates
 from hdopt.diagnosis.search.penalty import Scale, penalty
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.verdict import facts as facts_module
-from hdopt.diagnosis.verdict import residual_structure, rules
+from hdopt.diagnosis.verdict import rules
 from hdopt.diagnosis.verdict.facts import (
     find,
     found_again,
@@ -376,12 +377,12 @@ def test_a_description_that_explains_more_than_exact_shapes_is_seen():
     assert ahead_without_physics(mixed) == 0.0
 
 
-def test_the_largest_wave_of_a_varying_contact_is_told():
+def test_the_waves_of_a_varying_contact_are_told():
     """0.3 and 0.4 are 0.5. Faults caught: sine and cosine of different waves together, another term's numbers."""
     terms = tuple(Term(name, {}) for name in (VARYING_CONTACT, "hysteresis"))
     fit = SimpleNamespace(terms=terms, coefficients=(np.array([0.1, 0.2, -0.3, 0.4]), np.array([7.0, 7.0])))
-    assert varying_contact(fit) == pytest.approx(0.5)
-    assert varying_contact(SimpleNamespace(terms=terms[1:], coefficients=fit.coefficients[1:])) == 0.0
+    assert varying_contact(fit) == pytest.approx([0.05**0.5, 0.5])
+    assert varying_contact(SimpleNamespace(terms=terms[1:], coefficients=fit.coefficients[1:])) == []
 
 
 def test_what_is_described_better_or_follows_no_contact_is_likened(monkeypatch):
@@ -481,8 +482,8 @@ def test_what_is_gained_by_descriptions_alone_is_known_by_leaving_them_out(monke
         asked.append(([term.effect for term in terms], coefficients, errors, offsets))
         return SimpleNamespace(objective=40.0)
 
-    monkeypatch.setattr(residual_structure, "evaluate", evaluate)
-    monkeypatch.setattr(residual_structure, "refine", lambda fit, iterations: SimpleNamespace(objective=16.0))
+    monkeypatch.setattr(candidates, "evaluate", evaluate)
+    monkeypatch.setattr(candidates, "refine", lambda fit, iterations: SimpleNamespace(objective=16.0))
     found = candidate({"hysteresis": 3.0, "_jump": 1.0})
     found.gain = 5.0
     problem = SimpleNamespace(settings=DEFAULT, noise=SimpleNamespace(sigma=2**0.5))
@@ -569,7 +570,7 @@ def test_facts_are_drawn_from_what_measures_them(monkeypatch):
     no |= dict.fromkeys(("own_gain", "power_together", "unseen_gain", "unseen_rms", "left_over_passes"), 0.0)
     no |= {"unsteady": None, "far_errors": "", "left_over_floor": 0.0, "beside_told": (None, 0.0), "hum_as_good": None}
     no |= {"as_right_as_such_names": (), "effects_said": (), "shared_with_imitators": ()}
-    measured = {"varying_contact": 0.4, "ahead_without_physics": 7.0}
+    measured = {"varying_contact": [0.1, 0.4, 0.2], "ahead_without_physics": 7.0}
     for name, value in {**no, **measured}.items():
         monkeypatch.setattr(facts_module, name, lambda *about, value=value, **more: value)
     found = evidence(candidate({"hysteresis": 1.0}), noise_floor=1.0, remainder=SimpleNamespace(t=0.0))

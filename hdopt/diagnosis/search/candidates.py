@@ -188,10 +188,11 @@ def weigh(fit: Fit, base: Fit, scale: Scale, top_gain: float | None = None, far_
 
 def without_each(fit: Fit) -> list[Fit]:
     """`fit` without each of its terms in turn, the others refitted from where they stand."""
-    fits = []
-    for left_out in range(len(fit.terms)):
-        keep = fit.all_but(left_out)
-        terms, parts = [fit.terms[i] for i in keep], [fit.coefficients[i] for i in keep]
-        again = evaluate(fit.problem, fit.errors, fit.offsets, terms, parts)
-        fits.append(refine(again, fit.problem.settings.fit.again_iterations))
-    return fits
+    return [with_only(fit, fit.all_but(left_out)) for left_out in range(len(fit.terms))]
+
+
+def with_only(fit: Fit, keep: Sequence[int]) -> Fit:
+    """`fit` with the terms numbered in `keep` alone, refitted from where they stand."""
+    terms, parts = [fit.terms[i] for i in keep], [fit.coefficients[i] for i in keep]
+    fewer = evaluate(fit.problem, fit.errors, fit.offsets, terms, parts)
+    return refine(fewer, fit.problem.settings.fit.again_iterations)

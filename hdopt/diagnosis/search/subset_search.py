@@ -18,7 +18,7 @@ import numpy as np
 from hdopt.diagnosis.inference.base_fit import is_far
 from hdopt.diagnosis.inference.catalogue import is_outside
 from hdopt.diagnosis.inference.clean_base import drive_alone
-from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
+from hdopt.diagnosis.inference.fit import Fit, refine
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import (
     Candidate,
@@ -26,6 +26,7 @@ from hdopt.diagnosis.search.candidates import (
     in_order,
     joint_fit,
     search_terms,
+    with_only,
     without_each,
 )
 from hdopt.diagnosis.search.completion import completed
@@ -335,9 +336,7 @@ def base_beside_leader(state: SearchState) -> SearchState:
     leader = state.leader
     if leader is None:
         return state
-    fit = leader.fit
-    bare = evaluate(fit.problem, fit.errors, fit.offsets, (), ())
-    alone = refine(bare, fit.problem.settings.fit.again_iterations)
+    alone = with_only(leader.fit, ())
     return replace(state, base=min(state.base, alone, key=lambda one: one.objective))
 
 

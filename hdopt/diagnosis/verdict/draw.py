@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,13 +10,13 @@ from hdopt.arrays import Array
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.localization import locate
 from hdopt.diagnosis.inference.base_fit import base_estimate, beat_warning, beyond_tolerances, far_errors
-from hdopt.diagnosis.inference.catalogue import NEW_ZERO, SKEW, VARYING_CONTACT, is_effect
+from hdopt.diagnosis.inference.catalogue import NEW_ZERO, SKEW, is_effect
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.nuisance import estimated, notes
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.orientation import Orientation
 from hdopt.diagnosis.verdict.diagnosis import Diagnosis, FitNumbers
-from hdopt.diagnosis.verdict.facts import find
+from hdopt.diagnosis.verdict.facts import find, varying_contact
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
 from hdopt.diagnosis.verdict.rules import rule_for
 from hdopt.effects import EFFECTS
@@ -144,10 +143,12 @@ def zero_notes(evidence: Evidence) -> tuple[str, ...]:
 
 def contact_notes(evidence: Evidence) -> tuple[str, ...]:
     """What the `evidence` says of a k_e that varies round the input's turn."""
-    return tuple(
-        "the drive's own error grows and shrinks with the input angle, as where k_e varies round its turn: "
-        + ", ".join(f"{100 * math.hypot(*wave):.2g} % at {k} a turn" for k, wave in enumerate(share.reshape(-1, 2), 1))
-        for share in _coefficients(evidence, VARYING_CONTACT)
+    waves = varying_contact(evidence.selection.best.fit)
+    if not waves:
+        return ()
+    said = ", ".join(f"{100 * share:.2g} % at {k} a turn" for k, share in enumerate(waves, 1))
+    return (
+        f"the drive's own error grows and shrinks with the input angle, as where k_e varies round its turn: {said}",
     )
 
 

@@ -22,6 +22,7 @@ from hdopt.diagnosis.verdict.residual_structure import (
     beaten_by_generic,
     clearly_unexplained,
     effect_powers,
+    explained_power,
     gained_without_physics,
     left_over_passes,
     momentary,
@@ -202,7 +203,7 @@ def find(evidence: Evidence) -> Findings:
         scale_as_good=scale_is_as_good(evidence),
         hum_as_good=hum is not None,
         described_better=ahead_without_physics(evidence),
-        contact=varying_contact(best.fit),
+        contact=max(varying_contact(best.fit), default=0.0),
         far_base=far_errors(best.fit) != "",
         together=power_together(best),
         log_evidence=best.log_bayes_factor,
@@ -232,10 +233,13 @@ def find(evidence: Evidence) -> Findings:
     return Findings(evidence, replace(facts, rivals=as_good, found_again=again), high, pairs, effects, more, hum)
 
 
-def varying_contact(fit: Fit) -> float:
-    """The largest wave round the turn of a k_e that varies in `fit`, as a share of k_e; 0 where none does."""
-    found = (c for term, c in zip(fit.terms, fit.coefficients, strict=True) if term.effect == VARYING_CONTACT)
-    return max((float(np.hypot(*c.reshape(-1, 2).T).max()) for c in found), default=0.0)
+def varying_contact(fit: Fit) -> list[float]:
+    """The waves round the turn, from the first on, of a k_e that varies in `fit`, as shares of k_e; [] where none
+    does."""
+    for term, c in zip(fit.terms, fit.coefficients, strict=True):
+        if term.effect == VARYING_CONTACT:
+            return [math.hypot(*wave) for wave in c.reshape(-1, 2)]
+    return []
 
 
 def unseen_rms(evidence: Evidence) -> float:
@@ -292,7 +296,7 @@ def stands_out(high: Candidate, evidence: Evidence) -> bool:
     """
     settings = evidence.settings.verdict
     power = sum(term_powers(high.fit))
-    explained = max(evidence.base_held_out.variance - evidence.extended_held_out.variance, 0.0)
+    explained = explained_power(evidence)
     enough = power > settings.smallest_share * float(np.var(high.fit.residual))
     return enough and power > settings.high_share * explained
 

@@ -10,10 +10,10 @@ from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.turn_by_turn import from_turn_to_turn
 from hdopt.diagnosis.inference.catalogue import TOLD, is_outside, properties_of
 from hdopt.diagnosis.inference.cross_validation import paired_chance
-from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
+from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.nonphysical_alternatives import Mains
 from hdopt.diagnosis.numerical import TINY
-from hdopt.diagnosis.search.candidates import Candidate
+from hdopt.diagnosis.search.candidates import Candidate, with_only
 from hdopt.diagnosis.verdict.named_effect import main_orders, share_of
 from hdopt.diagnosis.verdict.where import Where
 from hdopt.effects.tooth_mesh import ToothMesh
@@ -45,6 +45,11 @@ def power_together(candidate: Candidate) -> float:
     parts = [fit.contribution(i) for i, name in enumerate(candidate.effects) if name not in TOLD]
     apart = sum(float(np.var(part)) for part in parts)
     return float(np.var(sum(parts))) / apart if apart > 0 else 1.0
+
+
+def explained_power(evidence: Evidence) -> float:
+    """Power (arcmin^2) of held-out turns that the best set of the `evidence` predicts beyond the base, not below 0."""
+    return max(evidence.base_held_out.variance - evidence.extended_held_out.variance, 0.0)
 
 
 def momentary(evidence: Evidence) -> bool:
@@ -117,7 +122,7 @@ def unsteady(evidence: Evidence) -> Where | None:
     if (gone := comes_and_goes(evidence)) is not None:
         return gone
     settings = evidence.settings.verdict
-    least = settings.remainder_share * max(evidence.base_held_out.variance - evidence.extended_held_out.variance, 0.0)
+    least = settings.remainder_share * explained_power(evidence)
     floor = max(settings.smallest_share * evidence.extended_held_out.variance, resolution(evidence) ** 2)
     wave, steps = evidence.wave, evidence.steps
     rms = max(wave.rms if wave is not None else 0.0, steps.rms)
@@ -139,8 +144,7 @@ def left_over_passes(evidence: Evidence) -> float:
     passes, settings = evidence.passes, evidence.settings.verdict
     if passes.t <= settings.remainder_t:
         return 1.0
-    explained = max(evidence.base_held_out.variance - evidence.extended_held_out.variance, 0.0)
-    if passes.repeated**2 <= max(settings.remainder_share * explained, resolution(evidence) ** 2):
+    if passes.repeated**2 <= max(settings.remainder_share * explained_power(evidence), resolution(evidence) ** 2):
         return 1.0
     return passes.left / max(passes.scatter, evidence.sensor_arcmin, TINY)
 
@@ -184,10 +188,7 @@ def gained_without_physics(candidate: Candidate) -> float:
     keep = [i for i, term in enumerate(fit.terms) if not is_outside(term.effect)]
     if len(keep) == len(fit.terms):
         return 0.0
-    terms, parts = [fit.terms[i] for i in keep], [fit.coefficients[i] for i in keep]
-    fewer = evaluate(fit.problem, fit.errors, fit.offsets, terms, parts)
-    fewer = refine(fewer, fit.problem.settings.fit.again_iterations)
-    lost = (fewer.objective - fit.objective) / fit.problem.noise.sigma**2
+    lost = (with_only(fit, keep).objective - fit.objective) / fit.problem.noise.sigma**2
     return lost / max(candidate.gain, TINY)
 
 

@@ -17,6 +17,7 @@ from hdopt.diagnosis.verdict.facts import Facts, Findings, sparse, unseen_rms
 from hdopt.diagnosis.verdict.named_effect import NamedEffect, main_orders
 from hdopt.diagnosis.verdict.residual_structure import (
     effect_powers,
+    explained_power,
     in_what_way,
     locate_remainder,
     locate_repeated,
@@ -303,9 +304,8 @@ def unconfirmed(findings: Findings) -> Conclusion:
     behind them.
     """
     evidence = findings.evidence
-    gain = evidence.base_held_out.variance - evidence.extended_held_out.variance
     but = "; but turns that no stage saw do not bear that out"
-    return no_more_than_like(evidence.selection.best, max(gain, 0.0), but, MORE_TURNS, evidence)
+    return no_more_than_like(evidence.selection.best, explained_power(evidence), but, MORE_TURNS, evidence)
 
 
 def balanced(findings: Findings) -> Conclusion:
@@ -341,8 +341,7 @@ def no_contact(findings: Findings) -> Conclusion:
         "more than teeth in contact make it"
     )
     test = "record again at another load: teeth in contact follow it, an encoder or a calculation does not"
-    gain = max(findings.evidence.base_held_out.variance - findings.evidence.extended_held_out.variance, 0.0)
-    return no_more_than_like(best, gain, but, test, findings.evidence)
+    return no_more_than_like(best, explained_power(findings.evidence), but, test, findings.evidence)
 
 
 def described(findings: Findings) -> Conclusion:
