@@ -54,6 +54,7 @@ def turn_round(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
             input_angle=-one.input_angle,
             error_arcmin=-one.error_arcmin,
             torque=None if one.torque is None else -one.torque,
+            scatter_arcmin=None if one.scatter_arcmin is None else -one.scatter_arcmin,
         )
         for one in recordings
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hdopt.arrays import Array, Index
+from hdopt.drive.geometry import ARCMIN
 
 TURN = 2 * math.pi
 OF_ROUNDING = 1 / math.sqrt(12)
@@ -33,7 +34,9 @@ class Recording:
     deg C or None; `segment` counts up at each gap. `quantum_arcmin` is the step of the coarser encoder at the output, 0
     where none shows; `output_step_arcmin` that of the output's alone. `warnings` say what was repaired, `understood`
     how the file was read, a plain sentence each. `sensor_arcmin` is the encoders' standard uncertainty at the output, 0
-    where nobody stated it; `output_reversed` says that the output was counted against the input.
+    where nobody stated it; `output_reversed` says that the output was counted against the input. `scatter_arcmin` is
+    what of the error tells nothing of where the output stood, or None: whole steps of a coarse encoder, a few samples
+    of many. A wave of the output angle that took them for motion could follow them one by one.
     """
 
     name: str
@@ -50,9 +53,16 @@ class Recording:
     understood: tuple[str, ...] = field(default=())
     sensor_arcmin: float = 0.0
     output_reversed: bool = False
+    scatter_arcmin: Array | None = None
 
     def __len__(self) -> int:
         return len(self.input_angle)
+
+    @property
+    def output_angle(self) -> Array:
+        """Where the output stood, (n,) rad, from a zero of its own."""
+        error = self.error_arcmin if self.scatter_arcmin is None else self.error_arcmin - self.scatter_arcmin
+        return self.input_angle / self.ratio - error * ARCMIN
 
     @property
     def turns(self) -> float:

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdopt.arrays import Array, Index
-from hdopt.drive.geometry import ARCMIN
 from hdopt.effects.conditions import Conditions
 from hdopt.recordings.passes import find_passes
 from hdopt.recordings.recording import TURN, Recording
@@ -107,7 +106,7 @@ def _one_record(recording: Recording, neighbours: int) -> dict[str, Any]:
     return {
         "theta": theta,
         "error": mean(recording.error_arcmin),
-        "output": mean(recording.input_angle / recording.ratio - recording.error_arcmin * ARCMIN),
+        "output": mean(recording.output_angle),
         "direction": passes.direction[starts],
         "travel": mean(passes.since_reversal) * scale,
         "first": passes.first[starts],

@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import ndtr
 
 from hdopt.arrays import Array
 from hdopt.diagnosis.inference.neighbour_noise import noise_between_neighbours
@@ -45,13 +46,34 @@ def without_output_steps(
         as_read = float(np.std(np.concatenate(left)))
         if not _is_most(step, as_read, settings):
             return fine
-        steps = [step * np.round(one / step) for one in left]
-        now = float(np.std(np.concatenate(steps)))
+        now = float(np.std(np.concatenate([step * np.round(one / step) for one in left])))
         if now > settings.worth_a_round * scatter:
             break
         scatter = now
-        found = tuple(replace(one, error_arcmin=m + s) for one, m, s in zip(recordings, model, steps, strict=True))
+        noise = noise_before_reading(step, scatter)
+        freed = [parted - added_by_reading(parted, step, noise) for parted in left]
+        found = tuple(
+            replace(one, error_arcmin=m + scattered, scatter_arcmin=scattered)
+            for one, m, scattered in zip(recordings, model, freed, strict=True)
+        )
     return found
+
+
+def noise_before_reading(step: float, scatter: float) -> float:
+    """Standard deviation (arcmin) of normal noise s before the nearest `step` (arcmin) is read, from the `scatter`
+    (arcmin) of the whole steps that it makes: at an edge u away a reading is wrong by one step with the chance
+    Phi(-|u|/s), so that scatter^2 = q s sqrt(2/pi) while s is small beside q."""
+    return scatter**2 / (step * math.sqrt(2 / math.pi))
+
+
+def added_by_reading(left: Array, step: float, noise: float) -> Array:
+    """What reading the nearest `step` q (arcmin) adds to an error on the mean (arcmin, like `left`), where `noise` s
+    (arcmin) precedes it: q (Phi((z - q/2)/s) - Phi((-z - q/2)/s)) - z. The place z of the output within its step is
+    known from what is `left` (n,) of the error about a model, both arcmin, but for whole steps."""
+    place = step * np.round(left / step) - left
+    if noise == 0:
+        return -place
+    return step * (ndtr((place - step / 2) / noise) - ndtr((-place - step / 2) / noise)) - place
 
 
 def _is_most(step: float, scatter: float, settings: EncoderStepSettings) -> bool:

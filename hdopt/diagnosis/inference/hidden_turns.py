@@ -85,6 +85,7 @@ def _without(recording: Recording, hidden: Mask) -> Recording:
         time=rest(recording.time),
         torque=rest(recording.torque),
         temperature=rest(recording.temperature),
+        scatter_arcmin=rest(recording.scatter_arcmin),
         segment=segment[kept],
     )
 
