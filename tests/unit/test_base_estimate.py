@@ -174,6 +174,11 @@ def test_what_is_left_open_is_a_part_of_the_prior():
         both[[8, 4]] = members
         (name,) = open_combinations(np.diag([(0.01 * 0.05) ** 2] * 12) + np.outer(0.05 * both, 0.05 * both), PRIOR)
         assert name == "wave-generator eccentricity along its major axis with CS tooth sine"
+    # Of three that are left open together the last is below 0.3 of the largest, and above 0.3 of the second.
+    three = np.zeros(12)
+    three[[4, 8, 9]] = 0.8, 0.5, 0.2
+    (name,) = open_combinations(np.diag([(0.01 * 0.05) ** 2] * 12) + np.outer(0.05 * three, 0.05 * three), PRIOR)
+    assert name == "wave-generator eccentricity along its major axis with CS tooth sine"
     wide = PRIOR * np.r_[20.0, np.ones(11)]
     assert open_combinations(np.diag([(0.5 * 0.05) ** 2, *[1e-12] * 11]), wide) == ()
 
@@ -269,3 +274,11 @@ def test_starts_are_random_drives_of_sizes_below_the_prior(started):
     assert 0.3 < np.mean(tried > 0) < 0.7
     assert np.abs(tried / PRIOR).max() < 5 * DEFAULT.base.largest_start
     assert np.std(tried / PRIOR) > DEFAULT.base.smallest_start
+
+
+def test_the_base_has_the_scatter_of_its_error():
+    """Of an error of 0.3 to either side; without a base there is none."""
+    assert estimated(np.zeros(12), np.full(12, 0.001)).rms_arcmin == pytest.approx(0.3)
+    bare = fitted(np.zeros(12), np.full(12, 0.001))
+    bare.problem.base = None
+    assert base_estimate(bare).rms_arcmin == 0.0

@@ -74,6 +74,7 @@ def test_spans_by_hand():
     nothing = remaining_span(np.eye(3)[:, :2], np.zeros((3, 2)))
     assert smallest_angle_deg(line, nothing) == 90.0
     assert share_in_span(line[:, 0], nothing) == 0.0
+    assert share_in_span(0 * line[:, 0], plane) == 0.0  # of nothing there is no share
 
 
 @pytest.mark.parametrize(
@@ -192,6 +193,16 @@ def test_evidence_apart_falls_with_rougher_noise(study):
     assert plain.evidence_apart > 0
     assert rough.evidence_apart == pytest.approx(plain.evidence_apart / 4)
     assert rough.imitates == plain.imitates
+
+
+def test_evidence_apart_is_counted_in_noise_variances(study):
+    """The same fit in noise of twice the size has a quarter of it, but for the base's prior, which counts for little
+    beside thousands of rows. Fault caught: the power over another power of the noise."""
+    fit = fitted(study, ["channel_delay"])
+    noise = replace(fit.problem.noise, sigma=2 * fit.problem.noise.sigma)
+    (plain,) = confounded_with(fit, 0, others=["lost_motion"])
+    (loud,) = confounded_with(replace(fit, problem=fit.problem.with_noise(noise)), 0, others=["lost_motion"])
+    assert loud.evidence_apart == pytest.approx(plain.evidence_apart / 4, rel=1e-3)
 
 
 def test_an_oval_wheel_that_runs_true_is_a_coupling_with_odds_against_it(study):

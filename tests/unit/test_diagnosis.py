@@ -6,6 +6,7 @@ and with its size is asked in `test_named_cases.py`, on records of a bench that 
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -22,6 +23,7 @@ from hdopt.errors import HdoptError
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.kinematics.waveform import kinematic_error_arcmin
 from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.recording import Recording
 from hdopt.recordings.rows import gather
 from hdopt.study import load_study
 
@@ -241,6 +243,17 @@ def test_unusable_input_ends_with_two(tmp_path, capsys, arguments, message):
         main(["diagnose", str(file), *arguments])
     assert end.value.code == 2
     assert message in capsys.readouterr().err
+
+
+def test_all_recordings_are_of_one_ratio(drive, study, monkeypatch):
+    """Recordings at hand were read with some ratio: it must be the drive's. Fault caught: the others refused."""
+    monkeypatch.setattr("hdopt.diagnosis.pipeline.gather_evidence", lambda *about: "evidence")
+    monkeypatch.setattr("hdopt.diagnosis.verdict.draw.draw_verdict", lambda evidence, warnings: (evidence, warnings))
+    theta = np.arange(400) * 0.1
+    one = Recording("one", drive.geometry.ratio, theta, np.zeros(400), warnings=("a gap",))
+    assert diagnose([one, one], drive) == ("evidence", ("a gap", "a gap"))
+    with pytest.raises(HdoptError, match="different ratios"):
+        diagnose([one, replace(one, ratio=drive.geometry.ratio + 0.5)], drive)
 
 
 def test_no_recordings():

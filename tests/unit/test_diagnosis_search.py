@@ -238,6 +238,26 @@ def test_a_mesh_that_was_told_beside_the_zones_is_not_looked_for_in_them(study, 
     assert len(looked_anew) == 1
 
 
+def test_a_mesh_behind_a_line_that_explains_more_is_tried_in_the_zones(mesh_of_both_zones, looked_anew):
+    """Where the sines that explain most hold no mesh and leave more than noise, the mesh of another set is what the
+    zones may meet. Faults caught: only the best set asked; one without a mesh taken; all tried where nothing is left."""
+    samples, low, plain = mesh_of_both_zones()
+    order = {"order": 160.0, "side": 0.0}
+    line = explanations()["_sine_in_angle"].term(samples, order)
+    start = np.linalg.lstsq(line.columns, low.residual, rcond=None)[0]
+    best = evaluate(plain.problem, np.zeros(0), np.zeros(1), [line], [start])
+    assert fit_in_zones(samples, low, _OneZero(), best, None, [best]) is None
+    assert not looked_anew
+    found = fit_in_zones(samples, low, _OneZero(), best, None, [best, plain])
+    assert [term.effect for term in found.fit.terms] == ["tooth_mesh"]
+    assert np.std(found.fit.residual) < 1.1 * 0.01
+    looked_anew.clear()
+    clean = replace(plain.problem.rows, error=np.random.default_rng(8).normal(0, 0.01, len(samples)))
+    nothing_left = evaluate(replace(plain.problem, rows=clean), np.zeros(0), np.zeros(1), [line], [0 * start])
+    assert fit_in_zones(samples, low, _OneZero(), nothing_left, None, [plain]) is None
+    assert not looked_anew
+
+
 def test_mesh_of_unequal_teeth_comes_back_from_a_bent_base(study):
     """A ripple of 1.5 um in arc, of teeth that differ in height by five waves round the rim. Beside
     sines of it stand one that no physics makes, and the base is the one that explains the means best: the fit in zones
@@ -359,6 +379,7 @@ def test_second_effects_pay_by_kind_and_flexible_ones_like_two():
     exact, lobes = term("encoder_input_eccentricity", 2), term("circular_spline_lobing", 2)
     assert discrepancy([order]) == 0.0
     assert discrepancy([order, loop]) == pytest.approx(DEFAULT.penalty.other_kind)
+    assert discrepancy([order, loop, term("resonance", 2)]) == pytest.approx(2 * DEFAULT.penalty.other_kind)
     assert discrepancy([order, lobes]) == pytest.approx(DEFAULT.penalty.discrepancy)
     # Two sines of known orders leave nothing for each other.
     assert discrepancy([order, exact]) == pytest.approx(DEFAULT.penalty.other_kind)

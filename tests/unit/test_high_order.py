@@ -141,12 +141,15 @@ def test_what_rough_shapes_explained_may_come_back_as_high_orders(searched):
 
 def test_a_ripple_found_in_the_zones_adds_what_it_adds_there(monkeypatch):
     """Fault caught: the contribution beside the zones taken where the fit inside of them is the better one."""
-    high = Selection("base", (Candidate(SimpleNamespace(terms=("a",), contributions="beside"), 9.0, 1.0),), 1.0)
+    best = Candidate(SimpleNamespace(terms=("a",), contributions="beside"), 9.0, 1.0)
+    high = Selection("base", (best, Candidate("mesh", 8.0, 1.0)), 1.0)
     found = SimpleNamespace(best=SimpleNamespace(fit=None))
     monkeypatch.setattr(high_order, "high_order_selection", lambda *about: high)
     monkeypatch.setattr(high_order, "gather", lambda recordings: None)
     inside = SimpleNamespace(fit="inside", adds="what it adds there")
     for zones, fit, adds in ((inside, "inside", "what it adds there"), (None, high.best.fit, "beside")):
-        monkeypatch.setattr(high_order, "fit_in_zones", lambda *about, zones=zones: about[-1] == "told" and zones)
+        monkeypatch.setattr(
+            high_order, "fit_in_zones", lambda *about, zones=zones: about[-2:] == ("told", ["mesh"]) and zones
+        )
         selection, ripple = high_order.find_ripple((), found, None, (), None, "told")
         assert (selection.best.fit, ripple) == (fit, adds)

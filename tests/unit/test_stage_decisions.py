@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hdopt.diagnosis import stages
+from hdopt.diagnosis import state as state_module
 from hdopt.diagnosis.inference import clean_base
 from hdopt.diagnosis.inference.common_slope import TakenSlope
 from hdopt.diagnosis.orientation import Orientation
@@ -530,3 +531,13 @@ def test_beside_smooth_columns_it_has_them_again(smooth):
     fit = clean_base.beside_smooth(clean)
     np.testing.assert_array_equal(fit.problem.nuisance[0], BESIDE)
     np.testing.assert_array_equal(fit.offsets, [5.0, 0.0, 0.0, 0.0])
+
+
+def test_a_ripple_is_told_where_one_was_found(monkeypatch):
+    """Fault caught: what there is told as nothing, and nothing asked for its best."""
+    monkeypatch.setattr(state_module, "guess_of", lambda fit, turned: (fit, turned))
+    there = SimpleNamespace(
+        high=SimpleNamespace(best=SimpleNamespace(fit="a ripple")), orientation=SimpleNamespace(turned=True)
+    )
+    assert State.ripple_as_guess(there) == ("a ripple", True)
+    assert State.ripple_as_guess(SimpleNamespace(high=None)) is None

@@ -45,7 +45,8 @@ def find_ripple(
     high = high_order_selection(recordings, found, nuisances, ruled_out, rng)
     if high is None or not high.best.fit.terms:
         return high, None
-    inside = fit_in_zones(gather(recordings), found.best.fit, nuisances, high.best.fit, told)
+    others = [one.fit for one in high.candidates[1:]]
+    inside = fit_in_zones(gather(recordings), found.best.fit, nuisances, high.best.fit, told, others)
     if inside is None:
         return high, high.best.fit.contributions
     return high.with_best_fit(inside.fit), inside.adds

@@ -46,24 +46,30 @@ class ZoneRipple:
 
 
 def fit_in_zones(
-    rows: Rows, low: Fit, nuisances: Nuisances, ripple: Fit, told: Guess | None = None
+    rows: Rows,
+    low: Fit,
+    nuisances: Nuisances,
+    ripple: Fit,
+    told: Guess | None = None,
+    others: Sequence[Fit] = (),
 ) -> ZoneRipple | None:
     """The one term of `ripple` that the zones may meet inside them, or None where it acts beside them or the sum of
     sines explains as much. Effects found with it stay beside; a sine without physics, which stands for what it does to
-    the driving zone, goes.
+    the driving zone, goes. Where `ripple` has no such term and leaves more than noise, the first of the `others` that
+    has one is tried: of teeth that differ in height a few lines may explain more than the mesh with its nearest waves.
 
     `rows` are the rows as recorded with their recorded error, `low` the base and effects fitted on averaged rows.
     `nuisances` are the columns that are always free; `told` is what was found of it on other rows of the recordings,
     inside the zones or beside them: where that leaves nothing that the row before would tell, nothing else is tried.
     """
     base = low.problem.base
-    physical = [one for one in _weighed(ripple.terms, ripple) if not is_outside(one[0].effect)]
-    forms = [(ripple.problem.explanations[term.effect], term.shape) for term, _ in physical]
-    met = [at for at, (effect, shape) in enumerate(forms) if effect.in_zones(shape)]
-    if base is None or len(met) != 1:
+    tried = next((one for one in (ripple, *others) if _met_in_zones(one) is not None), None)
+    if base is None or tried is None or (tried is not ripple and _leaves_nothing(ripple)):
         return None
-    effect, shape = forms[met[0]]
-    beside = [one for at, one in enumerate(physical) if at != met[0]]
+    physical = _physical(tried)
+    at_mesh = _met_in_zones(tried)
+    effect, shape = tried.problem.explanations[physical[at_mesh][0].effect], physical[at_mesh][0].shape
+    beside = [one for at, one in enumerate(physical) if at != at_mesh]
     problem = replace(low.problem, rows=rows, nuisance=nuisances.columns(rows), noise=ripple.problem.noise)
     base_value = base.evaluate_at(problem.rotation, low.errors)[0]
     known = _weighed([problem.explanations[t.effect].term(rows, t.shape, base_value) for t in low.terms], low)
@@ -88,6 +94,18 @@ def fit_in_zones(
         if _score(fit) < best:
             best, inside = _score(fit), _alone(fit, len(fit.terms) - len(beside) - 1)
     return inside
+
+
+def _physical(ripple: Fit) -> list[Weighed]:
+    """The terms of `ripple` that are effects."""
+    return [one for one in _weighed(ripple.terms, ripple) if not is_outside(one[0].effect)]
+
+
+def _met_in_zones(ripple: Fit) -> int | None:
+    """Which of the effects of `ripple` the zones may meet inside them, where there is one and no more."""
+    terms = [term for term, _ in _physical(ripple)]
+    met = [at for at, term in enumerate(terms) if ripple.problem.explanations[term.effect].in_zones(term.shape)]
+    return met[0] if len(met) == 1 else None
 
 
 def _ripple_told(rows: Rows, effect: Explanation, told: Guess) -> Weighed | None:
