@@ -240,7 +240,7 @@ def test_a_mesh_that_was_told_beside_the_zones_is_not_looked_for_in_them(study, 
 
 def test_a_mesh_behind_a_line_that_explains_more_is_tried_in_the_zones(mesh_of_both_zones, looked_anew):
     """Where the sines that explain most hold no mesh and leave more than noise, the mesh of another set is what the
-    zones may meet. Faults caught: only the best set asked; one without a mesh taken; all tried where nothing is left."""
+    zones may meet. Faults caught: only the best set asked; one without a mesh taken; tried where nothing is left."""
     samples, low, plain = mesh_of_both_zones()
     order = {"order": 160.0, "side": 0.0}
     line = explanations()["_sine_in_angle"].term(samples, order)

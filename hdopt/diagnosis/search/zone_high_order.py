@@ -51,23 +51,24 @@ def fit_in_zones(
     nuisances: Nuisances,
     ripple: Fit,
     told: Guess | None = None,
-    others: Sequence[Fit] = (),
+    other_sets: Sequence[Fit] = (),
 ) -> ZoneRipple | None:
     """The one term of `ripple` that the zones may meet inside them, or None where it acts beside them or the sum of
     sines explains as much. Effects found with it stay beside; a sine without physics, which stands for what it does to
-    the driving zone, goes. Where `ripple` has no such term and leaves more than noise, the first of the `others` that
-    has one is tried: of teeth that differ in height a few lines may explain more than the mesh with its nearest waves.
+    the driving zone, goes. Where `ripple` has no such term and leaves more than noise, the first of the `other_sets`
+    that has one is tried: of teeth that differ in height a few lines may explain more than the mesh and its nearest
+    waves.
 
     `rows` are the rows as recorded with their recorded error, `low` the base and effects fitted on averaged rows.
     `nuisances` are the columns that are always free; `told` is what was found of it on other rows of the recordings,
     inside the zones or beside them: where that leaves nothing that the row before would tell, nothing else is tried.
     """
     base = low.problem.base
-    tried = next((one for one in (ripple, *others) if _met_in_zones(one) is not None), None)
-    if base is None or tried is None or (tried is not ripple and _leaves_nothing(ripple)):
+    candidates = ((one, _met_in_zones(one)) for one in (ripple, *other_sets))
+    tried, at_mesh = next(((one, at) for one, at in candidates if at is not None), (ripple, None))
+    if base is None or at_mesh is None or (tried is not ripple and _leaves_nothing(ripple)):
         return None
     physical = _physical(tried)
-    at_mesh = _met_in_zones(tried)
     effect, shape = tried.problem.explanations[physical[at_mesh][0].effect], physical[at_mesh][0].shape
     beside = [one for at, one in enumerate(physical) if at != at_mesh]
     problem = replace(low.problem, rows=rows, nuisance=nuisances.columns(rows), noise=ripple.problem.noise)
