@@ -443,6 +443,12 @@ class HighOrderSettings:
     )
     height_rounds: int = threshold(2, "1", "choice: steps with every tooth free, as skew and heights follow each other")
     skew_iterations: int = threshold(6, "1", "choice: effort; least squares after each step, in which the skew moves")
+    tooth_parts: tuple[float, ...] = threshold(
+        (0.0, 0.5, 1.0, 1.5, 2.0), "1", "choice: heights over their usual size at which a single tooth is tried"
+    )
+    tooth_gain: float = threshold(
+        30.0, "noise variances", "choice: drop of the sum of squares from which another height of a tooth is taken"
+    )
 
 
 @dataclass(frozen=True)

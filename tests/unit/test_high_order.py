@@ -13,7 +13,8 @@ from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.high_order import high_order_selection, ripple_orders, subtract
 from hdopt.diagnosis.search.subset_search import Selection
 from hdopt.diagnosis.settings import DEFAULT
-from hdopt.effects import HIGH_ORDER
+from hdopt.effects import EFFECTS, HIGH_ORDER
+from hdopt.effects.term import Term
 from hdopt.recordings.read import recording_from_table
 
 
@@ -78,9 +79,9 @@ def searched(monkeypatch):
         def __len__(self):
             return 2
 
-    def of(together=9.0, lines=(30.0,)):
+    def of(together=9.0, lines=(30.0,), lowest=None, averaged=True):
         seen = SimpleNamespace()
-        rows = AveragedRows(locked=False, are_averages=True, rows_per_turn=400.0, highest_order=20.0)
+        rows = AveragedRows(locked=False, are_averages=averaged, rows_per_turn=400.0, highest_order=20.0)
         terms = (SimpleNamespace(rough=True), SimpleNamespace(rough=False))
         sizes = [np.array([-1.0, 1.0]) * np.sqrt(2.0), np.array([-5.0, 5.0])]
 
@@ -112,7 +113,7 @@ def searched(monkeypatch):
         monkeypatch.setattr(high_order, "leaves_nothing", lambda term: not term.rough)
         monkeypatch.setattr(high_order, "subtracted_terms", lambda fit, power, terms: (power, list(terms)))
         monkeypatch.setattr(high_order, "select", select)
-        assert high_order_selection((), found, None, ("tooth_mesh",), None) == "a selection"
+        assert high_order_selection((), found, None, ("tooth_mesh",), None, lowest) == "a selection"
         seen.rough = terms[0]
         return seen
 
@@ -143,7 +144,8 @@ def test_a_ripple_found_in_the_zones_adds_what_it_adds_there(monkeypatch):
     """Fault caught: the contribution beside the zones taken where the fit inside of them is the better one."""
     best = Candidate(SimpleNamespace(terms=("a",), contributions="beside"), 9.0, 1.0)
     high = Selection("base", (best, Candidate("mesh", 8.0, 1.0)), 1.0)
-    found = SimpleNamespace(best=SimpleNamespace(fit=None))
+    low = SimpleNamespace(terms=(), problem=SimpleNamespace(rows=None))
+    found = SimpleNamespace(best=SimpleNamespace(fit=low))
     monkeypatch.setattr(high_order, "high_order_selection", lambda *about: high)
     monkeypatch.setattr(high_order, "gather", lambda recordings: None)
     inside = SimpleNamespace(fit="inside", adds="what it adds there")
@@ -153,3 +155,45 @@ def test_a_ripple_found_in_the_zones_adds_what_it_adds_there(monkeypatch):
         )
         selection, ripple = high_order.find_ripple((), found, None, (), None, "told")
         assert (selection.best.fit, ripple) == (fit, adds)
+
+
+def test_a_mesh_among_the_averaged_rows_is_looked_for_in_the_zones(monkeypatch):
+    """Where the rows hold the mesh it was seen among all effects, beside the motion: it is taken out of what was found,
+    looked for from its lowest order on, and kept where the zones explain more; else all stays. Faults caught: taken out
+    for good, another term taken out, the orders beside it left out."""
+    asked = []
+
+    def selection(recordings, found, nuisances, ruled_out, rng, lowest):
+        asked.append((found.best.fit, lowest))
+        return None if lowest is None else Selection("base", (Candidate(SimpleNamespace(terms=("m",)), 9.0, 1.0),), 1.0)
+
+    explained = {name: EFFECTS[name] for name in ("tooth_mesh", "output_coupling")}
+    mesh = Term("tooth_mesh", {"sidebands": (0, -2, 2)}, columns=np.ones((3, 6)))
+    other = Term("output_coupling", {"shaft": "output"}, columns=np.ones((3, 2)))
+    problem = SimpleNamespace(explanations=explained, rows=SimpleNamespace(ratio=30.0))
+    fit = SimpleNamespace(problem=problem, errors=None, offsets=None, terms=(other, mesh), coefficients=("o", "m"))
+    found = Selection("base", (Candidate(fit, 9.0, 1.0),), 1.0)
+    monkeypatch.setattr(high_order, "evaluate", lambda problem, errors, offsets, terms, own: (terms, own))
+    monkeypatch.setattr(high_order, "high_order_selection", selection)
+    monkeypatch.setattr(high_order, "gather", lambda recordings: None)
+    inside = SimpleNamespace(fit="inside", adds="what it adds there")
+    for zones, expected in ((inside, ("inside", "what it adds there")), (None, None)):
+        asked.clear()
+        monkeypatch.setattr(high_order, "fit_in_zones", lambda *about, zones=zones: zones)
+        high, ripple = high_order.find_ripple((), found, None, (), None)
+        assert asked[0] == (([other], ["o"]), 59.0)  # 62 teeth, two waves below them, and one
+        assert (high and (high.best.fit, ripple)) == expected
+        assert asked[1:] == ([] if zones else [(fit, None)])
+    plain = Selection("base", (Candidate(SimpleNamespace(problem=problem, terms=(other,)), 9.0, 1.0),), 1.0)
+    assert high_order.mesh_taken_out(plain) is None
+
+
+def test_no_order_is_below_those_of_an_effect_without_orders():
+    assert high_order.lowest_order([Term("hysteresis", {}, columns=np.ones((3, 1)))], 80.0) == np.inf
+
+
+def test_high_orders_begin_where_they_are_told_to(searched):
+    """Of rows that are no averages too. Faults caught: the orders above the averaged rows alone, and none without."""
+    assert searched().plan.order_range[0] == 20.0
+    seen = searched(lowest=7.0, averaged=False)
+    assert seen.plan.order_range == (7.0, DEFAULT.high_order.order_share * 400.0)

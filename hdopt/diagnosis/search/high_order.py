@@ -20,9 +20,9 @@ from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.penalty import SubtractedTerms, leaves_nothing
 from hdopt.diagnosis.search.search_state import SearchPlan
 from hdopt.diagnosis.search.subset_search import Selection, select
-from hdopt.diagnosis.search.zone_high_order import fit_in_zones
+from hdopt.diagnosis.search.zone_high_order import ZoneRipple, fit_in_zones
 from hdopt.diagnosis.settings import DEFAULT, HighOrderSettings
-from hdopt.effects import HIGH_ORDER
+from hdopt.effects import EFFECTS, HIGH_ORDER
 from hdopt.effects.probe import strongest_orders
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Term
@@ -42,14 +42,47 @@ def find_ripple(
     `nuisances`, without the effects `ruled_out`, and what its best candidate adds to the rows as recorded, (n,).
     `rng` draws what is random; `told` is the ripple found on other rows of them.
     """
-    high = high_order_selection(recordings, found, nuisances, ruled_out, rng)
+
+    def ripple_beside(what: Selection, lowest: float | None) -> tuple[Selection | None, ZoneRipple | None]:
+        high = high_order_selection(recordings, what, nuisances, ruled_out, rng, lowest)
+        if high is None or not high.best.fit.terms:
+            return high, None
+        others = [one.fit for one in high.candidates[1:]]
+        return high, fit_in_zones(gather(recordings), what.best.fit, nuisances, high.best.fit, told, others)
+
+    if (without_mesh := mesh_taken_out(found)) is not None:
+        high, inside = ripple_beside(*without_mesh)
+        if high is not None and inside is not None:
+            return high.with_best_fit(inside.fit), inside.adds
+    high, inside = ripple_beside(found, None)
     if high is None or not high.best.fit.terms:
         return high, None
-    others = [one.fit for one in high.candidates[1:]]
-    inside = fit_in_zones(gather(recordings), found.best.fit, nuisances, high.best.fit, told, others)
     if inside is None:
         return high, high.best.fit.contributions
     return high.with_best_fit(inside.fit), inside.adds
+
+
+def mesh_taken_out(found: Selection) -> tuple[Selection, float] | None:
+    """Of what was `found` in rows fine enough to hold it: the selection without an effect of high order that the zones
+    may meet inside them, which was seen beside the drive's motion there, and the lowest order to look for it from;
+    None without one.
+    """
+    fit = found.best.fit
+    rows = fit.problem.rows
+    for at, term in enumerate(fit.terms):
+        effect = fit.problem.explanations[term.effect]
+        if term.effect in HIGH_ORDER and effect.in_zones(term.shape):
+            lowest = lowest_order([term], rows.ratio)
+            terms = [*fit.terms[:at], *fit.terms[at + 1 :]]
+            own = [*fit.coefficients[:at], *fit.coefficients[at + 1 :]]
+            return found.with_best_fit(evaluate(fit.problem, fit.errors, fit.offsets, terms, own)), lowest
+    return None
+
+
+def lowest_order(terms: Sequence[Term], ratio: float) -> float:
+    """An order below all of those of `terms`, at a drive's `ratio`; without end where they have none."""
+    effects = ((EFFECTS[one.effect], one.shape) for one in terms if one.effect in EFFECTS)
+    return min((order - 1 for effect, shape in effects for order in effect.orders(shape, ratio)), default=math.inf)
 
 
 def high_order_selection(
@@ -58,19 +91,22 @@ def high_order_selection(
     nuisances: Nuisances,
     ruled_out: Sequence[str],
     rng: np.random.Generator,
+    lowest: float | None = None,
 ) -> Selection | None:
-    """Effects of orders above what the averaged rows hold, on the rows of `recordings` as they are without what was
-    `found` there: of all effects but those `ruled_out`. `nuisances` are the columns that are always free. `rng`
-    draws what is random.
+    """Effects of orders above what the averaged rows hold, or from the `lowest` on, on the rows of `recordings` as they
+    are without what was `found` there: of all effects but those `ruled_out`. `nuisances` are the columns that are
+    always free. `rng` draws what is random. None where no rows were averaged and no order is said.
     """
     low = found.best.fit
     averaged = low.problem.rows
-    if averaged.locked or not averaged.are_averages:
+    if averaged.locked or not (averaged.are_averages or lowest is not None):
         return None
     problem = left_as_recorded(recordings, low, nuisances)
     raw = problem.rows
     settings = problem.settings
-    lowest, highest = orders = ripple_orders(averaged, raw, settings.high_order)
+    above, highest = ripple_orders(averaged, raw, settings.high_order)
+    lowest = above if lowest is None else lowest
+    orders = (lowest, highest)
     start = evaluate(problem, np.zeros(0), np.zeros(1), (), ())
     bare = refine(start, settings.fit.offset_iterations)
     noise = noise_model.estimate(raw, bare.residual, settings.noise)

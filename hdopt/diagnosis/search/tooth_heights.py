@@ -3,7 +3,7 @@
 A flank's form is as high as its tooth is worn or cut: heights that differ at random from tooth to tooth have waves of
 every number round the rim. Their slow part, and the mean of the form over a pitch, lift the driving zone as the base
 does, so that no sidebands of the mesh hold them. The heights come in as waves round the rim, a few at first, each step
-from where the one before it ended, until every tooth is free.
+from where the one before it ended, until every tooth is free. At last single teeth are tried at other heights.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hdopt.arrays import Array
+from hdopt.arrays import Array, Index
 from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
 from hdopt.diagnosis.numerical import HALF, TINY
 from hdopt.effects.met import ToothForms
@@ -22,30 +22,100 @@ from hdopt.effects.term import Term
 
 def fit_heights(start: Fit, term: Term) -> Fit:
     """The fit with a height of every tooth from `start`, a drive with what stands beside the mesh; `term` has the form
-    of the teeth, all alike. Its last term has the heights that were found as its shape, of an rms of 1, and their
-    size as its coefficient.
+    of the teeth, all alike. Its last term has the heights that were found as its shape, over their usual size,
+    and that size as its coefficient.
     """
     forms = _forms_of(term)
-    teeth, settings = len(forms.heights), start.problem.settings
-    steps = (*settings.high_order.height_waves, *[teeth] * settings.high_order.height_rounds)
-    beside = [replace(one, steps={}) for one in start.terms]
+    teeth, settings = len(forms.heights), start.problem.settings.high_order
     own, fit = np.array([float(forms.heights.mean())]), start
-    for waves in steps:
+    beside = len(start.terms)
+    for waves in (*settings.height_waves, *[teeth] * settings.height_rounds):
         basis = waves_round(teeth, waves)
         own = np.r_[own, np.zeros(basis.shape[1] - len(own))]
-        free = replace(term, met=replace(_forms_of(term), heights=basis), steps={})
-        weights = fit.coefficients[: len(beside)]
-        fit = evaluate(fit.problem, fit.errors, fit.offsets, [*beside, free], [*weights, own])
-        fit = refine(fit, settings.base.full_iterations, move_shapes=False)
-        weights, own = fit.coefficients[:-1], fit.coefficients[-1]
-        heights = basis @ own
-        size = max(float(np.sqrt(np.mean(heights**2))), TINY)
-        shape = {**term.shape, "heights": tuple(map(float, heights / size))}
-        term = fit.problem.explanations[term.effect].term(fit.problem.rows, shape)
-        fit = evaluate(fit.problem, fit.errors, fit.offsets, [*beside, term], [*weights, np.array([size])])
-        fit = refine(fit, settings.high_order.skew_iterations)
-        term, own = fit.terms[-1], own * (fit.coefficients[-1][0] / size)
+        fit = _with_heights(fit, beside, term, basis, own)
+        term = fit.terms[-1]
+        own = np.linalg.lstsq(basis, heights_of(fit), rcond=None)[0]
+    basis = waves_round(teeth, teeth)
+    for _ in range(settings.height_rounds):
+        if (heights := single_teeth_tried(fit)) is None:
+            break
+        own = np.asarray(np.linalg.solve(basis, heights), np.float64)
+        again = _with_heights(fit, beside, fit.terms[-1], basis, own)
+        if again.objective >= fit.objective:
+            break
+        fit = again
     return fit
+
+
+def _with_heights(fit: Fit, beside: int, term: Term, basis: Array, own: Array) -> Fit:
+    """The fit from `fit` with its first terms (`beside` of them) and a mesh like `term`, whose heights are those of a
+    `basis` (teeth, q) from the coefficients `own` (q,) on: at first with the form as it is, then with these heights and
+    a free form.
+    """
+    settings = fit.problem.settings
+    others = [replace(one, steps={}) for one in fit.terms[:beside]]
+    free = replace(term, met=replace(_forms_of(term), heights=basis), steps={})
+    fit = evaluate(fit.problem, fit.errors, fit.offsets, [*others, free], [*fit.coefficients[:beside], own])
+    fit = refine(fit, settings.base.full_iterations, move_shapes=False)
+    heights = basis @ fit.coefficients[-1]
+    fit = evaluate(fit.problem, fit.errors, fit.offsets, *_of_heights(fit, term, heights))
+    return refine(fit, settings.high_order.skew_iterations)
+
+
+def _of_heights(fit: Fit, term: Term, heights: Array) -> tuple[list[Term], list[Array]]:
+    """The terms of `fit` and their coefficients with a mesh like `term` of these `heights` (teeth,) mm as the last."""
+    size = usual(heights)
+    shape = {**term.shape, "heights": tuple(map(float, heights / size))}
+    mesh = fit.problem.explanations[term.effect].term(fit.problem.rows, shape)
+    return [*fit.terms[:-1], mesh], [*fit.coefficients[:-1], np.array([size])]
+
+
+def usual(heights: Array) -> float:
+    """The median size of these `heights` (teeth,), above 0: a tooth that hardly ever drives may be told any height."""
+    return max(float(np.median(np.abs(heights))), TINY)
+
+
+def heights_of(fit: Fit) -> Array:
+    """The height of every tooth (teeth,) mm of the mesh that is the last term of `fit`."""
+    return np.asarray(_forms_of(fit.terms[-1]).heights @ fit.coefficients[-1])
+
+
+def single_teeth_tried(fit: Fit) -> Array | None:
+    """Heights (teeth,) mm with which single teeth of `fit` leave clearly less, or None where none does. A tooth that
+    is told too low while it takes the load from the other zone only now and then does not drive in the model at all:
+    no slope leads a fit to its height. Each is tried at a few parts of their usual size, those of either half of the
+    rim at once, since both zones never stand on the same half.
+    """
+    forms, settings = _forms_of(fit.terms[-1]), fit.problem.settings.high_order
+    heights, teeth = heights_of(fit), len(forms.heights)
+    tooth = np.array([forms.places(angle)[0] for angle in fit.problem.met_angles(fit.errors)[forms.spline]])
+    size = usual(heights)
+    best, gained = heights.copy(), np.full(teeth, settings.tooth_gain * fit.problem.noise.sigma**2)
+    for half in (np.arange(teeth) < teeth // 2, np.arange(teeth) >= teeth // 2):
+        for part in settings.tooth_parts:
+            tried = np.where(half, part * size, heights)
+            other = evaluate(fit.problem, fit.errors, fit.offsets, *_of_heights(fit, fit.terms[-1], tried))
+            less = fit.residual**2 - other.residual**2
+            gain = np.bincount(tooth[0], less, teeth) + np.bincount(tooth[1], less, teeth)
+            better = half & (gain > gained)
+            best[better], gained[better] = tried[better], gain[better]
+    chosen = _apart(np.flatnonzero(best != heights), gained, teeth)
+    if not len(chosen):
+        return None
+    heights[chosen] = best[chosen]
+    return heights
+
+
+def _apart(found: Index, gained: Array, teeth: int) -> Index:
+    """Of the teeth that were `found` those whose rows no other explains better, by what each `gained` (teeth,): rows
+    that one tooth explains are gained by its neighbours and by those that the other zone meets meanwhile, too."""
+    left, chosen = sorted(found, key=lambda one: -gained[one]), []
+    while left:
+        one = left.pop(0)
+        chosen.append(one)
+        away = np.abs((np.array(left, np.int64) - one + teeth // 4) % (teeth // 2) - teeth // 4)
+        left = [other for other, steps in zip(left, away, strict=True) if steps > 1]
+    return np.array(chosen, np.int64)
 
 
 def waves_round(teeth: int, waves: int) -> Array:

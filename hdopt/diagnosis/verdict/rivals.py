@@ -13,7 +13,7 @@ from hdopt.diagnosis.inference.cross_validation import paired_t
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.nonphysical_alternatives import Mains
 from hdopt.diagnosis.search.candidates import Candidate, paid_for_freedom, penalty_scale
-from hdopt.diagnosis.search.high_order import ripple_orders
+from hdopt.diagnosis.search.high_order import lowest_order, ripple_orders
 from hdopt.diagnosis.search.penalty import leaves_nothing
 from hdopt.diagnosis.settings import VerdictSettings
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
@@ -173,7 +173,9 @@ def confounded_pairs(evidence: Evidence, named: bool, high: Candidate | None) ->
             if is_effect(term.effect):
                 pairs += confounded_with(fit, index, evidence.inflation, others)
     if high is not None:
-        orders = ripple_orders(evidence.rows, high.fit.problem.rows, evidence.settings.high_order)
+        above, highest = ripple_orders(evidence.rows, high.fit.problem.rows, evidence.settings.high_order)
+        # A mesh inside the zones may stand within the orders of the averaged rows.
+        orders = (min(above, lowest_order(high.fit.terms, evidence.rows.ratio)), highest)
         for index, term in enumerate(high.fit.terms):
             if is_effect(term.effect):
                 pairs += confounded_with(high.fit, index, others=HIGH_ORDER, order_range=orders)
