@@ -145,7 +145,7 @@ def test_a_ripple_found_in_the_zones_adds_what_it_adds_there(monkeypatch):
     best = Candidate(SimpleNamespace(terms=("a",), contributions="beside"), 9.0, 1.0)
     high = Selection("base", (best, Candidate("mesh", 8.0, 1.0)), 1.0)
     low = SimpleNamespace(terms=(), problem=SimpleNamespace(rows=None))
-    found = SimpleNamespace(best=SimpleNamespace(fit=low))
+    found = SimpleNamespace(best=SimpleNamespace(fit=low), candidates=())
     monkeypatch.setattr(high_order, "high_order_selection", lambda *about: high)
     monkeypatch.setattr(high_order, "gather", lambda recordings: None)
     inside = SimpleNamespace(fit="inside", adds="what it adds there")
@@ -159,8 +159,9 @@ def test_a_ripple_found_in_the_zones_adds_what_it_adds_there(monkeypatch):
 
 def test_a_mesh_among_the_averaged_rows_is_looked_for_in_the_zones(monkeypatch):
     """Where the rows hold the mesh it was seen among all effects, beside the motion: it is taken out of what was found,
-    looked for from its lowest order on, and kept where the zones explain more; else all stays. Faults caught: taken out
-    for good, another term taken out, the orders beside it left out."""
+    looked for from its lowest order on, and kept where the zones explain more than all that was found; else all stays.
+    Faults caught: taken out for good, another term taken out, the orders beside it left out, kept where it leaves more.
+    """
     asked = []
 
     def selection(recordings, found, nuisances, ruled_out, rng, lowest):
@@ -176,16 +177,38 @@ def test_a_mesh_among_the_averaged_rows_is_looked_for_in_the_zones(monkeypatch):
     monkeypatch.setattr(high_order, "evaluate", lambda problem, errors, offsets, terms, own: (terms, own))
     monkeypatch.setattr(high_order, "high_order_selection", selection)
     monkeypatch.setattr(high_order, "gather", lambda recordings: None)
-    inside = SimpleNamespace(fit="inside", adds="what it adds there")
-    for zones, expected in ((inside, ("inside", "what it adds there")), (None, None)):
+    recorded = SimpleNamespace(rows=SimpleNamespace(error=np.array([-2.0, 2.0])))
+    monkeypatch.setattr(high_order, "left_as_recorded", lambda *about: recorded)
+    less, more = (SimpleNamespace(fit=SimpleNamespace(residual=np.array([-a, a])), adds="added") for a in (1.9, 2.1))
+    for zones, expected in ((less, (less.fit, "added")), (more, None), (None, None)):
         asked.clear()
         monkeypatch.setattr(high_order, "fit_in_zones", lambda *about, zones=zones: zones)
         high, ripple = high_order.find_ripple((), found, None, (), None)
         assert asked[0] == (([other], ["o"]), 59.0)  # 62 teeth, two waves below them, and one
         assert (high and (high.best.fit, ripple)) == expected
-        assert asked[1:] == ([] if zones else [(fit, None)])
+        assert asked[1:] == ([] if zones is less else [(fit, None)])
     plain = Selection("base", (Candidate(SimpleNamespace(problem=problem, terms=(other,)), 9.0, 1.0),), 1.0)
     assert high_order.mesh_taken_out(plain) is None
+
+
+@pytest.mark.parametrize("white", [True, False])
+def test_a_mesh_behind_a_better_set_is_taken_where_that_leaves_more_than_noise(monkeypatch, white):
+    """Faults caught: of the sets only the best, or a mesh tried where nothing is left."""
+    problem = SimpleNamespace(explanations=dict(EFFECTS), rows=SimpleNamespace(ratio=30.0))
+    mesh = Term("tooth_mesh", {"sidebands": (0,)}, columns=np.ones((3, 2)))
+    line = Term("encoder_interpolation", {"lines": 62, "shaft": "input", "cycles": (1,)}, columns=np.ones((3, 2)))
+    first, second = (
+        SimpleNamespace(problem=problem, errors=None, offsets=None, terms=(one,), coefficients=("own",))
+        for one in (line, mesh)
+    )
+    found = Selection("base", (Candidate(first, 9.0, 1.0), Candidate(second, 8.0, 1.0)), 1.0)
+    monkeypatch.setattr(high_order, "evaluate", lambda problem, errors, offsets, terms, own: (terms, own))
+    monkeypatch.setattr(high_order, "leaves_white_noise", lambda fit: white if fit is first else None)
+    if white:
+        assert high_order.mesh_taken_out(found) is None
+    else:
+        without, lowest = high_order.mesh_taken_out(found)
+        assert (without.best.fit, lowest) == (([], []), 61.0)
 
 
 def test_no_order_is_below_those_of_an_effect_without_orders():

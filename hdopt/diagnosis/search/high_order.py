@@ -20,7 +20,7 @@ from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.penalty import SubtractedTerms, leaves_nothing
 from hdopt.diagnosis.search.search_state import SearchPlan
 from hdopt.diagnosis.search.subset_search import Selection, select
-from hdopt.diagnosis.search.zone_high_order import ZoneRipple, fit_in_zones
+from hdopt.diagnosis.search.zone_high_order import ZoneRipple, fit_in_zones, leaves_white_noise
 from hdopt.diagnosis.settings import DEFAULT, HighOrderSettings
 from hdopt.effects import EFFECTS, HIGH_ORDER
 from hdopt.effects.probe import strongest_orders
@@ -52,7 +52,8 @@ def find_ripple(
 
     if (without_mesh := mesh_taken_out(found)) is not None:
         high, inside = ripple_beside(*without_mesh)
-        if high is not None and inside is not None:
+        left = left_as_recorded(recordings, found.best.fit, nuisances).rows.error
+        if high is not None and inside is not None and np.var(inside.fit.residual) < np.var(left):
             return high.with_best_fit(inside.fit), inside.adds
     high, inside = ripple_beside(found, None)
     if high is None or not high.best.fit.terms:
@@ -63,19 +64,22 @@ def find_ripple(
 
 
 def mesh_taken_out(found: Selection) -> tuple[Selection, float] | None:
-    """Of what was `found` in rows fine enough to hold it: the selection without an effect of high order that the zones
+    """Of what was `found` in rows fine enough to hold it: the best set without an effect of high order that the zones
     may meet inside them, which was seen beside the drive's motion there, and the lowest order to look for it from;
-    None without one.
+    None without one, and where a better set leaves nothing.
     """
-    fit = found.best.fit
-    rows = fit.problem.rows
-    for at, term in enumerate(fit.terms):
-        effect = fit.problem.explanations[term.effect]
-        if term.effect in HIGH_ORDER and effect.in_zones(term.shape):
-            lowest = lowest_order([term], rows.ratio)
+    for candidate in found.candidates:
+        fit = candidate.fit
+        for at, term in enumerate(fit.terms):
+            effect = fit.problem.explanations[term.effect]
+            if term.effect not in HIGH_ORDER or not effect.in_zones(term.shape):
+                continue
+            if candidate is not found.best and leaves_white_noise(found.best.fit):
+                return None
             terms = [*fit.terms[:at], *fit.terms[at + 1 :]]
             own = [*fit.coefficients[:at], *fit.coefficients[at + 1 :]]
-            return found.with_best_fit(evaluate(fit.problem, fit.errors, fit.offsets, terms, own)), lowest
+            without = evaluate(fit.problem, fit.errors, fit.offsets, terms, own)
+            return found.with_best_fit(without), lowest_order([term], fit.problem.rows.ratio)
     return None
 
 

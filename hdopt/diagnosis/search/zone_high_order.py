@@ -66,7 +66,7 @@ def fit_in_zones(
     base = low.problem.base
     candidates = ((one, _met_in_zones(one)) for one in (ripple, *other_sets))
     tried, at_mesh = next(((one, at) for one, at in candidates if at is not None), (ripple, None))
-    if base is None or at_mesh is None or (tried is not ripple and _leaves_nothing(ripple)):
+    if base is None or at_mesh is None or (tried is not ripple and leaves_white_noise(ripple)):
         return None
     physical = _physical(tried)
     effect, shape = tried.problem.explanations[physical[at_mesh][0].effect], physical[at_mesh][0].shape
@@ -87,9 +87,9 @@ def fit_in_zones(
             there, iterations = replace(low, errors=told.errors), problem.settings.fit.known_iterations
             begun = [_at(problem, there, [*start, *beside, known_ripple]) for start in starts]
             fits = each(lambda one: refine(one, iterations, move_shapes=False), begun)
-        elif _leaves_nothing(sines):
+        elif leaves_white_noise(sines):
             return None
-    if not any(_leaves_nothing(fit) for fit in fits):
+    if not any(leaves_white_noise(fit) for fit in fits):
         fits += each(lambda start: _step_by_step(problem, low, [*start, *beside], effect, shapes), starts)
     for fit in fits:
         if _score(fit) < best:
@@ -118,7 +118,7 @@ def _ripple_told(rows: Rows, effect: Explanation, told: Guess) -> Weighed | None
     return None
 
 
-def _leaves_nothing(fit: Fit) -> bool:
+def leaves_white_noise(fit: Fit) -> bool:
     """Whether neighbouring rows tell next to nothing of what `fit` leaves."""
     settings = fit.problem.settings
     return predictable_share(fit.problem.rows, fit.residual, settings.noise) < settings.high_order.told_by_neighbours
