@@ -97,10 +97,10 @@ class Explanation(ABC):
         """Shapes of the same inside the meshing zones, to be tried in its place; none for most."""
         return ()
 
-    def other_laws(self, conditions: Conditions, term: Term) -> Sequence[Array]:
-        """Columns like those of its `term`, each (n, p), by other laws of the speed than its own; none
-        for most. Where one of these explains better, it is not this effect that is there."""
-        return ()
+    def other_laws(self, conditions: Conditions, term: Term) -> Mapping[str, Sequence[Array]]:
+        """Columns like those of its `term`, each (n, p), by other laws than its own, those of the "speed" and those of
+        the "time"; none for most. Where one of these explains better, it is not this effect that is there."""
+        return {}
 
     def other_forms(self, shape: Shape) -> Sequence[Shape]:
         """Shapes of the same physics in other forms, of which a real part may have any: an interval takes in what each

@@ -46,11 +46,11 @@ class ChannelDelay(Effect):
     def search(self, probe: Probe) -> Sequence[Term]:
         return [self.term(probe.samples, {})]
 
-    def other_laws(self, conditions: Conditions, term: Term) -> Sequence[Array]:
+    def other_laws(self, conditions: Conditions, term: Term) -> Mapping[str, Sequence[Array]]:
         speed = conditions.known_speed
         largest = float(np.max(np.abs(speed)))
         part = speed / largest if largest > 0 else speed
-        return [(np.sign(part) * np.abs(part) ** power)[:, None] for power in OTHER_POWERS]
+        return {"speed": [(np.sign(part) * np.abs(part) ** power)[:, None] for power in OTHER_POWERS]}
 
     def sentence(self, shape: Shape, parameters: Mapping[str, Parameter], rms_arcmin: float) -> str:
         delay = parameters["delay_s"].value

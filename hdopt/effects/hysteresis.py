@@ -19,6 +19,7 @@ from hdopt.arrays import Array
 from hdopt.effects._friction_law import LAWS, NAMES, Law
 from hdopt.effects._friction_torque import friction_columns, half_loop, passes_of
 from hdopt.effects._speed_laws import columns_by_speed
+from hdopt.effects._time_laws import columns_by_time
 from hdopt.effects.base import Effect, terms_at
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Category, Quantity
@@ -120,8 +121,8 @@ class Hysteresis(Effect):
             return ()
         return [{**shape, "model": law} for law in NAMES if law != shape["model"]]
 
-    def other_laws(self, conditions: Conditions, term: Term) -> Sequence[Array]:
-        return columns_by_speed(conditions, term)
+    def other_laws(self, conditions: Conditions, term: Term) -> Mapping[str, Sequence[Array]]:
+        return {"speed": columns_by_speed(conditions, term), "time": columns_by_time(conditions, term)}
 
     def predict(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
         """The term of a drive that has run in: no limits by a record, no unknown start."""

@@ -17,6 +17,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects._speed_laws import columns_by_speed
+from hdopt.effects._time_laws import columns_by_time
 from hdopt.effects.base import Effect, Keys
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Quantity, needed, number, polar, sine_and_cosine
@@ -89,8 +90,8 @@ class LostMotion(Effect):
             parts += [step * np.sin(angle), step * np.cos(angle)]
         return Term(self.id, dict(shape), columns=np.column_stack(parts), trials=3.0 if "order" in shape else 1.0)
 
-    def other_laws(self, conditions: Conditions, term: Term) -> Sequence[Array]:
-        return columns_by_speed(conditions, term)
+    def other_laws(self, conditions: Conditions, term: Term) -> Mapping[str, Sequence[Array]]:
+        return {"speed": columns_by_speed(conditions, term), "time": columns_by_time(conditions, term)}
 
     def highest_order(self, shape: Shape, ratio: float) -> float:
         return float(shape.get("order", 0))

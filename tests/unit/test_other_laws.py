@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from hdopt.diagnosis.checks.other_laws import OtherLaw, other_law
@@ -12,10 +13,14 @@ from hdopt.diagnosis.search.candidates import joint_fit
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.stages import begin
 from hdopt.diagnosis.verdict import rules
+from hdopt.drive.geometry import ARCMIN
 from hdopt.effects import EFFECTS
 from hdopt.effects._friction_law import Law
 from hdopt.effects._speed_laws import weights_by_speed
+from hdopt.effects._time_laws import weights_by_time
 from hdopt.kinematics.cartesian import CartesianModel
+from hdopt.kinematics.waveform import kinematic_error_arcmin
+from hdopt.recordings.read import recording_from_table
 from hdopt.study import load_study
 from tests.unit.test_diagnosis import bench
 
@@ -93,6 +98,65 @@ def test_play_and_friction_are_alike_at_all_speeds(effect, shape):
     assert other_law(shifted(effect, shape, np.sqrt, speeds=(1.0, 1.1)), 1.0) == OtherLaw()
 
 
+def worn_in(effect, shape, law, reversals=3):
+    """The fit of `effect` at `shape` to one record there and back, of so many `reversals`, in which the two directions
+    lie 0.3 arcmin apart at first, by a `law` of the part of the record that has gone by."""
+    study = load_study(drive="csf-25-80")
+    there = np.arange(20 * 60) * 2 * np.pi / 60
+    passes = [there if i % 2 == 0 else there[::-1] for i in range(reversals + 1)]
+    theta = np.concatenate(passes) + 0.2
+    direction = np.repeat([1.0 if i % 2 == 0 else -1.0 for i in range(reversals + 1)], len(there))
+    part = np.arange(len(theta)) / len(theta)
+    error = kinematic_error_arcmin(study.drive, study.errors, theta) + 0.15 * direction * law(part)
+    error = error + np.random.default_rng(2).normal(0, 0.02, len(theta))
+    table = {
+        "time_s": np.arange(len(theta)) * 0.1,
+        "input_angle_deg": np.degrees(theta),
+        "output_angle_deg": np.degrees(theta / 80 - error * ARCMIN),
+    }
+    state = begin([recording_from_table(pd.DataFrame(table), 80.0)], CartesianModel.of(study.drive), 1, DEFAULT)
+    return joint_fit(state.base, [EFFECTS[effect].term(state.problem.rows, shape)])
+
+
+@pytest.mark.parametrize(("effect", "shape"), SHIFTS)
+def test_play_and_friction_do_not_wear_in(effect, shape):
+    """Drag that fades within a tenth to four tenths of a record is another law, of the time; what stays is not. Of two
+    passes none is asked: what an offset of either does is a drift as well. Faults caught: play or friction not asked;
+    asked of two passes; said to be a law of the speed."""
+    for fading in (0.1, 0.15, 0.4):
+        found = other_law(worn_in(effect, shape, lambda part, f=fading: np.exp(-part / f)), 1.0)
+        assert found.log_evidence > 2 * DEFAULT.verdict.other_law
+        assert found.of == "time"
+    assert other_law(worn_in(effect, shape, np.ones_like), 1.0) == OtherLaw()
+    assert other_law(worn_in(effect, shape, lambda part: np.exp(-part / 0.2), reversals=1), 1.0) == OtherLaw()
+
+
+def test_what_wears_in_fades_from_the_start_of_each_recording():
+    """To 1/e after a tenth, a fifth and two fifths of it; without a clock, or with a recording of three passes, nothing
+    is told."""
+    way = np.tile(np.repeat([1.0, -1.0], 5), 2)
+    two = SimpleNamespace(
+        locked=False,
+        time=np.r_[np.arange(20.0), 100 + 3 * np.arange(20.0)],
+        direction=np.r_[way, way],
+        record=np.repeat([0, 1], 20),
+        records=2,
+    )
+
+    class Rows(SimpleNamespace):
+        def __len__(self):
+            return 40
+
+    rows = Rows(**vars(two))
+    found = weights_by_time(rows)
+    for weight, fading in zip(found, (0.1, 0.2, 0.4), strict=True):
+        np.testing.assert_allclose(weight, np.tile(np.exp(-np.arange(20) / 19 / fading), 2))
+    assert weights_by_time(Rows(**{**vars(two), "time": None})) == []
+    assert weights_by_time(Rows(**{**vars(two), "locked": True})) == []
+    fewer = np.r_[way, np.repeat([1.0, -1.0, 1.0], (5, 5, 10))]
+    assert weights_by_time(Rows(**{**vars(two), "direction": fewer})) == []
+
+
 def test_rough_noise_and_each_law_cost_evidence(monkeypatch):
     """Faults caught: the noise's roughness forgotten; three laws tried for nothing."""
     fit = recorded(0.5)
@@ -102,7 +166,7 @@ def test_rough_noise_and_each_law_cost_evidence(monkeypatch):
 
 def test_effects_without_other_laws_are_not_asked(monkeypatch):
     fit = recorded(0.5)
-    monkeypatch.setattr(type(DELAY), "other_laws", lambda self, conditions, term: ())
+    monkeypatch.setattr(type(DELAY), "other_laws", lambda self, conditions, term: {"speed": []})
     assert other_law(fit, 1.0) == OtherLaw()
 
 
@@ -117,3 +181,7 @@ def test_the_verdict_says_that_the_law_is_another():
     assert (said.verdict, said.effects, said.where["domain"]) == ("unknown", (), "speed")
     assert said.where["rms_arcmin"] == pytest.approx(np.std(fit.contribution(0)))
     assert "looks like channel_delay, but another law of the speed explains it better" in said.says
+    evidence.other_law = OtherLaw(0, 99.0, "time")
+    said = rules.not_by_its_law(SimpleNamespace(evidence=evidence))
+    assert said.where["domain"] == "time"
+    assert "another law of the time explains it better" in said.says

@@ -1,10 +1,10 @@
-"""Whether what is named depends on the speed as its effect does, or by another law.
+"""Whether what is named depends on speed and time as its effect does, or by another law.
 
 Drag that grows with the root of the speed looks much like a delay, whose offset grows with the speed itself, and one
-that fades with it like play, which is alike at all speeds. What is left of the one by the other is small, far less than
-an inexact shape may leave, so that no description without physics wins against the catalogue. But a delay fits a delay
-to the last digit: of two laws with the same freedom the right one explains more, clearly, as soon as there are two
-speeds.
+that fades with it like play, which is alike at all speeds; so does drag that wears in, while play stays. What is left
+of the one by the other is small, far less than an inexact shape may leave, so that no description without physics wins
+against the catalogue. But a delay fits a delay to the last digit: of two laws with the same freedom the right one
+explains more, clearly, as soon as there are two speeds, or a few reversals.
 """
 
 from __future__ import annotations
@@ -21,10 +21,12 @@ from hdopt.diagnosis.numerical import HALF
 
 @dataclass(frozen=True)
 class OtherLaw:
-    """By how much log evidence another law explains better than that of term `index`; 0 where none does."""
+    """By how much log evidence another law, `of` the speed or the time, explains better than that of term `index`; 0
+    where none does."""
 
     index: int = 0
     log_evidence: float = 0.0
+    of: str = "speed"
 
 
 def other_law(fit: Fit, inflation: float) -> OtherLaw:
@@ -34,11 +36,15 @@ def other_law(fit: Fit, inflation: float) -> OtherLaw:
     found = OtherLaw()
     for index, term in enumerate(fit.terms):
         laws = properties_of(term.effect).other_laws(fit.problem.rows, term)
-        if not laws:
+        tried = sum(len(columns) for columns in laws.values())
+        if not tried:
             continue
         probe = FitProbe(fit, keep=fit.all_but(index))
-        others = max(probe.gain(replace(term, columns=columns, steps={}, kept=False)) for columns in laws)
-        better = HALF * (others - probe.gain(term)) / inflation - float(np.log(len(laws)))
-        if better > found.log_evidence:
-            found = OtherLaw(index, better)
+        own = probe.gain(term)
+        for of, each in laws.items():
+            for columns in each:
+                gain = probe.gain(replace(term, columns=columns, steps={}, kept=False))
+                better = HALF * (gain - own) / inflation - float(np.log(tried))
+                if better > found.log_evidence:
+                    found = OtherLaw(index, better, of)
     return found

@@ -266,17 +266,17 @@ def named_and_beaten(findings: Findings) -> Conclusion:
 
 
 def not_by_its_law(findings: Findings) -> Conclusion:
-    """What is there resembles an effect, but follows another law of the speed. `findings` hold the facts and the
+    """What is there resembles an effect, but follows another law of speed or time. `findings` hold the facts and the
     evidence behind them.
     """
     evidence = findings.evidence
-    best, index = evidence.selection.best, evidence.other_law.index
+    best, index, of = evidence.selection.best, evidence.other_law.index, evidence.other_law.of
     name, contribution = best.effects[index], best.fit.contribution(index)
-    where = place("speed", main_orders(best.fit, contribution), float(np.std(contribution)), evidence)
+    where = place(of, main_orders(best.fit, contribution), float(np.std(contribution)), evidence)
     return Conclusion(
         "unknown",
         f"Something is there, {where['rms_arcmin']:.2g} arcmin rms, that looks like {name}, but another law of "
-        "the speed explains it better: what it is, is not known.",
+        f"the {of} explains it better: what it is, is not known.",
         separating_test=EFFECTS[name].separating,
         where=where,
     )
