@@ -598,8 +598,8 @@ class VerdictSettings:
     other_law: float = threshold(
         10.0,
         "1",
-        "choice: log evidence by which another law of speed or time must explain better: 0 to 1 over that of six delays "
-        "and of 45 plays and frictions, 15 and 682 over that of a delay and a play which were drag",
+        "choice: log evidence by which another law of speed or time must explain better: 0 to 1 over that of six "
+        "delays and of 45 plays and frictions, 15 and 682 over that of a delay and a play which were drag",
     )
     together: float = threshold(
         0.125,

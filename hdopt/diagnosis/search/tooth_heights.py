@@ -109,12 +109,13 @@ def single_teeth_tried(fit: Fit) -> Array | None:
 def _apart(found: Index, gained: Array, teeth: int) -> Index:
     """Of the teeth that were `found` those whose rows no other explains better, by what each `gained` (teeth,): rows
     that one tooth explains are gained by its neighbours and by those that the other zone meets meanwhile, too."""
-    left, chosen = sorted(found, key=lambda one: -gained[one]), []
-    while left:
-        one = left.pop(0)
-        chosen.append(one)
-        away = np.abs((np.array(left, np.int64) - one + teeth // 4) % (teeth // 2) - teeth // 4)
-        left = [other for other, steps in zip(left, away, strict=True) if steps > 1]
+    half = teeth // 2
+    taken: set[int] = set()
+    chosen = []
+    for one in sorted(found.tolist(), key=lambda one: -gained[one]):
+        if one % half not in taken:
+            chosen.append(one)
+            taken |= {(one + step) % half for step in (-1, 0, 1)}
     return np.array(chosen, np.int64)
 
 
