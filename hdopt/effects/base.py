@@ -97,9 +97,10 @@ class Explanation(ABC):
         """Shapes of the same inside the meshing zones, to be tried in its place; none for most."""
         return ()
 
-    def other_laws(self, conditions: Conditions, term: Term) -> Mapping[str, Sequence[Array]]:
-        """Columns like those of its `term`, each (n, p), by other laws than its own, those of the "speed" and those of
-        the "time"; none for most. Where one of these explains better, it is not this effect that is there."""
+    def other_laws(self, conditions: Conditions, term: Term, motion: Array) -> Mapping[str, Sequence[Array]]:
+        """Columns like those of its `term`, each (n, p), by other laws than its own, those of the "speed", the "time"
+        and the "direction"; none for most. Where one of these explains better, it is not this effect that is there.
+        `motion` (n,), arcmin, is the drive's own error."""
         return {}
 
     def other_forms(self, shape: Shape) -> Sequence[Shape]:

@@ -46,7 +46,7 @@ class ChannelDelay(Effect):
     def search(self, probe: Probe) -> Sequence[Term]:
         return [self.term(probe.samples, {})]
 
-    def other_laws(self, conditions: Conditions, term: Term) -> Mapping[str, Sequence[Array]]:
+    def other_laws(self, conditions: Conditions, term: Term, motion: Array) -> Mapping[str, Sequence[Array]]:
         speed = conditions.known_speed
         largest = float(np.max(np.abs(speed)))
         part = speed / largest if largest > 0 else speed

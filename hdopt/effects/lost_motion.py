@@ -16,6 +16,7 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
+from hdopt.effects._direction_laws import columns_by_direction
 from hdopt.effects._speed_laws import columns_by_speed
 from hdopt.effects._time_laws import columns_by_time
 from hdopt.effects.base import Effect, Keys
@@ -90,8 +91,12 @@ class LostMotion(Effect):
             parts += [step * np.sin(angle), step * np.cos(angle)]
         return Term(self.id, dict(shape), columns=np.column_stack(parts), trials=3.0 if "order" in shape else 1.0)
 
-    def other_laws(self, conditions: Conditions, term: Term) -> Mapping[str, Sequence[Array]]:
-        return {"speed": columns_by_speed(conditions, term), "time": columns_by_time(conditions, term)}
+    def other_laws(self, conditions: Conditions, term: Term, motion: Array) -> Mapping[str, Sequence[Array]]:
+        return {
+            "speed": columns_by_speed(conditions, term),
+            "time": columns_by_time(conditions, term),
+            "direction": columns_by_direction(conditions, term, motion),
+        }
 
     def highest_order(self, shape: Shape, ratio: float) -> float:
         return float(shape.get("order", 0))

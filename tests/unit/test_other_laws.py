@@ -15,6 +15,7 @@ from hdopt.diagnosis.stages import begin
 from hdopt.diagnosis.verdict import rules
 from hdopt.drive.geometry import ARCMIN
 from hdopt.effects import EFFECTS
+from hdopt.effects._direction_laws import columns_by_direction
 from hdopt.effects._friction_law import Law
 from hdopt.effects._speed_laws import weights_by_speed
 from hdopt.effects._time_laws import weights_by_time
@@ -131,6 +132,57 @@ def test_play_and_friction_do_not_wear_in(effect, shape):
     assert other_law(worn_in(effect, shape, lambda part: np.exp(-part / 0.2), reversals=1), 1.0) == OtherLaw()
 
 
+def larger_one_way(effect, shape, share, offset):
+    """The fit of `effect` at `shape` to one record there and back twice, whose error is larger by a `share` of itself
+    forwards than backwards, and an `offset` (arcmin) apart besides."""
+    study = load_study(drive="csf-25-80")
+    there = np.arange(20 * 60) * 2 * np.pi / 60
+    theta = np.concatenate([there, there[::-1], there, there[::-1]]) + 0.2
+    direction = np.repeat([1.0, -1.0, 1.0, -1.0], len(there))
+    own = kinematic_error_arcmin(study.drive, study.errors, theta)
+    error = own * (1 + share / 2 * direction) + offset / 2 * direction
+    error = error + np.random.default_rng(3).normal(0, 0.02, len(theta))
+    table = {
+        "time_s": np.arange(len(theta)) * 0.1,
+        "input_angle_deg": np.degrees(theta),
+        "output_angle_deg": np.degrees(theta / 80 - error * ARCMIN),
+    }
+    state = begin([recording_from_table(pd.DataFrame(table), 80.0)], CartesianModel.of(study.drive), 1, DEFAULT)
+    return joint_fit(state.base, [EFFECTS[effect].term(state.problem.rows, shape)])
+
+
+@pytest.mark.parametrize(("effect", "shape"), SHIFTS)
+def test_an_error_that_is_larger_in_one_direction_is_no_play(effect, shape):
+    """Its mean over the turn is an offset, and a play of that size leaves what varies. Of play alone the offset is all.
+    Faults caught: not asked of play or friction; a coefficient more for nothing."""
+    found = other_law(larger_one_way(effect, shape, 0.3, 0.0), 1.0)
+    assert found.of == "direction"
+    assert found.log_evidence > 2 * DEFAULT.verdict.other_law
+    assert other_law(larger_one_way(effect, shape, 0.0, 0.3), 1.0) == OtherLaw()
+
+
+def test_coefficients_beyond_the_effects_own_cost_evidence(monkeypatch):
+    """The same column twice explains no more, and costs half the log of the rows. Fault caught: free coefficients."""
+    fit = recorded(0.5)
+    once = other_law(fit, 1.0).log_evidence
+    laws = DELAY.other_laws(fit.problem.rows, fit.terms[0], fit.motion)["speed"]
+    angle = np.random.default_rng(0).normal(size=(len(fit.problem.rows), 1))
+    wider = {"speed": [np.hstack([columns, 1e-9 * angle * columns]) for columns in laws]}
+    monkeypatch.setattr(type(DELAY), "other_laws", lambda self, conditions, term, motion: wider)
+    paid = once - other_law(fit, 1.0).log_evidence
+    assert paid == pytest.approx(np.log(fit.problem.weighed_rows) / 2, rel=0.3)
+
+
+def test_a_gear_without_an_error_of_its_own_shows_none_in_one_direction():
+    rows = SimpleNamespace(locked=False)
+    term = SimpleNamespace(columns=np.array([[1.0, 5.0], [-1.0, 6.0]]))
+    assert columns_by_direction(rows, term, np.zeros(2)) == []
+    (columns,) = columns_by_direction(rows, term, np.array([2.0, 3.0]))
+    np.testing.assert_array_equal(columns, [[1.0, 5.0, 2.0], [-1.0, 6.0, -3.0]])
+    assert columns_by_direction(SimpleNamespace(locked=True), term, np.array([2.0, 3.0])) == []
+    assert columns_by_direction(rows, SimpleNamespace(columns=None), np.array([2.0, 3.0])) == []
+
+
 def test_what_wears_in_fades_from_the_start_of_each_recording():
     """To 1/e after a tenth, a fifth and two fifths of it; without a clock, or with a recording of three passes, nothing
     is told."""
@@ -166,7 +218,7 @@ def test_rough_noise_and_each_law_cost_evidence(monkeypatch):
 
 def test_effects_without_other_laws_are_not_asked(monkeypatch):
     fit = recorded(0.5)
-    monkeypatch.setattr(type(DELAY), "other_laws", lambda self, conditions, term: {"speed": []})
+    monkeypatch.setattr(type(DELAY), "other_laws", lambda self, conditions, term, motion: {"speed": []})
     assert other_law(fit, 1.0) == OtherLaw()
 
 

@@ -1,17 +1,17 @@
 """Whether what is named depends on speed and time as its effect does, or by another law.
 
 Drag that grows with the root of the speed looks much like a delay, whose offset grows with the speed itself, and one
-that fades with it like play, which is alike at all speeds; so does drag that wears in, while play stays. What is left
-of the one by the other is small, far less than an inexact shape may leave, so that no description without physics wins
-against the catalogue. But a delay fits a delay to the last digit: of two laws with the same freedom the right one
-explains more, clearly, as soon as there are two speeds, or a few reversals.
+that fades with it like play, which is alike at all speeds; so does drag that wears in, while play stays, and an error
+that is larger in one direction, whose mean is an offset. What is left of the one by the other is small, far less than
+an inexact shape may leave, so that no description without physics wins against the catalogue. But a delay fits a delay
+to the last digit: of two laws with the same freedom the right one explains more, clearly, as soon as there are two
+speeds, or a few reversals.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from hdopt.diagnosis.inference.catalogue import properties_of
 from hdopt.diagnosis.inference.fit import Fit
@@ -21,8 +21,8 @@ from hdopt.diagnosis.numerical import HALF
 
 @dataclass(frozen=True)
 class OtherLaw:
-    """By how much log evidence another law, `of` the speed or the time, explains better than that of term `index`; 0
-    where none does."""
+    """By how much log evidence another law, `of` the speed, the time or the direction, explains better than that of
+    term `index`; 0 where none does."""
 
     index: int = 0
     log_evidence: float = 0.0
@@ -31,11 +31,12 @@ class OtherLaw:
 
 def other_law(fit: Fit, inflation: float) -> OtherLaw:
     """The term of `fit` whose own law is beaten most by another, everything else fitted anew in one linear step, in
-    noise rougher by `inflation`; each other law that is tried costs its odds.
+    noise rougher by `inflation`; each other law that is tried costs its odds, and coefficients beyond the term's own
+    cost theirs by Schwarz's criterion.
     """
     found = OtherLaw()
     for index, term in enumerate(fit.terms):
-        laws = properties_of(term.effect).other_laws(fit.problem.rows, term)
+        laws = properties_of(term.effect).other_laws(fit.problem.rows, term, fit.motion)
         tried = sum(len(columns) for columns in laws.values())
         if not tried:
             continue
@@ -44,7 +45,8 @@ def other_law(fit: Fit, inflation: float) -> OtherLaw:
         for of, each in laws.items():
             for columns in each:
                 gain = probe.gain(replace(term, columns=columns, steps={}, kept=False))
-                better = HALF * (gain - own) / inflation - float(np.log(tried))
+                freedom = max(columns.shape[1] - term.width, 0) * math.log(fit.problem.weighed_rows)
+                better = HALF * ((gain - own) / inflation - freedom) - math.log(tried)
                 if better > found.log_evidence:
                     found = OtherLaw(index, better, of)
     return found

@@ -266,8 +266,8 @@ def named_and_beaten(findings: Findings) -> Conclusion:
 
 
 def not_by_its_law(findings: Findings) -> Conclusion:
-    """What is there resembles an effect, but follows another law of speed or time. `findings` hold the facts and the
-    evidence behind them.
+    """What is there resembles an effect, but follows another law of speed, time or direction. `findings` hold the facts
+    and the evidence behind them.
     """
     evidence = findings.evidence
     best, index, of = evidence.selection.best, evidence.other_law.index, evidence.other_law.of
