@@ -544,8 +544,9 @@ class VerdictSettings:
     contact_as_built: float = threshold(
         0.2,
         "1",
-        "choice: wave of k_e round the turn beyond which no contact varies; drives built so on the bench have 0.02 to "
-        "0.08, and what follows another law of the error came out at 0.3 and 0.5 (16 of run-019, 508 of run-018)",
+        "choice: waves of k_e round the turn, together, beyond which no contact varies; drives built so on the bench "
+        "have 0.02 to 0.08 in each, and what follows another law of the error came out at 0.24 to 0.5 (78 of run-021, "
+        "16 of run-019, 508 of run-018)",
     )
     listed_beside_a_tie: float = threshold(
         10.0, "1", "choice: log evidence within which a set that fits no worse is listed where there is a tie anyway"

@@ -61,8 +61,8 @@ class Facts:
     record cannot say even that the base is adequate. `rivals`: other sets that are as good, placebo and perfect
     imitations among them; `scale_as_good`: so is a ratio or gain that is off, alone, and `hum_as_good`: hum of the
     mains in an effect's place. `described_better`: log evidence by which a description without physics explains more
-    than the best set, if the shapes of that are exact. `contact`: the largest wave of a k_e that varies round the
-    turn, as the best set has it. `far_base`: the drive that is fitted beside what is said lies far outside the
+    than the best set, if the shapes of that are exact. `contact`: the waves of a k_e that varies round the turn,
+    together, as the best set has them. `far_base`: the drive that is fitted beside what is said lies far outside the
     tolerances of its kind; `together`: power of what the best set's effects do together, over the sum of what each
     does. `heldout_over_floor`: error on turns that were hidden from the fit (cross-validated where none could be
     spared) over what a generic basis leaves; `found_again`: what is said is preferred without those turns too;
@@ -203,7 +203,7 @@ def find(evidence: Evidence) -> Findings:
         scale_as_good=scale_is_as_good(evidence),
         hum_as_good=hum is not None,
         described_better=ahead_without_physics(evidence),
-        contact=max(varying_contact(best.fit), default=0.0),
+        contact=math.hypot(*varying_contact(best.fit)),
         far_base=far_errors(best.fit) != "",
         together=power_together(best),
         log_evidence=best.log_bayes_factor,
