@@ -544,8 +544,8 @@ class VerdictSettings:
     contact_as_built: float = threshold(
         0.2,
         "1",
-        "choice: waves of k_e round the turn, together, beyond which no contact varies; drives built so on the bench "
-        "have 0.02 to 0.08 in each, and what follows another law of the error came out at 0.24 to 0.5 (78 of run-021, "
+        "choice: waves of k_e round the turn, together, beyond which no contact varies; five drives built so on the "
+        "bench have 0.05 to 0.11, and what follows another law of the error came out at 0.24 to 0.5 (78 of run-021, "
         "16 of run-019, 508 of run-018)",
     )
     listed_beside_a_tie: float = threshold(

@@ -9,6 +9,7 @@ import pytest
 from test_effect_physics import GEAR, RATIO, moving
 
 from hdopt.effects import EFFECTS, catalogue
+from hdopt.effects.base import Effect
 from hdopt.effects.declared import Quantity, Sines
 from hdopt.effects.estimate import FitEstimate
 from hdopt.effects.term import Term
@@ -196,3 +197,73 @@ def test_ripple_has_as_many_waves_below_the_mesh_as_above_it():
     """Each set of sidebands is even about the mesh: teeth that differ modulate its height and its place."""
     for sides in (*SIDEBANDS, *ZONE_SIDEBANDS):
         assert sides[0] == 0 and sorted(sides) == sorted(-k for k in sides) and len(set(sides)) == len(sides)
+
+
+class Dropped(Effect):
+    """A number and a sine that are declared and nothing else, as of an effect in one file."""
+
+    id = "dropped"
+    domain = "order"
+    separating = "look"
+    declared = (
+        Quantity("size_um", "um", "how large", "s", (0.0, 10.0), scale=4.0),
+        Sines({3: ("wave_um", "wave_phase_deg")}, "um", "of arc", prior=(0.0, 10.0), scale=1e-3),
+    )
+
+
+def test_what_is_only_declared_is_said_too():
+    """A coefficient times its scale, and of its sine both numbers: 3 and 4 um are 5 um at the angle whose tangent is
+    4/3. Faults caught: a number that is left out, or taken from the place of another."""
+    term = Term("dropped", {}, columns=np.ones((3, 3)))
+    said = Dropped().parameters(term, FitEstimate(np.array([1.5, 3e-3, 4e-3]), 1e-12 * np.eye(3)))
+    assert {name: (one.value, one.unit) for name, one in said.items()} == {
+        "size_um": (pytest.approx(6.0), "um"),
+        "wave_um": (pytest.approx(5.0), "um"),
+        "wave_phase_deg": (pytest.approx(53.130, abs=1e-3), "deg"),
+    }
+
+
+@pytest.mark.parametrize(("first", "shows"), [(0.11, True), (0.09, False)])
+def test_an_eccentric_encoder_shows_its_first_order(first, shows):
+    """A tenth of the second at least: without it the second is another effect's."""
+    term = Term("encoder_output_eccentricity", {"shaft": "output", "orders": (1, 2)}, columns=np.ones((3, 4)))
+    values = np.array([0.0, first, 0.6, 0.8])
+    assert EFFECTS["encoder_output_eccentricity"].every_part_shows(term, FitEstimate(values, np.eye(4))) is shows
+
+
+def test_a_folder_of_effects_must_be_there(tmp_path, monkeypatch):
+    monkeypatch.setenv(catalogue.FOLDERS, str(tmp_path))
+    path = []
+    assert catalogue.find_effects(path, "hdopt.effects") == {}
+    assert path == [str(tmp_path)]
+    monkeypatch.setenv(catalogue.FOLDERS, str(tmp_path / "none"))
+    with pytest.raises(HdoptError, match="which is no folder; correct it or unset HDOPT_EFFECTS"):
+        catalogue.find_effects([], "hdopt.effects")
+
+
+@pytest.mark.parametrize(("sine", "cosine", "skew"), [(0.2, -1.0, 0.1), (-0.3, -1.0, -0.15), (3.0, -1.0, 0.5)])
+def test_a_wave_of_the_mesh_becomes_a_form_of_all_teeth(sine, cosine, skew):
+    """h ((1 - cos p)/2 + s sin p) varies as -h/2 cos p + h s sin p: s is minus the sine over twice the cosine, as far
+    as a form may be skewed. The second form has none and begins where the wave is lowest."""
+    term = Term("tooth_mesh", {"sidebands": (0,), "zones": True}, columns=np.ones((3, 4)))
+    coefficients = np.array([sine, cosine, sine, cosine])
+    skewed, straight = EFFECTS["tooth_mesh"].tooth_by_tooth(term, coefficients, 30.0)
+    assert (len(skewed["heights"]), skewed["skew"], skewed["start"]) == (62, pytest.approx(skew), 0.0)
+    assert skewed["heights"][0] == pytest.approx(2 * np.hypot(sine, cosine))
+    assert straight["skew"] == 0.0
+    lowest = 2 * np.pi * straight["start"]
+    assert sine * np.sin(lowest) + cosine * np.cos(lowest) == pytest.approx(-np.hypot(sine, cosine))
+
+
+def test_a_drive_that_stands_has_no_other_law_of_the_speed():
+    """Fault caught: a division by no speed."""
+    still = replace(RECORD, speed=np.zeros(len(RECORD)))
+    term = Term("channel_delay", {}, columns=np.zeros((len(still), 1)))
+    for columns in EFFECTS["channel_delay"].other_laws(still, term, np.zeros(len(still)))["speed"]:
+        assert np.all(columns == 0)
+
+
+def test_friction_of_a_locked_input_is_tried_at_each_friction_and_knee():
+    locked = replace(RECORD, locked=True)
+    term = EFFECTS["hysteresis"].term(locked, {"friction_nm": 5.0, "knee_nm": 3.0})
+    assert term.trials == 36
