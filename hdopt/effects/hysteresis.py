@@ -16,11 +16,9 @@ from dataclasses import replace
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.effects._direction_laws import columns_by_direction
 from hdopt.effects._friction_law import LAWS, NAMES, Law
 from hdopt.effects._friction_torque import friction_columns, half_loop, passes_of
-from hdopt.effects._speed_laws import columns_by_speed
-from hdopt.effects._time_laws import columns_by_time
+from hdopt.effects._offset_laws import laws_of_offset
 from hdopt.effects.base import Effect, terms_at
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Category, Quantity
@@ -123,11 +121,7 @@ class Hysteresis(Effect):
         return [{**shape, "model": law} for law in NAMES if law != shape["model"]]
 
     def other_laws(self, conditions: Conditions, term: Term, motion: Array) -> Mapping[str, Sequence[Array]]:
-        return {
-            "speed": columns_by_speed(conditions, term),
-            "time": columns_by_time(conditions, term),
-            "direction": columns_by_direction(conditions, term, motion),
-        }
+        return laws_of_offset(conditions, term, motion)
 
     def predict(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
         """The term of a drive that has run in: no limits by a record, no unknown start."""

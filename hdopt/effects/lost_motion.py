@@ -16,9 +16,7 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
-from hdopt.effects._direction_laws import columns_by_direction
-from hdopt.effects._speed_laws import columns_by_speed
-from hdopt.effects._time_laws import columns_by_time
+from hdopt.effects._offset_laws import laws_of_offset
 from hdopt.effects.base import Effect, Keys
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Quantity, needed, number, polar, sine_and_cosine
@@ -92,11 +90,7 @@ class LostMotion(Effect):
         return Term(self.id, dict(shape), columns=np.column_stack(parts), trials=3.0 if "order" in shape else 1.0)
 
     def other_laws(self, conditions: Conditions, term: Term, motion: Array) -> Mapping[str, Sequence[Array]]:
-        return {
-            "speed": columns_by_speed(conditions, term),
-            "time": columns_by_time(conditions, term),
-            "direction": columns_by_direction(conditions, term, motion),
-        }
+        return laws_of_offset(conditions, term, motion)
 
     def highest_order(self, shape: Shape, ratio: float) -> float:
         return float(shape.get("order", 0))

@@ -99,16 +99,15 @@ def test_play_and_friction_are_alike_at_all_speeds(effect, shape):
     assert other_law(shifted(effect, shape, np.sqrt, speeds=(1.0, 1.1)), 1.0) == OtherLaw()
 
 
-def worn_in(effect, shape, law, reversals=3):
-    """The fit of `effect` at `shape` to one record there and back, of so many `reversals`, in which the two directions
-    lie 0.3 arcmin apart at first, by a `law` of the part of the record that has gone by."""
+def there_and_back(effect, shape, hidden, passes=4):
+    """The fit of `effect` at `shape` to one record of so many `passes` of 20 turns, in which `hidden` adds to the
+    drive's own error: a function of that error, the direction and the part of the record that has gone by."""
     study = load_study(drive="csf-25-80")
     there = np.arange(20 * 60) * 2 * np.pi / 60
-    passes = [there if i % 2 == 0 else there[::-1] for i in range(reversals + 1)]
-    theta = np.concatenate(passes) + 0.2
-    direction = np.repeat([1.0 if i % 2 == 0 else -1.0 for i in range(reversals + 1)], len(there))
-    part = np.arange(len(theta)) / len(theta)
-    error = kinematic_error_arcmin(study.drive, study.errors, theta) + 0.15 * direction * law(part)
+    theta = np.concatenate([there if i % 2 == 0 else there[::-1] for i in range(passes)]) + 0.2
+    direction = np.repeat([1.0 if i % 2 == 0 else -1.0 for i in range(passes)], len(there))
+    own = kinematic_error_arcmin(study.drive, study.errors, theta)
+    error = own + hidden(own, direction, np.arange(len(theta)) / len(theta))
     error = error + np.random.default_rng(2).normal(0, 0.02, len(theta))
     table = {
         "time_s": np.arange(len(theta)) * 0.1,
@@ -117,6 +116,11 @@ def worn_in(effect, shape, law, reversals=3):
     }
     state = begin([recording_from_table(pd.DataFrame(table), 80.0)], CartesianModel.of(study.drive), 1, DEFAULT)
     return joint_fit(state.base, [EFFECTS[effect].term(state.problem.rows, shape)])
+
+
+def worn_in(effect, shape, law, passes=4):
+    """Of two directions that lie 0.3 arcmin apart at first, by a `law` of the part of the record that has gone by."""
+    return there_and_back(effect, shape, lambda own, direction, part: 0.15 * direction * law(part), passes)
 
 
 @pytest.mark.parametrize(("effect", "shape"), SHIFTS)
@@ -129,26 +133,12 @@ def test_play_and_friction_do_not_wear_in(effect, shape):
         assert found.log_evidence > 2 * DEFAULT.verdict.other_law
         assert found.of == "time"
     assert other_law(worn_in(effect, shape, np.ones_like), 1.0) == OtherLaw()
-    assert other_law(worn_in(effect, shape, lambda part: np.exp(-part / 0.2), reversals=1), 1.0) == OtherLaw()
+    assert other_law(worn_in(effect, shape, lambda part: np.exp(-part / 0.2), passes=2), 1.0) == OtherLaw()
 
 
 def larger_one_way(effect, shape, share, offset):
-    """The fit of `effect` at `shape` to one record there and back twice, whose error is larger by a `share` of itself
-    forwards than backwards, and an `offset` (arcmin) apart besides."""
-    study = load_study(drive="csf-25-80")
-    there = np.arange(20 * 60) * 2 * np.pi / 60
-    theta = np.concatenate([there, there[::-1], there, there[::-1]]) + 0.2
-    direction = np.repeat([1.0, -1.0, 1.0, -1.0], len(there))
-    own = kinematic_error_arcmin(study.drive, study.errors, theta)
-    error = own * (1 + share / 2 * direction) + offset / 2 * direction
-    error = error + np.random.default_rng(3).normal(0, 0.02, len(theta))
-    table = {
-        "time_s": np.arange(len(theta)) * 0.1,
-        "input_angle_deg": np.degrees(theta),
-        "output_angle_deg": np.degrees(theta / 80 - error * ARCMIN),
-    }
-    state = begin([recording_from_table(pd.DataFrame(table), 80.0)], CartesianModel.of(study.drive), 1, DEFAULT)
-    return joint_fit(state.base, [EFFECTS[effect].term(state.problem.rows, shape)])
+    """Of an error that is larger by a `share` of itself forwards than backwards, and an `offset` (arcmin) apart."""
+    return there_and_back(effect, shape, lambda own, direction, part: (share * own + offset) / 2 * direction)
 
 
 @pytest.mark.parametrize(("effect", "shape"), SHIFTS)

@@ -52,9 +52,10 @@ def find_ripple(
 
     if (without_mesh := mesh_taken_out(found)) is not None:
         high, inside = ripple_beside(*without_mesh)
-        left = left_as_recorded(recordings, found.best.fit, nuisances).rows.error
-        if high is not None and inside is not None and np.var(inside.fit.residual) < np.var(left):
-            return high.with_best_fit(inside.fit), inside.adds
+        if high is not None and inside is not None:
+            left = left_as_recorded(recordings, found.best.fit, nuisances).rows.error
+            if np.var(inside.fit.residual) < np.var(left):
+                return high.with_best_fit(inside.fit), inside.adds
     high, inside = ripple_beside(found, None)
     if high is None or not high.best.fit.terms:
         return high, None
