@@ -21,6 +21,7 @@ import numpy as np
 from hdopt.arrays import Array, Mask
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut, hidden_samples, shares_of_samples, without_samples
+from hdopt.diagnosis.inference.read_angle import where_it_stood
 from hdopt.diagnosis.orientation import turn_round
 from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.high_order import subtract
@@ -158,10 +159,11 @@ def ripple_of(recordings: Sequence[Recording], state: State) -> Array:
         return np.zeros(len(raw))
     low, high = state.selection.best.fit, state.high.best.fit
     problem = on_rows(low.problem, raw, state)
-    terms = terms_on(problem, low, [*low.terms, *high.terms])
+    below = terms_on(problem, low, low.terms)
+    alone = evaluate(problem, low.errors, low.offsets, below, low.coefficients)
+    above = terms_on(replace(problem, rows=where_it_stood(raw, alone.ahead)), low, high.terms)
     inside = [*low.coefficients, *high.coefficients]
-    both = evaluate(problem, low.errors, low.offsets, terms, inside)
-    alone = evaluate(problem, low.errors, low.offsets, terms[: len(low.terms)], low.coefficients)
+    both = evaluate(problem, low.errors, low.offsets, [*below, *above], inside)
     return both.prediction - alone.prediction
 
 

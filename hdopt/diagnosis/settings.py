@@ -35,6 +35,9 @@ class FitSettings:
     damping_least: float = threshold(1e-9, "1", "choice: smallest damping")
     shape_share: float = threshold(0.3, "1", "choice: largest step of a shape parameter over its value")
     shape_steps: float = threshold(20.0, "1", "choice: largest step of a shape parameter over its derivative's step")
+    reading_step_rad: float = threshold(
+        1e-3, "rad", "choice: step of the input angle for the slope of the drive's error"
+    )
     shape_rounds: int = threshold(4, "1", "choice: effort; shapes moved one by one, then together")
     shape_strides: tuple[float, ...] = threshold(
         (0.1, 0.3, 1.0, 3.0, 6.0), "steps", "choice: moves of one shape alone, from a jag to a node of the grid"

@@ -63,6 +63,9 @@ class ShaftSine(Effect):
         size = np.hypot(estimate.values[0 : term.width : 2], estimate.values[1 : term.width : 2])
         return bool(size[0] > LEAST_PART * size.max())
 
+    def reads_input(self, shape: Shape) -> bool:
+        return bool(shape.get("shaft") == Shaft.INPUT)
+
     def orders(self, shape: Shape, ratio: float) -> list[float]:
         return [k if shape["shaft"] == Shaft.INPUT else k / ratio for k in shape["orders"]]
 

@@ -97,6 +97,10 @@ class Explanation(ABC):
         """Shapes of the same inside the meshing zones, to be tried in its place; none for most."""
         return ()
 
+    def reads_input(self, shape: Shape) -> bool:
+        """Whether at `shape` it is an error of the input angle as it is read: by so much the drive stands elsewhere."""
+        return False
+
     def other_laws(self, conditions: Conditions, term: Term, motion: Array) -> Mapping[str, Sequence[Array]]:
         """Columns like those of its `term`, each (n, p), by other laws than its own, those of the "speed", the "time"
         and the "direction"; none for most. Where one of these explains better, it is not this effect that is there.

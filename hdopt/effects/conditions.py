@@ -34,7 +34,8 @@ class Conditions:
     input, rad/s, with its sign; `torque` at the output, Nm, above 0 where it opposes positive rotation;
     `temperature`, deg C, or K from a reference; each of the last four None where nobody knows it. `locked`: the input
     stands still and the torque moves. `averaged`: samples behind a row, on average. `output_step`: step of the output's
-    encoder, arcmin, where it is coarser than all else, else 0.
+    encoder, arcmin, where it is coarser than all else, else 0. `input_read`: input angle as its encoder read it, rad,
+    where `theta` is another, at which the drive stood; else None.
     """
 
     ratio: float
@@ -52,6 +53,7 @@ class Conditions:
     locked: bool = False
     averaged: float = 1.0
     output_step: float = 0.0
+    input_read: Array | None = None
 
     def __len__(self) -> int:
         return len(self.theta)
@@ -60,6 +62,11 @@ class Conditions:
     def remembered(self) -> dict[Hashable, Term]:
         """Terms made for these rows at shapes that every search looks at."""
         return {}
+
+    @property
+    def input_as_read(self) -> Array:
+        """Input angle as its encoder read it, rad, (n,)."""
+        return self.theta if self.input_read is None else self.input_read
 
     def waves_of_input(self, most: int) -> Array:
         """sin and cos of one to so many waves an input turn (`most`), (n, 2 most), made once: what follows the motion

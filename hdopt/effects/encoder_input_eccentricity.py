@@ -2,7 +2,9 @@
 
 A code wheel of diameter D whose centre lies e beside its axis is read wrong by (2 e/D) sin(theta + phi), that is
 412.5 arcsec times e (um) over D (mm) (HEIDENHAIN, "Angle encoders", section on mounting accuracy: 412 e/D). At the
-output it appears divided by N. Units: amplitude arcmin at the output. Prior: 0 to 2 arcmin.
+output it appears divided by N. Where it is read the drive stands N times that beside it: a diagnosis fits the drive,
+its damaged teeth and its mesh there, a waveform that is computed from a study does not. Units: amplitude arcmin at the
+output. Prior: 0 to 2 arcmin.
 """
 
 from __future__ import annotations

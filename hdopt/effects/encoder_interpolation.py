@@ -151,7 +151,7 @@ class EncoderInterpolation(Effect):
 
     def term(self, conditions: Conditions, shape: Shape, motion: Array | None = None, trials: float = 1000.0) -> Term:
         output = shape["shaft"] == Shaft.OUTPUT
-        angle = conditions.output if output else conditions.theta
+        angle = conditions.output if output else conditions.input_as_read
         columns = sine_columns(angle, [float(m * shape["lines"]) for m in shape["cycles"]])
         odds = FEW_LINES_ODDS if shape["lines"] < FEW_LINES else 0.0
         order = shape["lines"] / (conditions.ratio if output else 1.0)
@@ -162,6 +162,9 @@ class EncoderInterpolation(Effect):
     def is_part_of(self, shape: Shape, other: Shape) -> bool:
         """Whether `shape` has the lines of an encoder of which `other` holds a multiple."""
         return bool(shape["shaft"] == other["shaft"] and other["lines"] % shape["lines"] == 0)
+
+    def reads_input(self, shape: Shape) -> bool:
+        return bool(shape.get("shaft") == Shaft.INPUT)
 
     def orders(self, shape: Shape, ratio: float) -> list[float]:
         order = shape["lines"] / (ratio if shape["shaft"] == Shaft.OUTPUT else 1.0)

@@ -7,4 +7,11 @@ ROOMS = {
     "effects": 0.90,
     "recordings": 0.90,
     "diagnosis": 0.85,
+    "allocation": 0.90,
+    "compensation": 0.90,
+    "drive": 0.90,
+    "optimize": 0.90,
+    "simulation": 0.90,
+    "study": 0.90,
+    "workflow": 0.90,
 }

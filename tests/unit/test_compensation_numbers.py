@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hdopt.compensation.path import crossing_of, half_about, half_return, path_of, paths_of
+from hdopt.compensation.pursuit import independent_share
 from hdopt.compensation.surface import AT_ONCE, Crossing, Harmonics, grid_angles, nothing, surface_of
 from hdopt.compensation.writers import crosses, homing_arcmin
 from hdopt.compensation.zones import zone_values
@@ -195,3 +196,17 @@ def test_each_recording_has_its_own_extremes_and_its_speed_by_the_minute():
     assert (a.name, a.speed_rpm, a.before, a.after, a.expected) == ("a", pytest.approx(60.0), 1.0, 0.2, 0.3)
     assert (a.low, a.high) == (pytest.approx(0.3 - 0.196, rel=1e-3), pytest.approx(0.3 + 0.196, rel=1e-3))
     assert (b.name, b.speed_rpm, b.before, b.after, b.expected) == ("b", pytest.approx(120.0), 4.0, 1.0, 1.1)
+
+
+@pytest.mark.parametrize("r", [0.0, 0.3, 0.8, -0.5])
+def test_noise_that_stays_alike_holds_fewer_independent_values(r):
+    """(1 - r)/(1 + r) of an autoregression of first order (Bartlett); noise that turns over holds no more than there
+    are. Faults caught: products that are not divided by the power, a lag of none, more values than there are."""
+    fresh = np.random.default_rng(5).normal(size=200_000)
+    left = np.empty_like(fresh)
+    left[0] = fresh[0]
+    for i in range(1, len(fresh)):
+        left[i] = r * left[i - 1] + fresh[i]
+    expected = (1 - max(r, 0.0)) / (1 + max(r, 0.0))
+    # Four standard errors of a first autocorrelation, 1/sqrt(n), twice over in the share.
+    assert independent_share(1e-3 * left) == pytest.approx(expected, abs=8 / math.sqrt(len(left)))

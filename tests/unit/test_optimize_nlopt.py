@@ -50,6 +50,43 @@ class Spoilt(Bowl):
         return self.spoil(u, found) if self.calls > self.after else found
 
 
+def test_every_code_of_nlopt_has_its_words():
+    """By NLopt's own names of them. Faults caught: a code that is missing, or whose sign is lost, by which a search
+    that ended so breaks at its last word; words of another code."""
+    said = {
+        "SUCCESS": "converged",
+        "STOPVAL_REACHED": "wanted value",
+        "FTOL_REACHED": "value no longer changes",
+        "XTOL_REACHED": "design no longer changes",
+        "MAXEVAL_REACHED": "evaluations allowed",
+        "MAXTIME_REACHED": "time allowed",
+        "FAILURE": "failed",
+        "INVALID_ARGS": "refused its arguments",
+        "OUT_OF_MEMORY": "out of memory",
+        "ROUNDOFF_LIMITED": "rounding",
+        "FORCED_STOP": "stopped",
+    }
+    assert set(REASONS) == {getattr(nlopt, name) for name in said}
+    for name, words in said.items():
+        assert words in REASONS[getattr(nlopt, name)]
+
+
+@pytest.mark.parametrize("algorithm", LOCAL)
+def test_every_local_method_finds_an_optimum_below_zero(algorithm):
+    """A bowl whose least value is -250 at a start of 5: the level of the epigraph goes below zero, and farther than
+    its own size. Fault caught: its bound is a share of where it starts."""
+
+    class Deep(Bowl):
+        def evaluate(self, u, slopes=True):
+            found = super().evaluate(u, slopes)
+            return Evaluation(
+                600 * (found.pieces - 1) - 250, 600 * found.piece_slopes, found.constraints, found.constraint_slopes
+            )
+
+    outcome = minimise(Deep(), np.array([0.9, 0.35]), algorithm, Effort(evaluations=2000))
+    assert outcome.evaluation.objective == pytest.approx(-250, abs=0.5)
+
+
 @pytest.mark.parametrize("algorithm", LOCAL)
 def test_every_local_method_finds_the_constrained_optimum(algorithm):
     outcome = minimise(Bowl(at_least=0.5), np.array([0.9, 0.1]), algorithm, Effort(evaluations=500))

@@ -63,6 +63,13 @@ def test_a_class_outside_its_scope_says_so():
         "module 0.5 to 70 (here 0.396)",
     )
     assert len(iso_1328_tolerances(5, 0.5, Z).beyond) == 1
+    # The upper ends: 71 mm of module, a diameter of 25560 mm and, of another gear, 1001 teeth.
+    assert iso_1328_tolerances(5, 71.0, 360).beyond[1:] == (
+        "module 0.5 to 70 (here 71)",
+        "diameter 5 to 15000 (here 2.556e+04)",
+    )
+    assert iso_1328_tolerances(5, 1.0, 1001).beyond[1:] == ("teeth 5 to 1000 (here 1001)",)
+    assert len(iso_1328_tolerances(5, 1.0, 1000).beyond) == 1
     with pytest.raises(DriveError, match="the classes 1 to 11, not 12"):
         iso_1328_tolerances(12, 1.0, Z)
 

@@ -66,6 +66,7 @@ def test_constants_are_followed_where_someone_asks(result, monkeypatch, key, ask
     monkeypatch.setattr("hdopt.workflow.search.find_regions", lambda *_: calls.append(1) or Regions((), ()))
     found = search(study(f"search.regions={key}"), regions=asked)
     assert (len(calls), found.regions is not None) == (followed, bool(followed))
+    assert ("regions" in found.to_dict()) == bool(followed)
     monkeypatch.setattr("hdopt.report.sections.search._checked_figures", lambda _: {})
     section = confidence_section(found, SimpleNamespace(fresh=None))
     words = [item.text for item in section.items if isinstance(item, Text)]

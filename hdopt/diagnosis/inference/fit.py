@@ -27,13 +27,15 @@ from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.newey_west import newey_west, reach_95
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.normal_equations import GroupedColumns, bordered, solved, sums_of_groups
+from hdopt.diagnosis.inference.read_angle import read_ahead, reads_input
 from hdopt.diagnosis.numerical import NORMAL_95, TINY
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
+from hdopt.drive.geometry import ARCMIN
 from hdopt.effects.base import Explanation
 from hdopt.effects.estimate import FitEstimate
 from hdopt.effects.met import ToothForms, met_angles, sum_of
 from hdopt.effects.term import Shape, Term
-from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel
+from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel, Evaluated
 from hdopt.recordings.rows import Rows
 
 
@@ -67,12 +69,19 @@ class FitProblem:
         """The rows' angles as the base takes them, (n, 4); none for a gear without a base."""
         return np.empty((len(self.rows), 0)) if self.base is None else self.base.rotation(self.rows.theta)
 
-    def met_angles(self, errors: Array) -> Array:
-        """Angles of both splines at which both zones of a base with these `errors` (12,) mm meet them, rad,
-        (2, 2, n)."""
+    def rotation_behind(self, ahead: Array | None) -> Array:
+        """`rotation` where the input angle was read `ahead` of where the drive stood, rad, (n,); None: nowhere."""
+        if ahead is None or self.base is None:
+            return self.rotation
+        return self.base.rotation(self.rows.theta - ahead)
+
+    def met_angles(self, errors: Array, ahead: Array | None = None) -> Array:
+        """Angles of both splines at which both zones of a base with these `errors` (12,) mm meet them, rad, (2, 2, n),
+        where the input angle was read `ahead` (n,) of where the drive stood, rad (None: nowhere)."""
         if self.base is None:
             raise ValueError("a gear without a base has no meshing zones")
-        return met_angles(self.rows.theta, self.base.advance, self.base.beyond_at(self.rotation, errors))
+        theta = self.rows.theta if ahead is None else self.rows.theta - ahead
+        return met_angles(theta, self.base.advance, self.base.beyond_at(self.rotation_behind(ahead), errors))
 
     @property
     def base_width(self) -> int:
@@ -105,7 +114,8 @@ class FitProblem:
 @dataclass(frozen=True)
 class Fit:
     """A fitted model: base errors (mm), offsets, terms with coefficients; prediction and residual in arcmin;
-    `objective` the whitened sum of squares plus the prior's, `design` the columns of the linearised model."""
+    `objective` the whitened sum of squares plus the prior's, `design` the columns of the linearised model. `ahead`: by
+    how much the terms say that the input angle was read ahead of where the drive stood, rad, (n,), None for nowhere."""
 
     problem: FitProblem
     errors: Array
@@ -117,15 +127,21 @@ class Fit:
     prediction: Array
     objective: float
     base_jacobian: Array
+    ahead: Array | None = None
 
     @property
     def residual(self) -> Array:
         return self.problem.rows.error - self.prediction
 
     @cached_property
+    def met_angles(self) -> Array:
+        """Angles of both splines at which both zones meet them, rad, (2, 2, n)."""
+        return self.problem.met_angles(self.errors, self.ahead)
+
+    @cached_property
     def met_angle(self) -> Array:
         """Angles of both splines at which the driving zone meets them, rad, (2, n)."""
-        angles = self.problem.met_angles(self.errors)
+        angles = self.met_angles
         chosen: Array = np.where(self.zone == 0, angles[:, 0], angles[:, 1])
         return chosen
 
@@ -133,6 +149,21 @@ class Fit:
     def motion(self) -> Array:
         """The drive's motion before its spring, arcmin, (n,): what excites a resonance."""
         return motion_of(self.base_value, self.terms, self.coefficients)
+
+    @cached_property
+    def of_a_reading(self) -> Array:
+        """What an error of the input angle's reading, 1 arcmin at the output, adds to the record, arcmin, (n,): itself,
+        less what the drive would do where it was read and did not where it stood."""
+        if self.problem.base is None:
+            return np.ones(len(self.problem.rows))
+        ahead = np.zeros(len(self.problem.rows)) if self.ahead is None else self.ahead
+        step = self.problem.settings.fit.reading_step_rad
+        behind, before = (
+            _base_value(self.problem, self.errors, self.terms, self.coefficients, ahead + side)[0]
+            for side in (step, -step)
+        )
+        slope: Array = (before - behind) / (2 * step)
+        return 1 - ARCMIN * self.problem.rows.ratio * slope
 
     def all_but(self, index: int) -> list[int]:
         """The numbers of the terms without `index`: what to keep beside it."""
@@ -301,7 +332,9 @@ def term_columns(term: Term, fit: Fit) -> Array:
     if base is not None and term.zones is not None:
         columns: Array = base.arcmin_per_mm * np.where((zone == 0)[:, None], term.zones[0], term.zones[1])
         return columns
-    return term.columns if term.columns is not None else np.zeros((len(zone), term.width))
+    if term.columns is None:
+        return np.zeros((len(zone), term.width))
+    return term.columns * fit.of_a_reading[:, None] if reads_input(term) else term.columns
 
 
 def shape_columns(fit: Fit, index: int) -> Array:
@@ -327,9 +360,9 @@ def evaluate(
     (q,), and `terms` with their `coefficients`.
     """
     rows = problem.rows
+    ahead = read_ahead(rows, terms, coefficients)
     if problem.base is not None:
-        extra, rises = _in_zones(problem, errors, terms, coefficients)
-        base_value, zone, jacobian = problem.base.evaluate_at(problem.rotation, errors, extra, rises)
+        base_value, zone, jacobian = _base_value(problem, errors, terms, coefficients, ahead)
     else:
         base_value, zone, jacobian = (
             np.zeros(len(rows)),
@@ -345,16 +378,25 @@ def evaluate(
     objective = float(white @ white)
     if problem.base is not None:
         objective += problem.noise.sigma**2 * float(np.sum((errors / problem.prior) ** 2))
-    return Fit(
-        problem, errors, offsets, tuple(terms), tuple(coefficients), base_value, zone, prediction, objective, jacobian
-    )
+    kept = tuple(coefficients)
+    return Fit(problem, errors, offsets, tuple(terms), kept, base_value, zone, prediction, objective, jacobian, ahead)
+
+
+def _base_value(
+    problem: FitProblem, errors: Array, terms: Sequence[Term], coefficients: Sequence[Array], ahead: Array | None
+) -> Evaluated:
+    """The base of `problem`, which it must have, with these `errors` and what `terms` add in its zones, where the input
+    angle was read `ahead` (n,) of where the drive stood, rad (None: nowhere)."""
+    assert problem.base is not None
+    extra, rises = _in_zones(problem, errors, terms, coefficients, ahead)
+    return problem.base.evaluate_at(problem.rotation_behind(ahead), errors, extra, rises)
 
 
 def _in_zones(
-    problem: FitProblem, errors: Array, terms: Sequence[Term], coefficients: Sequence[Array]
+    problem: FitProblem, errors: Array, terms: Sequence[Term], coefficients: Sequence[Array], ahead: Array | None
 ) -> tuple[Array | None, Array | None]:
     """What `terms` add to the deviation of both zones, mm of arc, (2, n), and its slopes over the angles at which the
-    splines are met, mm/rad, (2, 2, n); None where nothing does."""
+    splines are met, mm/rad, (2, 2, n); None where nothing does. `ahead` as in `_base_value`."""
     extra: Array | None = None
     rises: Array | None = None
     on_splines = []
@@ -364,7 +406,7 @@ def _in_zones(
         elif term.zones is not None:
             extra = term.zones @ c if extra is None else extra + term.zones @ c
     if on_splines:
-        added, rises = sum_of(on_splines, problem.met_angles(errors))
+        added, rises = sum_of(on_splines, problem.met_angles(errors, ahead))
         extra = added if extra is None else extra + added
     return extra, rises
 

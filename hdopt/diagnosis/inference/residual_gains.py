@@ -14,6 +14,7 @@ from hdopt.arrays import Array
 from hdopt.diagnosis.inference.base_excitation import excites, is_driven
 from hdopt.diagnosis.inference.fit import Fit, side_by_side
 from hdopt.diagnosis.inference.normal_equations import orthonormal, solved
+from hdopt.diagnosis.inference.read_angle import reads_input
 from hdopt.diagnosis.numerical import RIDGE, TINY
 from hdopt.effects.term import Term
 from hdopt.recordings.read import TURN
@@ -90,7 +91,7 @@ class FitProbe:
     def _whitened(self, term: Term) -> tuple[Array, Array]:
         """The term's whitened columns and their inner products."""
         known = self.fit.problem.whitened
-        alone = term.kept and not term.in_zones and not (self.swings and excites(term))
+        alone = term.kept and not (term.in_zones or reads_input(term)) and not (self.swings and excites(term))
         if alone and id(term) in known:
             return known[id(term)][1:]
         white = self.white_columns(term)

@@ -15,6 +15,7 @@ from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.nonphysical_alternatives import AnyOrder, Mains
 from hdopt.diagnosis.inference.nuisance import Nuisances
+from hdopt.diagnosis.inference.read_angle import where_it_stood
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.penalty import SubtractedTerms, leaves_nothing
@@ -132,14 +133,16 @@ def high_order_selection(
 
 
 def left_as_recorded(recordings: Sequence[Recording], fit: Fit, nuisances: Nuisances) -> FitProblem:
-    """What `fit`, made on averaged rows, leaves of the rows as recorded: a problem with an offset alone beside it.
-    `recordings` are those diagnosed. `nuisances` are the columns that are always free.
+    """What `fit`, made on averaged rows, leaves of the rows as recorded, at the input angles at which by it the drive
+    stood: a problem with an offset alone beside it. `recordings` are those diagnosed. `nuisances` are the columns that
+    are always free.
     """
     raw, old = gather(recordings), fit.problem
     problem = replace(old, rows=raw, nuisance=nuisances.columns(raw), noise=Noise.white(raw, 1.0))
     base_value = np.zeros(len(raw)) if old.base is None else old.base.evaluate_at(problem.rotation, fit.errors)[0]
     terms = [problem.explanations[t.effect].term(raw, t.shape, base_value) for t in fit.terms]
-    left = replace(raw, error=evaluate(problem, fit.errors, fit.offsets, terms, fit.coefficients).residual)
+    anew = evaluate(problem, fit.errors, fit.offsets, terms, fit.coefficients)
+    left = replace(where_it_stood(raw, anew.ahead), error=anew.residual)
     noise = Noise.white(left, float(np.std(left.error)))
     return FitProblem(left, None, np.ones((len(left), 1)), noise, settings=old.settings)
 

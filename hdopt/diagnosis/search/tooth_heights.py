@@ -88,7 +88,7 @@ def single_teeth_tried(fit: Fit) -> Array | None:
     """
     forms, settings = _forms_of(fit.terms[-1]), fit.problem.settings.high_order
     heights, teeth = heights_of(fit), len(forms.heights)
-    tooth = np.array([forms.places(angle)[0] for angle in fit.problem.met_angles(fit.errors)[forms.spline]])
+    tooth = np.array([forms.places(angle)[0] for angle in fit.met_angles[forms.spline]])
     size = usual(heights)
     best, gained = heights.copy(), np.full(teeth, settings.tooth_gain * fit.problem.noise.sigma**2)
     for half in (np.arange(teeth) < teeth // 2, np.arange(teeth) >= teeth // 2):
