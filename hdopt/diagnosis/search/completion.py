@@ -109,15 +109,17 @@ def brings_home(more: Fit, first: Candidate) -> bool:
 
 def with_one_more(state: SearchState, fit: Fit, fills: Callable[[Fit], bool], sines_alone: bool) -> list[Fit]:
     """`fit` with each of the best plain effects beside it, or of sines at known orders (`sines_alone`): the best fit
-    for each set of effects. They are fitted from where `fit` stands, sines from new drives too, since a drive takes up
-    most of them; so is the best where none takes up what `fit` leaves (`fills`). `state` is where the work stands; the
-    draws are its own.
+    for each set of effects, those that were tried before among them. They are fitted from where `fit` stands, sines
+    from new drives too, since a drive takes up most of them; so is the best where none takes up what `fit` leaves
+    (`fills`). `state` is where the work stands; the draws are its own.
     """
     probe, settings = state.probe(fit), state.settings
     pool = [term for term in state.terms_for(probe, *names_of(fit)) if may_be_one_more(term, fit)]
     pool = sorted((t for t in pool if leaves_nothing(t) or not sines_alone), key=probe.gain, reverse=True)
     pool = [*pool[: settings.most_plain], *(t for t in pool[settings.most_plain :] if leaves_nothing(t))]
-    fits = sorted(each(lambda term: joint_fit(fit, [*fit.terms, term]), pool), key=lambda one: one.objective)
+    fits = known_with_one_more(state, fit, sines_alone)
+    fits += each(lambda term: joint_fit(fit, [*fit.terms, term]), pool)
+    fits.sort(key=lambda one: one.objective)
     again = [[*fit.terms, term] for term in pool if leaves_nothing(term)]
     if not any(fills(one) for one in fits):
         again += [[*one.terms] for one in fits if not leaves_nothing(one.terms[-1])][:1]
@@ -126,6 +128,18 @@ def with_one_more(state: SearchState, fit: Fit, fills: Callable[[Fit], bool], si
     for one in sorted(fits, key=lambda fit: fit.objective):
         best.setdefault(names_of(one), one)
     return list(best.values())
+
+
+def known_with_one_more(state: SearchState, fit: Fit, sines_alone: bool) -> list[Fit]:
+    """Of the sets that were tried those that have one plain effect more than `fit`, or sines at known orders
+    (`sines_alone`): what a search from `fit` on finds may be another drive. `state` is where the work stands."""
+    found = []
+    for names, known in state.fits.items():
+        beside = [term for term in known.terms if term.effect not in names_of(fit)]
+        if names > names_of(fit) and len(beside) == 1 and may_be_one_more(beside[0], fit):
+            if leaves_nothing(beside[0]) or not sines_alone:
+                found.append(known)
+    return found
 
 
 def may_be_one_more(term: Term, fit: Fit) -> bool:

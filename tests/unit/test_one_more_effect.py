@@ -1,0 +1,90 @@
+"""What completes a set that is only begun: sets that were tried before count beside those fitted anew."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hdopt.diagnosis.search import completion
+from hdopt.diagnosis.search.completion import known_with_one_more, with_one_more
+from hdopt.diagnosis.search.search_state import names_of
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.effects.declared import Shaft
+from hdopt.effects.term import Term
+
+WIDE = 40
+
+
+def fit_of(*effects, width=2):
+    """A fit of these effects, each of so many coefficients."""
+    terms = [
+        Term(
+            effect,
+            {"shaft": Shaft.INPUT, "orders": (1,)},
+            columns=np.zeros((3, width)),
+            doubtful=effect == "hysteresis",
+        )
+        for effect in effects
+    ]
+    return SimpleNamespace(terms=terms, problem=SimpleNamespace(settings=DEFAULT))
+
+
+BEGUN = fit_of("local_tooth_defect")
+
+
+def state_of(*fits):
+    return SimpleNamespace(fits={names_of(fit): fit for fit in fits})
+
+
+@pytest.mark.parametrize("sines_alone", [False, True])
+def test_a_set_that_was_tried_before_completes_too(sines_alone):
+    """Fault caught: only what is fitted from the begun set on counts, which may be another drive."""
+    pair = fit_of("encoder_input_eccentricity", "local_tooth_defect")
+    assert known_with_one_more(state_of(BEGUN, pair), BEGUN, sines_alone) == [pair]
+
+
+def test_what_is_no_sine_completes_only_where_any_may():
+    """Fault caught: a thermal drift that brings a drive home."""
+    pair = fit_of("local_tooth_defect", "thermal_drift")
+    assert known_with_one_more(state_of(pair), BEGUN, sines_alone=False) == [pair]
+    assert known_with_one_more(state_of(pair), BEGUN, sines_alone=True) == []
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        fit_of("local_tooth_defect"),
+        fit_of("encoder_input_eccentricity"),
+        fit_of("encoder_input_eccentricity", "thermal_drift"),
+        fit_of("local_tooth_defect", "encoder_input_eccentricity", "thermal_drift"),
+        fit_of("local_tooth_defect", "_sine_in_angle"),
+        fit_of("local_tooth_defect", "resonance"),
+        fit_of("local_tooth_defect", "hysteresis"),
+        fit_of("local_tooth_defect", "encoder_interpolation", width=WIDE),
+    ],
+    ids=lambda fit: " and ".join(term.effect for term in fit.terms),
+)
+def test_others_do_not(other):
+    """The set itself, others without its effects, two effects more, and what is not plain: without physics, driven,
+    doubtful, or of many coefficients. Faults caught: each of these let in."""
+    assert known_with_one_more(state_of(other), BEGUN, sines_alone=False) == []
+
+
+def test_of_a_set_fitted_anew_and_one_tried_before_the_better_stands(monkeypatch):
+    """Faults caught: what was tried before left out; what is fitted anew left out; the worse of both."""
+    fits = {name: fit_of("local_tooth_defect", "encoder_input_eccentricity") for name in ("known", "anew", "driven")}
+    term = fits["anew"].terms[1]
+    monkeypatch.setattr(completion, "joint_fit", lambda *_: fits["anew"])
+    monkeypatch.setattr(completion, "from_new_drives", lambda *_: [fits["driven"]])
+    state = SimpleNamespace(
+        fits={names_of(fits["known"]): fits["known"]},
+        settings=SimpleNamespace(most_plain=1),
+        probe=lambda fit: SimpleNamespace(gain=lambda term: 1.0),
+        terms_for=lambda *_: [term],
+        rng=np.random.default_rng(0),
+    )
+    for least in fits:
+        for name, fit in fits.items():
+            fit.objective = 1.0 if name == least else 2.0
+        found = with_one_more(state, BEGUN, lambda fit: False, sines_alone=False)
+        assert [one is fits[least] for one in found] == [True]
