@@ -35,6 +35,8 @@ CYCLES: tuple[tuple[int, ...], ...] = ((1,), (1, 2), (2,), (1, 2, 3, 4))
 """Cycles a line of each variant; distorted signals (no pure sines) add the third and fourth."""
 SEARCHED = ((1,), (1, 2), (1, 2, 3, 4))
 """Two cycles a line without the first cannot be told from one cycle of twice as many lines."""
+MESH_CYCLES = (1, 2)
+"""Cycles a line by which lines at the tooth mesh could stand for it."""
 SHOWS = 0.01
 """Power over that of its double or triple from which a line is taken for the encoder's own."""
 WHOLE = 1e-9
@@ -60,6 +62,13 @@ def beside_the_mesh(orders: Array, ratio: float) -> Mask:
     """
     near = np.abs(orders - np.round(orders)) < MODULATION_PER_OUTPUT_TURN / ratio
     return np.asarray(near & (np.abs(orders - mesh_order(ratio)) < SIDEBAND_REACH))
+
+
+def are_of_the_mesh(orders: Array, ratio: float) -> Mask:
+    """Which `orders` (n,) of an encoder's lines are that of the tooth mesh of a drive of `ratio` N, or half of it: a
+    mesh is there in every drive, and no encoder is made with just as many lines.
+    """
+    return np.asarray(np.any([np.abs(m * orders - mesh_order(ratio)) < WHOLE * orders for m in MESH_CYCLES], axis=0))
 
 
 def is_of_teeth(order: float, multiples: Sequence[int], ratio: float, output: bool) -> bool:
@@ -140,6 +149,7 @@ class EncoderInterpolation(Effect):
             if samples.span_turns < 0.5 * samples.ratio:
                 return []
             lines = lines[~beside_the_mesh(lines / per, samples.ratio)]
+        lines = lines[~are_of_the_mesh(lines / per, samples.ratio)]
         if not len(lines):
             return []
         return [

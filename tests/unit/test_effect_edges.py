@@ -7,25 +7,29 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from test_effect_physics import GEAR, RATE, RATIO, TURN, moving
 from test_windup_curves import fit_of
 
-from hdopt.diagnosis.inference.fit import refine
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.effects import EFFECTS, cs_tooth_harmonics
 from hdopt.effects import hysteresis as friction
 from hdopt.effects._friction_torque import friction_columns
 from hdopt.effects._zone_harmonics import strongest_few
 from hdopt.effects.cs_tooth_harmonics import CircularSplineToothHarmonics
-from hdopt.effects.declared import REQUIRED, Numbers, Quantity, Sines
-from hdopt.effects.encoder_interpolation import beside_the_mesh
+from hdopt.effects.declared import REQUIRED, Numbers, Quantity, Shaft, Sines
+from hdopt.effects.encoder_interpolation import are_of_the_mesh, beside_the_mesh
 from hdopt.effects.estimate import FitEstimate
 from hdopt.effects.grid_search import Axis
 from hdopt.effects.local_tooth_defect import WIDEST_DEG, WIDEST_OUTPUT_DEG, Seat
 from hdopt.effects.requirements import requirement
 from hdopt.effects.term import Term
 from hdopt.errors import HdoptError, MissingValue
+from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.rows import gather
 
 EACH = pytest.mark.parametrize("effect", EFFECTS.values(), ids=EFFECTS)
 RECORD = moving((14, 14, 14))
@@ -252,6 +256,31 @@ def test_few_harmonics_end_where_the_least_adds_nothing():
     assert strongest_few(np.eye(6), moment, (4, 7, 9), 3) == [(4,), (4, 7)]
     moment[4] = 1.0  # 0.008 of all
     assert strongest_few(np.eye(6), moment, (4, 7, 9), 3) == [(4,), (4, 7), (4, 7, 9)]
+
+
+def test_lines_at_the_mesh_are_the_teeths():
+    """102 for N = 50, and 51, whose second cycle stands there; a third of it, and neighbours, may be an encoder's."""
+    orders = np.array([102.0, 51.0, 34.0, 25.5, 101.0, 103.0, 50.0, 204.0])
+    assert are_of_the_mesh(orders, RATIO).tolist() == [True, True, False, False, False, False, False, False]
+
+
+@pytest.mark.parametrize(("waves", "offered"), [(102, False), (103, True)])
+def test_a_mesh_is_no_encoder_of_as_many_lines(waves, offered):
+    """A wave of 102 an input turn, N = 50, of either encoder: no lines at it, nor half as many. Faults caught: such
+    lines of the input offered, by which every mesh of one wave is told half an encoder's; or of the output, 2550 and
+    5100; no lines offered that are not the mesh's."""
+    theta = np.arange(60 * 400) * TURN / 400
+    table = pd.DataFrame({"input_angle_deg": np.degrees(theta), "output_angle_deg": np.degrees(theta / RATIO)})
+    rows = gather([recording_from_table(table, RATIO, name="one")])
+    rows = replace(rows, error=0.1 * np.sin(waves * theta))
+    bare = evaluate(FitProblem(rows, None, np.ones((len(rows), 1)), Noise.white(rows, 0.01)), [], np.zeros(1), (), ())
+    found = EFFECTS["encoder_interpolation"].search(FitProbe(bare))
+    orders = {
+        cycle * term.shape["lines"] / (RATIO if term.shape["shaft"] == Shaft.OUTPUT else 1)
+        for term in found
+        for cycle in (1, 2)
+    }
+    assert (float(waves) in orders) is offered
 
 
 def test_the_teeth_own_orders_about_the_mesh():
