@@ -167,7 +167,7 @@ class NoiseSettings:
     rows_a_lag: int = threshold(20, "rows", "choice: rows of one piece behind each lag")
     largest_inflation: float = threshold(10.0, "1", "choice: roughness turn by turn beyond which more is no noise")
     rounds: int = threshold(3, "1", "choice: how often the noise is measured anew at most")
-    unchanged_from: float = threshold(0.7, "1", "choice: ratio of two noises that counts as unchanged")
+    unchanged_from: float = threshold(0.85, "1", "choice: ratio of two noises that counts as unchanged")
     unchanged_to: float = threshold(1.4, "1", "choice: ratio of two noises that counts as unchanged")
     first_share: float = threshold(0.3, "1", "choice: first guess of the noise over all that varies")
     smallest_arcmin: float = threshold(1e-9, "arcmin", "choice: first guess for a record without any variation")

@@ -27,7 +27,7 @@ from hdopt.diagnosis.inference.nuisance import nuisances_for, with_time_warp
 from hdopt.diagnosis.inference.residual_noise import measure_noise
 from hdopt.diagnosis.inference.settled_shapes import settled
 from hdopt.diagnosis.orientation import Orientation, is_decisive, preference, turn_round
-from hdopt.diagnosis.search.candidates import Candidate
+from hdopt.diagnosis.search.candidates import Candidate, paid_for_freedom, penalty_scale
 from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.high_order import find_ripple, strong_ripple, subtract, subtracted_terms
 from hdopt.diagnosis.search.search_state import SearchPlan
@@ -231,7 +231,7 @@ def better_way(state: State, turned: State) -> State:
     if abs(gap) > settings.first_look:
         return ways[0] if gap > 0 else other
     ways = [search_effects(way) for way in ways]
-    scores = [way.selection.best.log_bayes_factor - unexplained(way) for way in ways]
+    scores = [explained(way) - unexplained(way) for way in ways]
     if abs(scores[0] - scores[1]) < settings.tie:
         return replace(ways[0], orientation=replace(state.orientation, decided_by="convention"))
     # Turned round, the noise is another, and the search goes on in it from what was found.
@@ -266,6 +266,13 @@ def gap_at_first_look(ways: Sequence[State]) -> float:
     """
     first, second = (leading_evidence(way.looked) - unexplained(way) for way in ways if way.looked is not None)
     return first - second
+
+
+def explained(state: State) -> float:
+    """What the best set of `state` explains beyond its base, as log evidence that pays for freedom and search alone: a
+    set that completed another need not pay for inexact shapes, one that led from the first on does.
+    """
+    return paid_for_freedom(state.selection.best, penalty_scale(state.problem, state.inflation))
 
 
 def unexplained(state: State) -> float:

@@ -13,6 +13,7 @@ from hdopt.diagnosis import state as state_module
 from hdopt.diagnosis.inference import clean_base
 from hdopt.diagnosis.inference.common_slope import TakenSlope
 from hdopt.diagnosis.orientation import Orientation
+from hdopt.diagnosis.search import candidates
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.subset_search import Selection
@@ -180,10 +181,23 @@ def test_after_both_searches_what_effects_and_base_explain_together_decides(monk
     monkeypatch.setattr(stages, "gap_at_first_look", lambda both: 499.0)
     monkeypatch.setattr(stages, "search_effects", searched)
     monkeypatch.setattr(stages, "unexplained", lambda way: way.base.objective / 2)
+    monkeypatch.setattr(stages, "explained", lambda way: found[way.base.name])
     after = stages.better_way(ways[0], ways[1])
     assert (after.base.name, after.orientation.decided_by) == chosen
     assert after.selection.best.log_bayes_factor == found[chosen[0]]
     assert after.inflation == (3.0 if chosen[0] == "two" else 5.0)
+
+
+@pytest.mark.parametrize("log_bayes_factor", [5467.0, 4827.0])
+def test_what_a_way_explains_does_not_hang_on_how_its_set_was_weighed(monkeypatch, log_bayes_factor):
+    """Half the gain in the noise as it is, less what freedom and search cost. Faults caught: the log Bayes factor, of
+    which a set that completed another pays 400 less; the inflation forgotten; nothing paid at all."""
+    fit = SimpleNamespace(terms=("a term", "another"))
+    best = Candidate(fit, log_bayes_factor, 1000.0)
+    state = replace(state_of(Told("one")), selection=Selection(Told("one"), (best,), 2.0), inflation=2.0)
+    monkeypatch.setattr(stages, "penalty_scale", lambda problem, inflation: SimpleNamespace(inflation=inflation))
+    monkeypatch.setattr(candidates, "penalty", lambda terms, top_gain, scale: 20.0 * len(terms) + top_gain)
+    assert stages.explained(state) == pytest.approx(1000.0 / 2.0 / 2 - 40.0)
 
 
 @pytest.mark.parametrize("drift", [False, True])

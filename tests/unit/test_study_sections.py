@@ -1,0 +1,72 @@
+"""Sections of a study file, key by key: what they take, what they mean without a word, and what they say of a fault."""
+
+import numpy as np
+import pytest
+
+from hdopt.errors import HdoptError
+from hdopt.study import load_study
+from hdopt.study.costs import AllocateSection
+from hdopt.study.drive import ErrorsSection
+from hdopt.study.tolerances import DimensionRow, TolerancesSection, _check_size
+from hdopt.study.toml_faults import LONGEST
+from hdopt.tolerance.distributions import Uniform
+
+TILTS = [name for name in ErrorsSection.model_fields if "tilt" in name]
+
+
+@pytest.fixture
+def study(tmp_path):
+    """The study of the CSF-25-80 with these lines besides, or what is said of it."""
+
+    def read(text, overrides=()):
+        path = tmp_path / "own.toml"
+        path.write_text(f'drive = "csf-25-80"\n{text}\n', encoding="utf-8")
+        return load_study(path, overrides)
+
+    return read
+
+
+@pytest.mark.parametrize("tilt", TILTS)
+def test_a_tilt_goes_either_way(study, tilt):
+    """Faults caught: a lower end that is 0, or missing."""
+    turned = study(f"[errors]\n{tilt} = -0.02")
+    assert float(getattr(turned.errors, tilt.removesuffix("_deg"))) == pytest.approx(np.radians(-0.02))
+    for beyond in (-89.0, 89.0):
+        with pytest.raises(HdoptError, match=tilt):
+            study(f"[errors]\n{tilt} = {beyond}")
+
+
+def test_what_a_section_means_without_a_word():
+    """Documented defaults. Faults caught: a million samples of a verification that became a tenth of one; a dimension
+    that counts twice."""
+    assert AllocateSection().verify_n == 1_048_576
+    assert DimensionRow(tolerance=0.1).sensitivity == 1.0
+    assert DimensionRow(tolerance=0.1).sigmas == 3.0
+
+
+def test_the_errors_that_vary_are_those_with_a_tolerance():
+    """Fault caught: those without one."""
+    row = {"distribution": "uniform", "lower": -0.01, "upper": 0.01}
+    rows = TolerancesSection.model_validate({"wg_tilt_major_deg": row}).rows
+    assert list(rows) == ["wg_tilt_major_deg"]
+    assert rows["wg_tilt_major_deg"].upper == 0.01
+
+
+def test_a_spread_that_cannot_be_computed_is_refused():
+    """Nearly all drives would have more than [errors] may have; at its end they may. Faults caught: the other side of
+    the comparison, one side of the distribution only."""
+    _check_size("wg_eccentricity_mm", Uniform(lower=0.0, upper=0.02))
+    for low, high in ((0.0, 200.0), (-200.0, 0.0)):
+        with pytest.raises(HdoptError, match=r"nearly all drives \(99.73 %\) would have"):
+            _check_size("wg_tilt_major_deg", Uniform(lower=low, upper=high))
+    # A direction has no size.
+    _check_size("axis_eccentricity_direction_deg", Uniform(lower=0.0, upper=360.0))
+
+
+@pytest.mark.parametrize(("length", "hinted"), [(4 * LONGEST, True), (4 * LONGEST + 1, False)])
+def test_a_long_line_is_not_looked_at_for_hints(study, length, hinted):
+    """Up to 320 characters. Fault caught: a line of any length, or none, gets one."""
+    line = "[errors]\nwg_tilt_major_deg = 0,01" + " #".ljust(length - len("wg_tilt_major_deg = 0,01"), "x")
+    with pytest.raises(HdoptError) as said:
+        study(line)
+    assert ("decimal point" in str(said.value)) is hinted
