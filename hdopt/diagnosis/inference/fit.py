@@ -27,7 +27,7 @@ from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.newey_west import newey_west, reach_95
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.normal_equations import GroupedColumns, bordered, solved, sums_of_groups
-from hdopt.diagnosis.inference.read_angle import read_ahead, reads_input
+from hdopt.diagnosis.inference.read_angle import read_ahead, reads_input, where_it_stood
 from hdopt.diagnosis.numerical import NORMAL_95, TINY
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
 from hdopt.drive.geometry import ARCMIN
@@ -69,19 +69,17 @@ class FitProblem:
         """The rows' angles as the base takes them, (n, 4); none for a gear without a base."""
         return np.empty((len(self.rows), 0)) if self.base is None else self.base.rotation(self.rows.theta)
 
-    def rotation_behind(self, ahead: Array | None) -> Array:
-        """`rotation` where the input angle was read `ahead` of where the drive stood, rad, (n,); None: nowhere."""
-        if ahead is None or self.base is None:
-            return self.rotation
-        return self.base.rotation(self.rows.theta - ahead)
+    def where_it_stood(self, ahead: Array | None) -> FitProblem:
+        """The same problem at the angles at which the drive stood, where these were read `ahead` (n,) of it, rad (None:
+        nowhere)."""
+        return self if ahead is None else replace(self, rows=where_it_stood(self.rows, ahead))
 
-    def met_angles(self, errors: Array, ahead: Array | None = None) -> Array:
-        """Angles of both splines at which both zones of a base with these `errors` (12,) mm meet them, rad, (2, 2, n),
-        where the input angle was read `ahead` (n,) of where the drive stood, rad (None: nowhere)."""
+    def met_angles(self, errors: Array) -> Array:
+        """Angles of both splines at which both zones of a base with these `errors` (12,) mm meet them, rad,
+        (2, 2, n)."""
         if self.base is None:
             raise ValueError("a gear without a base has no meshing zones")
-        theta = self.rows.theta if ahead is None else self.rows.theta - ahead
-        return met_angles(theta, self.base.advance, self.base.beyond_at(self.rotation_behind(ahead), errors))
+        return met_angles(self.rows.theta, self.base.advance, self.base.beyond_at(self.rotation, errors))
 
     @property
     def base_width(self) -> int:
@@ -136,7 +134,7 @@ class Fit:
     @cached_property
     def met_angles(self) -> Array:
         """Angles of both splines at which both zones meet them, rad, (2, 2, n)."""
-        return self.problem.met_angles(self.errors, self.ahead)
+        return self.problem.where_it_stood(self.ahead).met_angles(self.errors)
 
     @cached_property
     def met_angle(self) -> Array:
@@ -378,8 +376,8 @@ def evaluate(
     objective = float(white @ white)
     if problem.base is not None:
         objective += problem.noise.sigma**2 * float(np.sum((errors / problem.prior) ** 2))
-    kept = tuple(coefficients)
-    return Fit(problem, errors, offsets, tuple(terms), kept, base_value, zone, prediction, objective, jacobian, ahead)
+    own = tuple(coefficients)
+    return Fit(problem, errors, offsets, tuple(terms), own, base_value, zone, prediction, objective, jacobian, ahead)
 
 
 def _base_value(
@@ -388,15 +386,16 @@ def _base_value(
     """The base of `problem`, which it must have, with these `errors` and what `terms` add in its zones, where the input
     angle was read `ahead` (n,) of where the drive stood, rad (None: nowhere)."""
     assert problem.base is not None
-    extra, rises = _in_zones(problem, errors, terms, coefficients, ahead)
-    return problem.base.evaluate_at(problem.rotation_behind(ahead), errors, extra, rises)
+    stood = problem.where_it_stood(ahead)
+    extra, rises = _in_zones(stood, errors, terms, coefficients)
+    return problem.base.evaluate_at(stood.rotation, errors, extra, rises)
 
 
 def _in_zones(
-    problem: FitProblem, errors: Array, terms: Sequence[Term], coefficients: Sequence[Array], ahead: Array | None
+    problem: FitProblem, errors: Array, terms: Sequence[Term], coefficients: Sequence[Array]
 ) -> tuple[Array | None, Array | None]:
     """What `terms` add to the deviation of both zones, mm of arc, (2, n), and its slopes over the angles at which the
-    splines are met, mm/rad, (2, 2, n); None where nothing does. `ahead` as in `_base_value`."""
+    splines are met, mm/rad, (2, 2, n); None where nothing does."""
     extra: Array | None = None
     rises: Array | None = None
     on_splines = []
@@ -406,7 +405,7 @@ def _in_zones(
         elif term.zones is not None:
             extra = term.zones @ c if extra is None else extra + term.zones @ c
     if on_splines:
-        added, rises = sum_of(on_splines, problem.met_angles(errors, ahead))
+        added, rises = sum_of(on_splines, problem.met_angles(errors))
         extra = added if extra is None else extra + added
     return extra, rises
 
