@@ -17,6 +17,7 @@ from hdopt.diagnosis.inference.clean_base import (
     drive_alone,
     fit_clean_base,
     is_left_wavy,
+    long_waves,
 )
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
@@ -108,6 +109,22 @@ def test_a_base_that_leaves_a_quarter_more_than_noise_may_be_wavy(left, wavy):
     """Fault caught: a limit of another size."""
     problem = SimpleNamespace(weighed_rows=100.0, noise=SimpleNamespace(sigma=0.5), settings=DEFAULT)
     assert is_left_wavy(SimpleNamespace(objective=left * 25.0, problem=problem)) is wavy
+
+
+@pytest.mark.parametrize(
+    ("rows_per_turn", "turns", "splines"),
+    [(17, 10, ["fs", "cs"]), (17, 9, ["cs"]), (16, 10, []), (400, 40, ["fs", "cs"])],
+)
+def test_the_long_waves_are_those_of_each_spline_that_the_rows_hold(rows_per_turn, turns, splines):
+    """Eight waves want more than sixteen rows a turn, those of the flexspline ten turns. Faults caught: waves that are
+    folded; waves of both splines at once; the twenty-three that bend to anything."""
+    problem = recorded(0.0)[0]
+    rows = SimpleNamespace(rows_per_turn=rows_per_turn, span_turns=turns, ratio=RATIO)
+    rows.highest_order = rows_per_turn / 2
+    problem = SimpleNamespace(base=problem.base, rows=rows, explanations=problem.explanations)
+    found = [(term.effect, term.shape["members"]) for term in long_waves(problem)]
+    assert found == [(f"{spline}_tooth_harmonics", (2, 3, 4, 5, 6, 7, 8)) for spline in splines]
+    assert long_waves(SimpleNamespace(**vars(problem) | {"base": None})) == []
 
 
 def test_waves_that_take_up_little_are_not_the_teeths(monkeypatch):

@@ -25,12 +25,14 @@ ORDER_DOMAINS = ("integer order", "output-synchronous order", "asynchronous orde
 """Domains of the generic basis in which the base itself lives."""
 
 FS_TEETH, CS_TEETH = "fs_tooth_harmonics", "cs_tooth_harmonics"
-WAVES_OF_TEETH = tuple(
+Members = tuple[tuple[str, int], ...]
+"""Waves of the teeth by effect, from the second wave to the last."""
+WAVES_OF_TEETH: tuple[Members, ...] = tuple(
     tuple((effect, last) for effect in effects)
     for last in (8, 24)
     for effects in ((FS_TEETH,), (CS_TEETH,), (FS_TEETH, CS_TEETH))
 )
-"""Sets of waves of the teeth by effect, from the second wave to the last: long ones of either spline and of both."""
+"""Sets of them: long ones of either spline and of both."""
 
 
 def fit_clean_base(problem: FitProblem, rng: np.random.Generator) -> Fit | None:
@@ -91,6 +93,29 @@ def _of_noise(problem: FitProblem) -> float:
     return problem.weighed_rows * problem.noise.sigma**2
 
 
+def long_waves(problem: FitProblem) -> list[Term]:
+    """The longest waves of each spline's teeth that the rows of `problem` hold; none without a base."""
+    shortest = WAVES_OF_TEETH[0][0][1]
+    alone = (members for members in _held_by(problem) if len(members) == 1 and members[0][1] == shortest)
+    return [] if problem.base is None else [term for members in alone for term in _terms_of(problem, members)]
+
+
+def _held_by(problem: FitProblem) -> list[Members]:
+    """Those of the `WAVES_OF_TEETH` that the rows of `problem` hold."""
+
+    def held(members: Members) -> bool:
+        effects = [problem.explanations[effect] for effect, _ in members]
+        return 2 * members[0][1] < problem.rows.rows_per_turn and all(e.lacks(problem.rows) is None for e in effects)
+
+    return [members for members in WAVES_OF_TEETH if held(members)]
+
+
+def _terms_of(problem: FitProblem, members: Members) -> tuple[Term, ...]:
+    """Waves of the teeth, by effect and last wave (`members`), on the rows of `problem`."""
+    waves = ((problem.explanations[effect], tuple(range(2, last + 1))) for effect, last in members)
+    return tuple(effect.term(problem.rows, {"members": run}) for effect, run in waves)
+
+
 def beside_waves(smooth: Fit, rng: np.random.Generator) -> Fit | None:
     """The base of `smooth`, its fit beside smooth columns, with those waves of the teeth beside these that pay best for
     their freedom, from drives drawn by `rng`; None where it leaves no more than noise, or where waves take up little of
@@ -106,20 +131,14 @@ def beside_waves(smooth: Fit, rng: np.random.Generator) -> Fit | None:
     def cost(fit: Fit) -> float:
         return fit.objective / variance + sum(term.width for term in fit.terms) * math.log(problem.weighed_rows)
 
-    def able(members: Sequence[tuple[str, int]]) -> bool:
-        effects = [problem.explanations[effect] for effect, _ in members]
-        return 2 * members[0][1] < problem.rows.rows_per_turn and all(e.lacks(problem.rows) is None for e in effects)
-
-    def fitted(numbered: tuple[Sequence[tuple[str, int]], np.random.Generator]) -> Fit:
+    def fitted(numbered: tuple[Members, np.random.Generator]) -> Fit:
         members, own_rng = numbered
-        waves = ((problem.explanations[effect], tuple(range(2, last + 1))) for effect, last in members)
-        terms = tuple(effect.term(problem.rows, {"members": run}, smooth.motion) for effect, run in waves)
-        return fit_base(problem, own_rng, settings.starts_clean, terms=terms)
+        return fit_base(problem, own_rng, settings.starts_clean, terms=_terms_of(problem, members))
 
     def takes_up(fit: Fit) -> bool:
         return fit.objective - of_noise < settings.wavy_share * (smooth.objective - of_noise)
 
-    sets = [members for members in WAVES_OF_TEETH if able(members)]
+    sets = _held_by(problem)
     if not sets:
         return None
     *fewer, all_waves = zip(sets, rng.spawn(len(sets)), strict=True)

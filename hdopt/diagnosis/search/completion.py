@@ -6,7 +6,8 @@ noise does. A set that leaves more than noise, or whose drive lies far outside i
 one plain effect more takes up nearly all of that, or brings the drive home, that is no misfit of a shape, which would
 be left beside it. Such sets do not pay for being inexact against the set that they complete. What many waves of the
 teeth leave of steps from tooth to tooth is a pulse, though: beside a term that bends to anything only sines of known
-orders and what does not turn with the drive complete a set.
+orders and what does not turn with the drive complete a set. Beside terms that bend to nothing long waves of the teeth
+do too, where they take up most of what is left: the drive had taken up the rest of them.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from hdopt.diagnosis.checks.other_laws import other_law
 from hdopt.diagnosis.inference.base_excitation import is_driven
 from hdopt.diagnosis.inference.base_fit import beyond_tolerances, is_far
 from hdopt.diagnosis.inference.catalogue import is_outside
+from hdopt.diagnosis.inference.clean_base import long_waves
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import Candidate, from_new_drives, in_order, joint_fit, paid_for_freedom
@@ -37,7 +39,8 @@ def completed(state: SearchState, candidates: list[Candidate]) -> list[Candidate
     if not first.fit.terms:
         return candidates
     found: dict[Names, Candidate] = {}
-    for one in in_order([*far_more_taken_up(state, candidates), *by_one_plain_effect(state, first)]):
+    made = (*far_more_taken_up(state, candidates), *by_one_plain_effect(state, first), *by_waves(state, first))
+    for one in in_order(made):
         found.setdefault(names_of(one.fit), one)
     return in_order([*found.values(), *(one for one in candidates if names_of(one.fit) not in found)])
 
@@ -48,7 +51,7 @@ def far_more_taken_up(state: SearchState, candidates: list[Candidate]) -> list[C
     """
     first, settings = candidates[0], state.settings
     left = state.above_noise(first.fit)
-    if left < settings.begun * state.scale.rows:
+    if not is_far_more_than_noise(left, state):
         return []
     found = []
     for candidate in candidates[1:]:
@@ -59,13 +62,24 @@ def far_more_taken_up(state: SearchState, candidates: list[Candidate]) -> list[C
     return found
 
 
+def may_grow(first: Candidate) -> bool:
+    """Whether the `first` is a set of physics that may have one effect more."""
+    return not first.outside and len(first.fit.terms) < first.fit.problem.settings.search.most_effects
+
+
+def is_far_more_than_noise(left: float, state: SearchState) -> bool:
+    """Whether what is `left` above the noise, in noise variances, is a good part of the noise. `state` is where the
+    work stands."""
+    return left >= state.settings.begun * state.scale.rows
+
+
 def by_one_plain_effect(state: SearchState, first: Candidate) -> list[Candidate]:
     """Sets that complete the `first`, one of physics, by one plain effect more: where it leaves more than noise, any
     that takes up nearly all of that; where its drive lies outside its tolerances, sines of known orders that bring it
     home. `state` is where the work stands.
     """
     settings, fit = state.settings, first.fit
-    if first.outside or len(fit.terms) >= settings.most_effects:
+    if not may_grow(first):
         return []
     left, far = state.above_noise(fit), is_outside_tolerances(fit)
     leaves_more = left >= settings.leaves_more * state.scale.rows
@@ -86,9 +100,30 @@ def by_one_plain_effect(state: SearchState, first: Candidate) -> list[Candidate]
         one = without_inexactness(state, first, state.weigh(more, state.top_gain))
         if not fills(more):
             one = replace(one, log_bayes_factor=one.log_bayes_factor - share)
-        ahead = one.log_bayes_factor - first.log_bayes_factor > settings.clearly
         completes = fills(more) or any(more is fit_at_home for fit_at_home in home)
-        if ahead and completes and is_acceptable(more) and follows_its_laws(more, state):
+        if completes and may_come_first(one, first, state):
+            found.append(one)
+    return found
+
+
+def by_waves(state: SearchState, first: Candidate) -> list[Candidate]:
+    """Sets that complete the `first`, one of physics that bends to nothing, by the longest waves of a spline's teeth:
+    where it leaves far more than noise, and they, from new drives, take up most of that. A drive fitted without them
+    takes up so much of them that no look beside it shows them. `state` is where the work stands; the draws are its own.
+    """
+    settings, fit = state.settings, first.fit
+    left = state.above_noise(fit)
+    if not may_grow(first) or has_bending(fit):
+        return []
+    if not is_far_more_than_noise(left, state):
+        return []
+    known = (*first.effects, *state.plan.skip)
+    sets = [[*fit.terms, waves] for waves in long_waves(fit.problem) if waves.effect not in known]
+    found = []
+    for more in from_new_drives(fit, sets, copy.deepcopy(state.rng)):
+        one = without_inexactness(state, first, state.weigh(more, state.top_gain))
+        completes = state.above_noise(more) <= settings.complete_by_waves * left and not is_far(more).any()
+        if completes and may_come_first(one, first, state):
             found.append(one)
     return found
 
@@ -153,6 +188,13 @@ def may_be_left(term: Term, fit: Fit) -> bool:
     """Whether `term` could be what a term of `fit` that bends to anything leaves of itself: it turns with the drive,
     and is no sines of known orders."""
     return kind_of(term) == "turning" and not leaves_nothing(term) and has_bending(fit)
+
+
+def may_come_first(more: Candidate, first: Candidate, state: SearchState) -> bool:
+    """Whether the candidate of `more` effects is clearly ahead of the `first`, acceptable, and beaten by no other law.
+    `state` is where the work stands."""
+    ahead = more.log_bayes_factor - first.log_bayes_factor > state.settings.clearly
+    return ahead and is_acceptable(more.fit) and follows_its_laws(more.fit, state)
 
 
 def follows_its_laws(fit: Fit, state: SearchState) -> bool:
