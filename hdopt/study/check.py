@@ -13,7 +13,7 @@ from hdopt.errors import HdoptError, IncompleteStudy, unknown_name
 from hdopt.study.base import Section
 from hdopt.study.document import Document, leaves
 from hdopt.study.nearest import unknown_key
-from hdopt.study.schema import SECTIONS, known_paths, section_model, step_sections
+from hdopt.study.schema import ANY_NAME, SECTIONS, known_paths, section_model, step_sections
 from hdopt.toml_lines import Keys
 from hdopt.words import counted
 
@@ -138,7 +138,7 @@ def _fault(fault: ErrorDetails, document: Document, section: str) -> str:
     where = document.where(path)
     kind, value = fault["type"], fault["input"]
     if kind == "extra_forbidden":
-        known = _known_keys(section_model(section), path[1:-1])
+        known = _known_keys(section_model(section), path[1:-1]) or _keys_of_its_kind(document, path)
         return f"{where}: {unknown_key(path[-1], known, _elsewhere(document, path))}"
     if kind == "union_tag_not_found":
         return f"{where}: does not say its {_tag(fault)}; give it"
@@ -191,8 +191,10 @@ def _elsewhere(document: Document, path: Keys) -> list[Keys]:
 
 
 def _known_keys(model: Any, path: Keys) -> tuple[str, ...]:
-    """The keys that the table at `path` of a section may have; () where that depends on what else it says."""
+    """The keys that the table at `path` of a section may have; () where that depends on its kind."""
     for part in path:
+        if part.isdecimal():  # a place in a list, of which all rows are alike
+            continue
         field = {field.alias or name: field for name, field in model.model_fields.items()}.get(part)
         choices = () if field is None else (field.annotation, *get_args(field.annotation))
         tables = [choice for choice in choices if isinstance(choice, type) and issubclass(choice, Section)]
@@ -200,6 +202,12 @@ def _known_keys(model: Any, path: Keys) -> tuple[str, ...]:
             return ()
         model = tables[0]
     return tuple(field.alias or name for name, field in model.model_fields.items())
+
+
+def _keys_of_its_kind(document: Document, path: Keys) -> tuple[str, ...]:
+    """The keys beside that at the end of `path` that a table may have which says what kind it is."""
+    paths = known_paths(document.data)
+    return tuple(sorted(found[-1] for found in paths if found[:-1] == path[:-1] and found[-1] != ANY_NAME))
 
 
 def _path_in_file(location: tuple[Any, ...], content: Any) -> Keys:

@@ -5,9 +5,10 @@ import pytest
 
 from hdopt.errors import HdoptError
 from hdopt.study import load_study
-from hdopt.study.costs import AllocateSection
+from hdopt.study.costs import AllocateSection, Cost
 from hdopt.study.drive import ErrorsSection
-from hdopt.study.tolerances import DimensionRow, TolerancesSection, _check_size
+from hdopt.study.schema import sections_in
+from hdopt.study.tolerances import AnyRow, DimensionRow, TolerancesSection, _check_size
 from hdopt.study.toml_faults import LONGEST
 from hdopt.tolerance.distributions import Uniform
 
@@ -70,3 +71,42 @@ def test_a_long_line_is_not_looked_at_for_hints(study, length, hinted):
     with pytest.raises(HdoptError) as said:
         study(line)
     assert ("decimal point" in str(said.value)) is hinted
+
+
+KINDS_OF_ROW = [
+    ("wg_tilt_major_deg", "distribution", row.model_fields["distribution"].annotation.__args__[0], row)
+    for row in sections_in(AnyRow)
+    if "distribution" in row.model_fields
+]
+KINDS_OF_COST = [
+    ("wg_tilt_major_deg.cost", "model", row.model_fields["model"].annotation.__args__[0], row)
+    for row in sections_in(Cost)
+    if "model" in row.model_fields
+]
+
+
+@pytest.mark.parametrize(
+    ("table", "kind_key", "kind", "row"),
+    [*KINDS_OF_ROW, *KINDS_OF_COST],
+    ids=lambda value: getattr(value, "__name__", value),
+)
+def test_a_misspelt_key_of_a_row_is_answered_with_the_one_meant(study, table, kind_key, kind, row):
+    """In a table of any kind, each of its keys with a letter too many. Faults caught: keys of a row of [tolerances] and
+    of its cost, of which there are several kinds, called unknown and nothing else."""
+    keys = [name for name in row.model_fields if name != kind_key]
+    assert len(KINDS_OF_ROW) >= 8 and len(KINDS_OF_COST) >= 4
+    for key in keys:
+        given = f'{{ {kind_key} = "{kind}", {key}x = 1.0 }}'
+        if table.endswith("cost"):
+            given = f'{{ distribution = "normal", std = 0.003, lower = -0.01, upper = 0.01, cost = {given} }}'
+        with pytest.raises(HdoptError) as refused:
+            study(f"[tolerances]\nwg_tilt_major_deg = {given}")
+        # One letter is like nothing: all keys follow.
+        meant = f"did you mean '{key}'?" if len(key) > 1 else f"known: {', '.join(sorted(row.model_fields))}"
+        assert f"unknown key '{key}x'; {meant}" in str(refused.value)
+
+
+def test_so_is_one_in_a_list(study):
+    """Fault caught: rows of a list, whose place in it no table has."""
+    with pytest.raises(HdoptError, match=r"correlation\.0\.erors: unknown key 'erors'; did you mean 'errors'"):
+        study("[[tolerances.correlation]]\nerors = []")
