@@ -123,14 +123,17 @@ class StudyOptions:
 
     def load(self, *further: str) -> Study:
         """The study that is meant, with `further` KEY=VALUE after those of --set."""
-        from hdopt.study import DEFAULT_STUDY, load_study
+        from hdopt.study import DEFAULT_STUDY, DRIVE_SECTIONS, load_study
         from hdopt.study.defaults import defaults_taken, used_by
 
         study = load_study(self.study, (*self.overrides, *further), self.drive)
         context = click.get_current_context()
-        said = defaults_taken(study.sections, used_by(context.info_name, study.sections))
+        said = defaults_taken(study.sections, used_by(context.info_name, study.sections), study.document)
         if self.study is None and self.drive is None:
             said = (f"no study given: the shipped {DEFAULT_STUDY}", *said)
+        elif self.study is not None and self.drive is not None:
+            sections = ", ".join(f"[{name}]" for name in DRIVE_SECTIONS)
+            said = (f"--drive: {sections} are those of {self.drive}, whatever {self.study} gives", *said)
         context.meta[DEFAULTS] = said
         return study
 

@@ -297,7 +297,13 @@ def study_document(source: str | Path | None = None, drive: str | None = None) -
     if isinstance(document.data.get("drive"), str):
         own = {key: value for key, value in document.data.items() if key != "drive"}
         base = _shipped_drive(document.data["drive"], document.where(("drive",)))
-        document = replace(document, data=merge(base.data, own), texts=(*base.texts, *document.texts))
+        document = replace(
+            document,
+            data=merge(base.data, own),
+            texts=(*base.texts, *document.texts),
+            shipped=document.data["drive"],
+            beneath=base.data,
+        )
     return document, name, folder
 
 

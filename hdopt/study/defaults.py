@@ -6,7 +6,9 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any  # Any: parsed TOML
 
+from hdopt.drive.errors import PHASE_OF, study_key
 from hdopt.study.base import Section
+from hdopt.study.document import Document
 
 DRIVE = ("wave_generator", "errors", "cs_teeth", "fs_teeth", "cs_roundness")
 TOLERANCED = (*DRIVE, "tolerances", "requirement", "contributors", "linear_stack")
@@ -28,6 +30,8 @@ WHOLE = ("allocate", "search")
 """Sections that a command may be run without: then all of their defaults hold."""
 OF_NO_WEIGHT = ("source", "noise_um", "correlation", "cost", "rated_torque_nm", "rated_speed_rpm")
 """Keys whose default changes nothing, or that another line speaks of."""
+OF_ONE_DRIVE = {"errors": "is 0", "tolerances": "is fixed"}
+"""Sections of which somebody who writes his own may take it that nothing else holds, and what would make it so."""
 
 
 def used_by(command: str | None, sections: Mapping[str, Section]) -> tuple[str, ...]:
@@ -35,10 +39,24 @@ def used_by(command: str | None, sections: Mapping[str, Section]) -> tuple[str, 
     return tuple(sections) if command == WHOLE_STUDY else USED.get(command or "", ())
 
 
-def defaults_taken(sections: Mapping[str, Section], names: Sequence[str]) -> tuple[str, ...]:
+def defaults_taken(
+    sections: Mapping[str, Section], names: Sequence[str], document: Document | None = None
+) -> tuple[str, ...]:
     """A line for each of the sections `names` of a study, of its checked `sections`, that leaves something out: which
-    value holds instead."""
-    return tuple(line for name in names if (line := _line(name, sections.get(name))))
+    value holds instead, of the shipped drive that its `document` starts from (None: of none) or of its own."""
+    kept = () if document is None else tuple(_kept(name, document) for name in names if name in OF_ONE_DRIVE)
+    return (*filter(None, kept), *(line for name in names if (line := _line(name, sections.get(name)))))
+
+
+def _kept(name: str, document: Document) -> str:
+    """What is said where the section `name` of a `document` gives a part of what the shipped drive's does."""
+    kept = document.kept_of_shipped(name)
+    # Directions and phases belong to their size.
+    sizes = [key for key in kept if key not in map(study_key, PHASE_OF.values())]
+    values = [f"{key} = {_shown(kept[key])}" if isinstance(kept[key], float | int) else key for key in sizes]
+    if not values:
+        return ""
+    return f"[{name}] keeps of {document.shipped} {', '.join(values)}; say where yours {OF_ONE_DRIVE[name]}"
 
 
 def _line(name: str, section: Section | None) -> str:

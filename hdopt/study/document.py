@@ -6,7 +6,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
@@ -27,13 +27,16 @@ LARGEST_INTEGER = 2**63 - 1
 @dataclass(frozen=True)
 class Document:
     """A parsed study file: its nested `data`, and the `source` and `lines` that messages point to; `texts` are those of
-    the files that it was read from, what lies below first. `set_by` is what keys without a line were set by."""
+    the files that it was read from, what lies below first. `set_by` is what keys without a line were set by. What the
+    file does not give stands as in `beneath`, the data of the `shipped` drive that it starts from; "" for none."""
 
     data: Mapping[str, Any]
     source: str
     lines: Mapping[Keys, int]
     texts: tuple[str, ...] = ()
     set_by: str = "--set"
+    shipped: str = ""
+    beneath: Mapping[str, Any] = field(default_factory=dict)
 
     def where(self, path: Keys) -> str:
         """'FILE, line N, a.b': the closest place in the file to the key `path`, or what set it or all in it."""
@@ -56,6 +59,15 @@ class Document:
             return []
         found = {path[:depth] for path in leaves(held, table) for depth in (self._set_depth(path),)}
         return sorted(found) if () not in found else []
+
+    def kept_of_shipped(self, section: str) -> dict[str, Any]:
+        """What stays of the shipped drive's `section` beside what the file gives there itself; {} where it gives
+        nothing."""
+        below = self.beneath.get(section)
+        given = any(path[0] == section and line != SET_ON_COMMAND_LINE for path, line in self.lines.items())
+        if not given or not isinstance(below, Mapping):
+            return {}
+        return {key: value for key, value in below.items() if not any(p[:2] == (section, key) for p in self.lines)}
 
     def _set_depth(self, path: Keys) -> int:
         """How many parts of `path` name what set it; 0 where the file holds it."""

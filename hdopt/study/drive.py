@@ -234,7 +234,8 @@ class RoundnessSection(Section):
 
 
 class ErrorsSection(Section):
-    """[errors]: one drive's errors. An error that is not listed is zero; a listed size needs its direction or phase."""
+    """[errors]: one drive's errors. One that is not listed is zero, or that of the shipped drive that the study starts
+    from; a listed size needs its direction or phase."""
 
     axis_eccentricity_mm: float = Field(default=0.0, ge=0, le=LARGEST_ERROR_MM)
     axis_eccentricity_direction_deg: float | None = None

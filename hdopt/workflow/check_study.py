@@ -86,7 +86,8 @@ def check_study(study: AnyStudy = None) -> StudyCheck:
     found = [_tried(replace(one, missing=lacking), probe, loaded) for one, probe in PROBES]
     found = [_judged(one, found) for one in found]
     names = tuple(dict.fromkeys(name for sections in USED.values() for name in sections if name in loaded.sections))
-    return StudyCheck(loaded.name, tuple(found), defaults_taken(loaded.sections, names), _doubts(loaded, lacking))
+    defaults = defaults_taken(loaded.sections, names, loaded.document)
+    return StudyCheck(loaded.name, tuple(found), defaults, _doubts(loaded, lacking))
 
 
 def _doubts(study: Study, lacking: tuple[str, ...]) -> tuple[str, ...]:

@@ -194,7 +194,7 @@ def _inputs(study: Study) -> Section:
     """The appendix of the page: what went in, with what the study file says of it."""
     comments = comments_of(study.document)
     text = study_toml(study.data, comments.head or (study.title,), comments.beside, comments.above)
-    defaults = defaults_taken(study.sections, tuple(study.sections))
+    defaults = defaults_taken(study.sections, tuple(study.sections), study.document)
     return inputs_section(study.data, text, study.name, defaults, comments.beside)
 
 

@@ -328,6 +328,39 @@ def test_what_a_command_falls_back_on_is_printed(tmp_path, capsys):
     assert "default:" not in out
 
 
+def test_what_stays_of_a_shipped_drive_is_printed(tmp_path, capsys):
+    """A study that starts from a shipped drive and gives one error keeps the other seven: 0.987 arcmin in place of
+    none. Faults caught: that in silence; a line for what was set to 0, or set on the command line, or by a study that
+    gives nothing of its own; directions counted beside their sizes; costs taken for tolerances."""
+    file = tmp_path / "own.toml"
+    sizes = 'drive = "csf-25-80"\n[errors]\naxis_eccentricity_mm = 0.012\naxis_tilt_x_deg = 0\n'
+    file.write_text(sizes)
+    kept = "default: [errors] keeps of csf-25-80 {}wg_eccentricity_mm = 0.005, wg_tilt_major_deg = 0.1, "
+    for command in (("ke",), ("stack", "-n", "2048"), ("check",)):
+        _, out, _ = said(capsys, *command, str(file))
+        assert kept.format("axis_tilt_y_deg = 0.2, ") in out and "; say where yours is 0\n" in out
+        assert "direction_deg = " not in out
+    _, out, _ = said(capsys, "ke", str(file), "--set", "errors.axis_tilt_y_deg=0")
+    assert kept.format("") in out
+    file.write_text(
+        'drive = "csf-25-80"\n[tolerances]\naxis_tilt_x_deg = { distribution = "uniform", lower = -0.1, upper = 0.1 }\n'
+    )
+    _, out, _ = said(capsys, "stack", str(file), "-n", "2048")
+    assert "default: [tolerances] keeps of csf-25-80 axis_eccentricity_mm, axis_tilt_y_deg, wg_eccentricity_mm, " in out
+    for whole in ("csf-25-80", "csf-25-80-tolerances"):
+        assert "keeps of" not in said(capsys, "stack", whole, "-n", "2048", "--set", "errors.axis_tilt_x_deg=0")[1]
+
+
+def test_a_drive_in_place_of_the_studys_own_is_said(tmp_path, capsys):
+    """Fault caught: another drive computed under the name of a study, in silence."""
+    file = tmp_path / "own.toml"
+    file.write_text(OWN)
+    _, out, _ = said(capsys, "ke", str(file), "--drive", "csf-25-80")
+    sections = "[drive], [wave_generator], [clearances], [material], [load]"
+    assert f"default: --drive: {sections} are those of csf-25-80, whatever {file} gives" in out
+    assert "--drive:" not in said(capsys, "ke", "--drive", "csf-25-80")[1]
+
+
 def test_a_drive_that_nobody_named_is_said(tmp_path, capsys):
     """Would catch a recording judged by the shipped drive's ratio without a word."""
     rows = "\n".join(f"{i * 0.01},{i * 3.6},{i * 3.6 / 80}" for i in range(400))
