@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import click
 from click.core import ParameterSource
 
 from hdopt.errors import shown
 from hdopt.files import FilesOfWork
-from hdopt.study.named import shows
+from hdopt.study.named import shows, without_numbers
 
 MOST_FILES = 3
 FILE = re.compile(r"(?:(?:read|write)(?: to)?|folder) \S*[/.]")
@@ -22,7 +23,8 @@ def placed(message: str, context: click.Context | None, work: FilesOfWork) -> st
     names neither an option nor a file, with the study's or the recordings' names."""
     places = [] if context is None else list(dict.fromkeys(_options(message, context)))
     if work.values is not None and work.facts.get("source", "") not in message and "--set " not in message:
-        places += work.values(message)
+        of_options = () if context is None else _numbers_of_options(message, context)
+        places += work.values(without_numbers(message, of_options))
     if places:
         return f"{'; '.join(places[:MOST_FILES])}: {message}"
     if OPTION.search(message) or FILE.search(message) or _names_an_input(message, context, work):
@@ -31,24 +33,46 @@ def placed(message: str, context: click.Context | None, work: FilesOfWork) -> st
     return f"{', '.join(files[:MOST_FILES])}: {message}" if files else message
 
 
-def _options(message: str, context: click.Context) -> Iterator[str]:
-    """'-n 20' for every option whose name and value stand in the `message`, or whose text in quotes, and not yet its
-    spelling."""
+class _Given(NamedTuple):
+    """One value of an `option` as it is spelt, the option's `name` as keys are written, and whether it is the
+    `default`."""
+
+    option: str
+    name: str
+    value: object
+    default: bool
+
+
+def _values(context: click.Context) -> Iterator[_Given]:
+    """Every value that an option of the command has."""
     for parameter in context.command.params:
         if not isinstance(parameter, click.Option) or parameter.name is None:
             continue
         option = max(parameter.opts, key=len)
-        name = option.lstrip("-").replace("-", "_")
-        if re.search(rf"{option}\b", message):
-            continue
         value = context.params.get(parameter.name)
         default = context.get_parameter_source(parameter.name) is not ParameterSource.COMMANDLINE
         for one in value if isinstance(value, tuple) else (value,):
-            given = isinstance(one, str) and not default
-            if given and repr(one) != shown(one) and shown(one) in message:
-                yield option  # the message shows of its long text what there is room for
-            elif (given and repr(one) in message) or shows(message, one, name):
-                yield f"{option} {one}" + (" (the default)" if default else "")
+            yield _Given(option, option.lstrip("-").replace("-", "_"), one, default)
+
+
+def _options(message: str, context: click.Context) -> Iterator[str]:
+    """'-n 20' for every option whose name and value stand in the `message`, or whose text in quotes, and not yet its
+    spelling."""
+    for option, name, one, default in _values(context):
+        if re.search(rf"{option}\b", message):
+            continue
+        given = isinstance(one, str) and not default
+        if given and repr(one) != shown(one) and shown(one) in message:
+            yield option  # the message shows of its long text what there is room for
+        elif (given and repr(one) in message) or shows(message, one, name):
+            yield f"{option} {one}" + (" (the default)" if default else "")
+
+
+def _numbers_of_options(message: str, context: click.Context) -> Iterator[float]:
+    """The numbers of options of which the `message` speaks, by their spelling or by name and value."""
+    for option, name, one, _ in _values(context):
+        if isinstance(one, int | float) and (re.search(rf"{option}\b", message) or shows(message, one, name)):
+            yield float(one)
 
 
 def _names_an_input(message: str, context: click.Context | None, work: FilesOfWork) -> bool:

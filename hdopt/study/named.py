@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any  # Any: what a study file holds, of TOML's several kinds
 
 from hdopt.study.document import Document, leaves
+from hdopt.study.nearest import UNIT
 from hdopt.toml_lines import Keys
 
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
@@ -18,6 +19,9 @@ KEY = re.compile(r"(?<![\w.\-/])[a-z]\w*(?:\.\w+)+|\[(\w+)\](?: (\w+))?")
 COMMON = 100
 """Whole numbers up to this stand in many a message and many a study: they are taken only beside their key's name."""
 
+LITTLE = ("to", "of", "at", "in", "by")
+"""Words in names of keys that stand in any message."""
+
 MOST_ALIKE = 3
 """Places of one value that a message may name where it shows no other."""
 DIGITS = range(6, 18)
@@ -27,6 +31,12 @@ DIGITS = range(6, 18)
 def numbers_in(message: str) -> set[float]:
     """The numbers that stand in `message`, but in its examples; a comma or a full stop that follows is none of them."""
     return {float(found) for found in NUMBER.findall(EXAMPLE.sub("", message))}
+
+
+def without_numbers(message: str, values: Iterable[float]) -> str:
+    """`message` without the numbers that are one of `values`: they are spoken for."""
+    known = set(values)
+    return NUMBER.sub(lambda found: "" if float(found[0]) in known else found[0], message)
 
 
 def shows(message: str, value: Any, name: str) -> bool:
@@ -44,8 +54,9 @@ def shows(message: str, value: Any, name: str) -> bool:
 
 
 def _speaks_of(name: str, message: str) -> bool:
-    """Whether `message` has a part of the `name`, with any end where it has three letters or more."""
-    parts = [part for part in re.split(r"[_\-]", name) if part]
+    """Whether `message` has a part of the `name`, with any end where it has three letters or more: but for its unit and
+    little words, which stand in any message."""
+    parts = [part for part in re.split(r"[_\-]", UNIT.sub("", name)) if part and part not in LITTLE]
     return any(re.search(rf"\b{part}" + ("" if len(part) > 2 else r"\b"), message) for part in parts)
 
 

@@ -181,7 +181,7 @@ class PositionZoneRow(Section):
         return Rayleigh(scale=self.std, upper=radius)
 
 
-AnyRow = Annotated[
+SpreadRow = (
     NormalRow
     | UniformRow
     | TriangularRow
@@ -190,10 +190,11 @@ AnyRow = Annotated[
     | LogNormalRow
     | BetaRow
     | MeasuredRow
-    | PositionZoneRow
-    | FixedRow,
-    Field(discriminator="distribution"),
-]
+    | FixedRow
+)
+AnyRow = Annotated[SpreadRow | PositionZoneRow, Field(discriminator="distribution")]
+RowWithoutZone = Annotated[SpreadRow, Field(discriminator="distribution")]
+"""Of what has no place in a plane, as a tilt or the deviation of teeth."""
 
 
 class CorrelationRow(Section):
@@ -306,7 +307,12 @@ def _check_size(key: str, distribution: Distribution) -> None:
         )
 
 
-_ROWS: dict[str, Any] = {key: (AnyRow | None, None) for key in STUDY_KEYS}
+def _row(key: str) -> Any:
+    """The type of the row of the error `key`."""
+    return AnyRow if key.endswith("_eccentricity_mm") else RowWithoutZone
+
+
+_ROWS: dict[str, Any] = {key: (_row(key) | None, None) for key in STUDY_KEYS}
 """Fields as pydantic takes them; its types know no fields whose names are data."""
 TolerancesSection = create_model("TolerancesSection", __base__=TolerancesBase, **_ROWS)
 """[tolerances] with a field for every error, so that a misspelt one is refused with the nearest."""

@@ -72,6 +72,21 @@ def test_a_refused_number_comes_with_its_option(line, inputs, capsys):
         assert said.count("\n") <= 3
 
 
+@pytest.mark.parametrize(
+    ("line", "innocent"),
+    [
+        ("ke --sampling-deg 0", "errors.cs_tooth_phase_deg"),
+        ("ke --sampling-deg -3", "errors"),
+        ("stack -n 2000 --quantile 0.99999", "load.input_speed_rpm"),
+    ],
+)
+def test_a_refused_option_points_to_nothing_else(line, innocent, inputs, capsys):
+    """Faults caught: values of the study that are equal to the option's, or to a limit that the message names, beside
+    a unit or a little word that their keys share with it: a speed of 2000 for -n 2000, a phase of 0 for 'above 0'."""
+    said = refusal(line.split(), capsys)
+    assert innocent not in said and ".toml" not in said, said
+
+
 def test_every_option_with_a_number_is_bounded_or_tried_above():
     tried = {(line.split()[0], line.split()[-1]) for line in REFUSED}
     for name in COMMANDS:
@@ -106,6 +121,13 @@ def test_a_message_shows_a_number_however_it_is_written(value, form):
         return
     assert shows(f"the yield is {written}; it is refused", value, "yield")
     assert not shows("the yield is refused", value, "yield")
+
+
+def test_a_unit_or_a_little_word_names_no_key():
+    """Faults caught: 'give 1 to 64' for a peak_to_peak_arcmin of 1, 'above 0 deg' for a phase_deg of 0."""
+    assert not shows("it is -1; give 1 to 64", 1.0, "peak_to_peak_arcmin")
+    assert not shows("it must lie above 0 deg", 0.0, "cs_tooth_phase_deg")
+    assert shows("a peak of 1 is too small", 1.0, "peak_to_peak_arcmin")
 
 
 def test_a_common_number_is_taken_only_beside_its_name():

@@ -74,12 +74,12 @@ def test_a_long_line_is_not_looked_at_for_hints(study, length, hinted):
 
 
 KINDS_OF_ROW = [
-    ("wg_tilt_major_deg", "distribution", row.model_fields["distribution"].annotation.__args__[0], row)
+    ("wg_eccentricity_mm", "distribution", row.model_fields["distribution"].annotation.__args__[0], row)
     for row in sections_in(AnyRow)
     if "distribution" in row.model_fields
 ]
 KINDS_OF_COST = [
-    ("wg_tilt_major_deg.cost", "model", row.model_fields["model"].annotation.__args__[0], row)
+    ("wg_eccentricity_mm.cost", "model", row.model_fields["model"].annotation.__args__[0], row)
     for row in sections_in(Cost)
     if "model" in row.model_fields
 ]
@@ -100,7 +100,7 @@ def test_a_misspelt_key_of_a_row_is_answered_with_the_one_meant(study, table, ki
         if table.endswith("cost"):
             given = f'{{ distribution = "normal", std = 0.003, lower = -0.01, upper = 0.01, cost = {given} }}'
         with pytest.raises(HdoptError) as refused:
-            study(f"[tolerances]\nwg_tilt_major_deg = {given}")
+            study(f"[tolerances]\nwg_eccentricity_mm = {given}")
         # One letter is like nothing: all keys follow.
         meant = f"did you mean '{key}'?" if len(key) > 1 else f"known: {', '.join(sorted(row.model_fields))}"
         assert f"unknown key '{key}x'; {meant}" in str(refused.value)
@@ -110,3 +110,14 @@ def test_so_is_one_in_a_list(study):
     """Fault caught: rows of a list, whose place in it no table has."""
     with pytest.raises(HdoptError, match=r"correlation\.0\.erors: unknown key 'erors'; did you mean 'errors'"):
         study("[[tolerances.correlation]]\nerors = []")
+
+
+@pytest.mark.parametrize("key", sorted(ErrorsSection.model_fields))
+def test_only_an_eccentricity_has_a_position_zone(study, key):
+    """Fault caught: a tilt with a zone of 0.2 mm, taken for 0 to 0.1 deg, and the yield of that."""
+    text = f'[tolerances]\n{key} = {{ distribution = "position_zone", diameter = 0.02 }}'
+    if key.endswith("_eccentricity_mm"):
+        assert study(text).sections["tolerances"].rows[key].diameter == 0.02
+        return
+    with pytest.raises(HdoptError, match=rf"{key}.distribution: is 'position_zone'; it must be one of normal, uniform"):
+        study(text)
