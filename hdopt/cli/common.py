@@ -15,6 +15,7 @@ from click.shell_completion import CompletionItem
 
 from hdopt.cli.completion import a_file, drives, engines, offered, studies
 from hdopt.cli.log import logged
+from hdopt.cli.whole_number import WholeNumber
 from hdopt.files import HasTables, claim_output, files_of_work, to_csv, to_json, write_tables, write_text
 from hdopt.words import without_minus_nought
 
@@ -89,9 +90,7 @@ def _tables_wanted() -> list[tuple[str, Path]]:
     return [] if context is None else context.meta.get(TABLES, [])
 
 
-seed_option = click.option(
-    "--seed", type=click.IntRange(0, 2**63 - 1), default=1, show_default=True, help="Random seed."
-)
+seed_option = click.option("--seed", type=WholeNumber(0, 2**63 - 1), default=1, show_default=True, help="Random seed.")
 set_option = click.option(
     "--set", "overrides", metavar="KEY=VALUE", multiple=True, help="Change a key of the study; may be repeated."
 )

@@ -10,6 +10,7 @@ import click
 
 from hdopt.cli.common import StudyOptions, answer_options, emit, study_options, table_options
 from hdopt.cli.completion import a_file
+from hdopt.cli.whole_number import WholeNumber
 from hdopt.words import counted
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 @study_options
 @click.option("-o", "--output", "file", metavar="FILE", default="explorer.html", show_default=True,
               shell_complete=a_file, help="The page to write.")  # fmt: skip
-@click.option("-n", "n", type=click.IntRange(1, 100_000), default=2048, show_default=True, help="Drives of the cloud.")
+@click.option("-n", "n", type=WholeNumber(1, 100_000), default=2048, show_default=True, help="Drives of the cloud.")
 @table_options
 @answer_options
 def command(asked: StudyOptions, file: str, n: int, json_file: Path | None, seed: int) -> None:

@@ -10,6 +10,7 @@ import click
 
 from hdopt.cli.common import StudyOptions, check_option, emit, json_option, status, study_options, table_options
 from hdopt.cli.completion import geometries, offered, structures, unhyphened
+from hdopt.cli.whole_number import WholeNumber
 from hdopt.words import counted
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 @json_option
 @click.option(
     "--seed",
-    type=click.IntRange(0, 2**63 - 1),
+    type=WholeNumber(0, 2**63 - 1),
     expose_value=False,
     help="Taken as in every command; nothing here is random.",
 )

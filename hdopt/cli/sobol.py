@@ -10,6 +10,7 @@ import click
 
 from hdopt.cli.common import StudyOptions, emit, status, study_options, table_options, watched, work_options
 from hdopt.cli.completion import offered, sensitivity_methods
+from hdopt.cli.whole_number import WholeNumber
 from hdopt.words import counted
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 @click.command()
 @table_options
 @study_options
-@click.option("-n", "n", type=click.IntRange(1, 2**30), help="Base points in all; 16384, or the method's own number.")
+@click.option("-n", "n", type=WholeNumber(1, 2**30), help="Base points in all; 16384, or the method's own number.")
 @click.option(
     "--method",
     metavar="METHOD",

@@ -20,6 +20,7 @@ from hdopt.cli.common import (
     work_options,
 )
 from hdopt.cli.completion import offered, samplings, stack_geometries, unhyphened
+from hdopt.cli.whole_number import WholeNumber
 from hdopt.words import counted
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 @click.command()
 @table_options
 @study_options
-@click.option("-n", "n", type=click.IntRange(1, 10**13), default=2**18, show_default=True, help="Samples in all.")
+@click.option("-n", "n", type=WholeNumber(1, 10**13), default=2**18, show_default=True, help="Samples in all.")
 @click.option("--tail", type=float, metavar="LIMIT", help="Also the probability of exceeding LIMIT, down to 1e-7.")
 @click.option("--worst-case", is_flag=True, help="Also the worst case over the tolerance box, with its certificate.")
 @click.option("--quantile", "quantiles", type=float, multiple=True, help="A further quantile; may be repeated.")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal  # Any: fields that pydantic takes
 
 import numpy as np
-from pydantic import ConfigDict, Field, create_model
+from pydantic import ConfigDict, Field, create_model, model_validator
 
 from hdopt.drive.errors import PHASE_OF, STUDY_KEYS, study_key
 from hdopt.drive.geometry import DriveGeometry
@@ -345,6 +345,14 @@ class ContributorRow(Section):
     cost: Cost | None = None
     """What tightening costs; for `hdopt allocate`."""
 
+    @model_validator(mode="after")
+    def _can_be_built(self) -> ContributorRow:
+        try:
+            self.build("")
+        except HdoptError as error:
+            raise ValueError(str(error).removeprefix("contributor '': ")) from error
+        return self
+
     def build(self, name: str) -> tuple[Contributor, Distribution]:
         contributor = Contributor(name, self.callout, self.value_mm, vector_of(self.feeds), self.length_mm)
         return contributor, contributor_distribution(self.value_mm, self.spread)
@@ -371,14 +379,7 @@ class ContributorsSection(Section):
         return dict(self.__pydantic_extra__)
 
     def build(self) -> dict[Contributor, Distribution]:
-        built = {}
-        for name, row in self.rows.items():
-            try:
-                contributor, distribution = row.build(name)
-            except HdoptError as error:
-                raise HdoptError(f"[contributors] {name}: {error}") from error
-            built[contributor] = distribution
-        return built
+        return dict(row.build(name) for name, row in self.rows.items())
 
     def costs(self) -> Mapping[str, Cost]:
         return {name: row.cost for name, row in self.rows.items() if row.cost is not None}

@@ -104,11 +104,13 @@ def _doubts(study: Study, lacking: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _judged(one: Capability, found: Sequence[Capability]) -> Capability:
-    """The verdict, `one` of what is `found`, with only the commands whose own work can be done; others as they are."""
+    """The verdict, `one` of what is `found`, with only the commands whose own work can be done; "no" where there is
+    none, and others as they are."""
     if one.what != VERDICT or not one.can:
         return one
     work = {name: other for other in reversed(found) if other.what != VERDICT for name in other.commands}
-    return replace(one, commands=tuple(name for name in one.commands if work[name].can) or one.commands)
+    able = tuple(name for name in one.commands if work[name].can)
+    return replace(one, commands=able) if able else replace(one, why="none of its commands can be run")
 
 
 def _loaded(source: Any) -> tuple[Study, tuple[str, ...]]:

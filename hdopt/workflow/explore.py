@@ -119,7 +119,7 @@ def explorer_page(study: Study, n: int = CLOUD_N, seed: int = 1) -> ExplorerPage
     notes = _notes(study)
     matrix = cloud = None
     table = np.empty((0, len(ERROR_NAMES) + 1))
-    if "tolerances" in study.sections and "requirement" in study.sections:
+    if not _lacking(study):
         matrix, peaks = _cloud(study, n, seed)
         table = np.column_stack([_in_study_units(matrix), peaks])
         cloud = {"errors": _rounded(_in_study_units(matrix)), "peak_to_peak": _rounded(peaks)}
@@ -155,6 +155,12 @@ def _check(drive: Drive) -> None:
         )
 
 
+def _lacking(study: Study) -> list[str]:
+    """The sections that the cloud of drives needs and `study` has not."""
+    varies = "contributors" if "contributors" in study.sections else "tolerances"
+    return [f"[{name}]" for name in (varies, "requirement") if name not in study.sections]
+
+
 def _notes(study: Study) -> tuple[str, ...]:
     notes = []
     if study.effects:
@@ -166,7 +172,7 @@ def _notes(study: Study) -> tuple[str, ...]:
             f"The cloud's drives have teeth drawn from tolerances of pitch ({', '.join(drawn)}); the drive that the "
             "sliders move has one sine a spline."
         )
-    lacking = [f"[{name}]" for name in ("tolerances", "requirement") if name not in study.sections]
+    lacking = _lacking(study)
     if lacking:
         notes.append(f"There is no cloud of drives: the study has no {' and no '.join(lacking)}.")
     return tuple(notes)

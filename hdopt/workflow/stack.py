@@ -15,7 +15,13 @@ from hdopt.kinematics.model_error import WORTH_A_WORD_ARCMIN, ModelError, model_
 from hdopt.kinematics.waveform import CLOSED_FORM, EXACT
 from hdopt.parallel.engine import Engine
 from hdopt.study import AnyStudy, Study, as_study
-from hdopt.study.tolerances import ContributorsSection, LinearStackSection, RequirementSection, TolerancesBase
+from hdopt.study.tolerances import (
+    ContributorsSection,
+    LinearStackSection,
+    RequirementSection,
+    TolerancesBase,
+    TolerancesSection,
+)
 from hdopt.tolerance.copula import CorrelationGroup
 from hdopt.tolerance.distributions import Distribution
 from hdopt.tolerance.drive_inputs import DriveProblem, DriveResponse, drive_problem
@@ -134,11 +140,12 @@ def study_problem(study: AnyProblem) -> ToleranceProblem:
 @numbers_named
 def drive_problem_of(study: Study) -> DriveProblem:
     """The drives of a `study` under its [tolerances] and [contributors], without effects: their response, arcmin, and
-    their random inputs. Raises `HdoptError` where it has no [tolerances] or no [requirement]."""
-    study.require(("drive", "wave_generator", "tolerances", "requirement"), "a stack")
-    tolerances = study.section("tolerances", TolerancesBase, "a stack")
-    requirement = study.section("requirement", RequirementSection, "a stack")
+    their random inputs. Raises `HdoptError` where it has neither of both or no [requirement]."""
     contributors = study.find("contributors", ContributorsSection)
+    varies = () if contributors is not None and contributors.rows else ("tolerances",)
+    study.require(("drive", "wave_generator", *varies, "requirement"), "a stack")
+    tolerances = study.find("tolerances", TolerancesBase) or TolerancesSection()
+    requirement = study.section("requirement", RequirementSection, "a stack")
     return drive_problem(
         study.drive,
         _not_measured(study, tolerances.distributions(study.folder)),

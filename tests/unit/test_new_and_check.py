@@ -173,6 +173,34 @@ def test_the_verdict_names_no_command_that_cannot_be_run(tmp_path, capsys):
     assert "yes  verdict on the requirement (hdopt stack, hdopt sobol)\n" in out
 
 
+def test_a_verdict_that_no_command_can_give_is_none(tmp_path, capsys):
+    """Fault caught: 'yes' with all four commands, each of which ends with what is missing."""
+    file = tmp_path / "own.toml"
+    flat = OWN.replace("[wave_generator]", '[wave_generator]\nprofile = "two_disk"')
+    tolerance = 'axis_eccentricity_mm = { distribution = "rayleigh", scale = 0.005 }'
+    file.write_text(f"{flat}\n[tolerances]\n{tolerance}\n[requirement]\npeak_to_peak_arcmin = 0.8\n")
+    _, out, _ = said(capsys, "check", str(file))
+    (line,) = [line for line in out.splitlines() if "verdict on the requirement" in line]
+    assert line.startswith("  no ")
+
+
+def test_callouts_alone_are_stacked(tmp_path, capsys):
+    """They stand in place of tolerances. Fault caught: an empty [tolerances] asked for beside them."""
+    file = tmp_path / "own.toml"
+    callout = 'bore = { callout = "coaxiality", value_mm = 0.02, feeds = "axis_eccentricity" }'
+    text = f"{OWN}\n[requirement]\npeak_to_peak_arcmin = 0.8\n[contributors]\n{callout}\n"
+    found = []
+    for more in ("", "[tolerances]\n"):
+        file.write_text(text + more)
+        _, out, error = said(capsys, "stack", str(file), "-n", "2048", "--json", "-")
+        assert not error
+        found.append(json.loads(out)["yield"])
+        assert "yes  tolerance stack and sensitivities" in said(capsys, "check", str(file))[1]
+    assert found[0] == found[1]
+    file.write_text(text.partition("[contributors]")[0] + "[contributors]\n")
+    assert "needs a [tolerances] section" in said(capsys, "stack", str(file), "-n", "2048")[2]
+
+
 @pytest.mark.parametrize("value", [True, "keyway", 14.0, 6])
 def test_an_assumed_size_is_printed_as_a_study_takes_it(value):
     """Would catch `hub = True` and `mount = keyway`, which no study file may say."""

@@ -121,3 +121,18 @@ def test_only_an_eccentricity_has_a_position_zone(study, key):
         return
     with pytest.raises(HdoptError, match=rf"{key}.distribution: is 'position_zone'; it must be one of normal, uniform"):
         study(text)
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ('callout = "paralelism", feeds = "axis_tilt", length_mm = 20', "unknown callout 'paralelism'; did you mean"),
+        ('callout = "parallelism", feeds = "axis_tilt_z", length_mm = 20', "unknown error to feed 'axis_tilt_z'"),
+        ('callout = "parallelism", feeds = "axis_tilt"', "parallelism needs length_mm"),
+        ('callout = "coaxiality", feeds = "axis_tilt"', "coaxiality cannot feed axis_tilt"),
+    ],
+)
+def test_a_callout_that_feeds_nothing_is_refused_with_its_line(study, row, said):
+    """Fault caught: refused by a stack alone, so that an export drew the parts without it."""
+    with pytest.raises(HdoptError, match=rf"line 3, contributors.bore: {said}"):
+        study(f"[contributors]\nbore = {{ value_mm = 0.01, {row} }}")
