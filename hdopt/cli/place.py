@@ -61,10 +61,10 @@ def _options(message: str, context: click.Context) -> Iterator[str]:
     for option, name, one, default in _values(context):
         if re.search(rf"{option}\b", message):
             continue
-        given = isinstance(one, str) and not default
-        if given and repr(one) != shown(one) and shown(one) in message:
+        text = one if isinstance(one, str) and not default else None
+        if text is not None and repr(text) != shown(text) and shown(text) in message:
             yield option  # the message shows of its long text what there is room for
-        elif (given and repr(one) in message) or shows(message, one, name):
+        elif (text is not None and repr(text) in message) or shows(message, one, name):
             yield f"{option} {one}" + (" (the default)" if default else "")
 
 

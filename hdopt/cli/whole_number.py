@@ -21,5 +21,5 @@ class WholeNumber(click.IntRange):
                 text = whole + part.rstrip("0").ljust(exponent, "0")
         if not re.fullmatch(r"[+-]?\d+", text):
             self.fail(f"{value!r} is no whole number; write it as 100000 or 1e5", param, ctx)
-        number: int = super().convert(text, param, ctx)
+        number: int = super().convert(int(text), param, ctx)
         return number
