@@ -54,10 +54,10 @@ def fit_in_zones(
     other_sets: Sequence[Fit] = (),
 ) -> ZoneRipple | None:
     """The one term of `ripple` that the zones may meet inside them, or None where it acts beside them or the sum of
-    sines explains as much. Effects found with it stay beside; a sine without physics, which stands for what it does to
-    the driving zone, goes. Where `ripple` has no such term and leaves more than noise, the first of the `other_sets`
-    that has one is tried: of teeth that differ in height a few lines may explain more than the mesh and its nearest
-    waves.
+    sines explains as much. Effects found with it stay beside where they still show; a sine without physics, which
+    stands for what it does to the driving zone, goes. Where `ripple` has no such term and leaves more than noise, the
+    first of the `other_sets` that has one is tried: of teeth that differ in height a few lines may explain more than
+    the mesh and its nearest waves.
 
     `rows` are the rows as recorded with their recorded error, `low` the base and effects fitted on averaged rows.
     `nuisances` are the columns that are always free; `told` is what was found of it on other rows of the recordings,
@@ -76,7 +76,6 @@ def fit_in_zones(
     known = _weighed([problem.explanations[t.effect].term(rows, t.shape, base_value) for t in low.terms], low)
     sines = _at(problem, low, [*known, *_weighed(ripple.terms, ripple)])
     sines = refine(sines, problem.settings.fit.settled_iterations, move_shapes=False)
-    best, inside = _score(sines), None
     # Waves of the teeth may stand for what the ripple does to the driving zone: it is fitted without them, too.
     others = [one for one in known if one[0].met is None]
     starts = (known, others) if len(others) < len(known) else (known,)
@@ -91,10 +90,11 @@ def fit_in_zones(
             return None
     if not any(leaves_white_noise(fit) for fit in fits):
         fits += each(lambda start: _step_by_step(problem, low, [*start, *beside], effect, shapes), starts)
-    for fit in fits:
-        if _score(fit) < best:
-            best, inside = _score(fit), _alone(fit, len(fit.terms) - len(beside) - 1)
-    return inside
+    inside = min((sines, *fits), key=_score)
+    if inside is sines:
+        return None
+    first = len(inside.terms) - len(beside) - 1
+    return _alone(_without_idle(inside, first), first)
 
 
 def _physical(ripple: Fit) -> list[Weighed]:
@@ -189,6 +189,18 @@ def widened(waves: Array, width: int) -> Array:
     wide = np.zeros(width)
     wide[:half], wide[width // 2 : width // 2 + half] = waves[:half], waves[half:]
     return wide
+
+
+def _without_idle(fit: Fit, first: int) -> Fit:
+    """`fit` without those of its terms from the `first` on, but for the mesh, its last, that do not pay for themselves:
+    a line may have held what the mesh's sines left of it, and nothing of the mesh as the zones meet it."""
+    for at in reversed(range(first, len(fit.terms) - 1)):
+        keep = fit.all_but(at)
+        terms, own = [fit.terms[i] for i in keep], [fit.coefficients[i] for i in keep]
+        fewer = evaluate(fit.problem, fit.errors, fit.offsets, terms, own)
+        fewer = refine(fewer, fit.problem.settings.fit.known_iterations, move_shapes=False)
+        fit = min(fewer, fit, key=_score)
+    return fit
 
 
 def _score(fit: Fit) -> float:
