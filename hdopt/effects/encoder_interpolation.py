@@ -17,6 +17,7 @@ import numpy as np
 
 from hdopt.arrays import Array, Mask
 from hdopt.drive.geometry import DriveGeometry
+from hdopt.effects._time_laws import columns_growing
 from hdopt.effects.base import Effect, Keys
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import Category, Quantity, Shaft, Sines, needed, smallest_set
@@ -175,6 +176,9 @@ class EncoderInterpolation(Effect):
 
     def reads_input(self, shape: Shape) -> bool:
         return bool(shape.get("shaft") == Shaft.INPUT)
+
+    def other_laws(self, conditions: Conditions, term: Term, motion: Array) -> Mapping[str, Sequence[Array]]:
+        return {"time": columns_growing(conditions, term)}
 
     def orders(self, shape: Shape, ratio: float) -> list[float]:
         order = shape["lines"] / (ratio if shape["shaft"] == Shaft.OUTPUT else 1.0)

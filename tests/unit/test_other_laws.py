@@ -18,7 +18,9 @@ from hdopt.effects import EFFECTS
 from hdopt.effects._direction_laws import columns_by_direction
 from hdopt.effects._friction_law import Law
 from hdopt.effects._speed_laws import weights_by_speed
-from hdopt.effects._time_laws import weights_by_time
+from hdopt.effects._time_laws import columns_growing, part_gone_by, weights_by_time
+from hdopt.effects.declared import Shaft
+from hdopt.effects.term import Term
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.kinematics.waveform import kinematic_error_arcmin
 from hdopt.recordings.read import recording_from_table
@@ -197,6 +199,47 @@ def test_what_wears_in_fades_from_the_start_of_each_recording():
     assert weights_by_time(Rows(**{**vars(two), "locked": True})) == []
     fewer = np.r_[way, np.repeat([1.0, -1.0, 1.0], (5, 5, 10))]
     assert weights_by_time(Rows(**{**vars(two), "direction": fewer})) == []
+
+
+def lines_of_an_encoder(grows, shaft="output", lines=400):
+    """The fit of an encoder's lines to four passes of 20 turns, in which a wave at their order is by so much (`grows`)
+    larger at the end than at the start, beside 0.25 arcmin."""
+    order = lines if shaft == "input" else lines / 80
+
+    def wave(own, direction, part):
+        turned = np.concatenate([np.arange(1200)[:: 1 if i % 2 == 0 else -1] for i in range(4)]) * 2 * np.pi / 60 + 0.2
+        return (0.25 + grows * part) * np.sin(order * turned + 1.0)
+
+    return there_and_back("encoder_interpolation", {"shaft": Shaft(shaft), "lines": lines, "cycles": (1,)}, wave)
+
+
+def test_lines_of_an_encoder_do_not_grow():
+    """A wave that grows or fades by 0.2 arcmin is a hundred in log evidence in 4,800 rows, as the noise is first taken;
+    one that does not pays for the two coefficients more. It was named an encoder (case 26 of run-023: a wave of the
+    time). Faults caught: not asked; asked without the wave that is alike at all times; coefficients that cost nothing.
+    """
+    for grows in (0.2, -0.2):
+        found = other_law(lines_of_an_encoder(grows), 1.0)
+        assert found.of == "time" and found.log_evidence > 10 * DEFAULT.verdict.other_law
+    for shaft, lines in (("output", 400), ("output", 1000), ("input", 12)):
+        assert other_law(lines_of_an_encoder(0.0, shaft, lines), 1.0) == OtherLaw()
+
+
+def test_what_has_gone_by_is_counted_in_each_recording():
+    """Fault caught: the time since the first of all recordings."""
+
+    class Rows(SimpleNamespace):
+        def __len__(self):
+            return 6
+
+    rows = Rows(locked=False, time=np.array([0.0, 1, 2, 100, 110, 140]), record=np.repeat([0, 1], 3), records=2)
+    np.testing.assert_allclose(part_gone_by(rows), [0, 0.5, 1, 0, 0.25, 1])
+    for of, value in (("locked", True), ("time", None), ("time", np.array([0.0, 1, 2, 7, 7, 7]))):
+        assert part_gone_by(Rows(**{**vars(rows), of: value})) is None
+    term = Term("encoder_interpolation", {}, columns=np.ones((6, 1)))
+    (columns,) = columns_growing(rows, term)
+    np.testing.assert_allclose(columns, np.column_stack([np.ones(6), part_gone_by(rows)]))
+    assert columns_growing(rows, Term("encoder_interpolation", {})) == []
 
 
 def test_rough_noise_and_each_law_cost_evidence(monkeypatch):
