@@ -10,7 +10,7 @@ import numpy as np
 
 from hdopt.geometry.balloons import point_out
 from hdopt.geometry.bought import HeldRing, Screws, bought
-from hdopt.geometry.digits import drawn
+from hdopt.geometry.digits import auxiliary
 from hdopt.geometry.drawing import FROM_LEFT, SCALES, Placed, draw_exploded, draw_view
 from hdopt.geometry.materials import mass, material
 from hdopt.geometry.mating_drawing import ERRORS
@@ -47,7 +47,8 @@ def assembly_sheet(job: Job) -> Sheet:
     sheet.text((MIDDLE[0], top - 10), "section along the major axis", 3.6, "middle", bold=True)
     over = 5 / scale
     sheet.line(place.point(low - over, 0), place.point(high + over, 0), "axis")
-    sheet.dimension(place.point(low, edge), place.point(high, edge), bottom + 12, drawn(high - low, ()), False)
+    # The parts' own lengths make it.
+    sheet.dimension(place.point(low, edge), place.point(high, edge), bottom + 12, auxiliary(high - low), False)
     _numbers(sheet, place, job, (top, bottom))
     draw_exploded(sheet, made, (255.0, 88.0), (146.0, 120.0))
     _parts_list(sheet, job)

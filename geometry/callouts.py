@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from hdopt.geometry.contour import Circle, ParallelCurve
-from hdopt.geometry.digits import plain, rounded
+from hdopt.geometry.digits import auxiliary, plain, rounded
 from hdopt.geometry.din471 import ring_of
 from hdopt.geometry.features import BoltCircle, DBore, KeywayBore, polar
 from hdopt.geometry.iso286 import deviations
@@ -292,14 +292,14 @@ def outer_point(bolts: BoltCircle) -> tuple[float, float]:
 
 
 def hole_note(part: Part, model: WaveGeneratorModel) -> str:
-    """Thread or clearance of the bolt holes of a `part`, which has some, with the depth (mm) of a hub's thread; `model`
-    is that of the wave generator."""
+    """Thread or clearance of the bolt holes of a `part`, which has some, with the depth (mm) of a hub's thread, which
+    its flange has; `model` is that of the wave generator."""
     bolts = part.bolts
     assert bolts is not None
     thread = next((name for name, (_, tap) in THREADS.items() if math.isclose(tap, bolts.hole)), None)
     if part.name == "hub" and thread is not None:
         depth = part.body[0].height
-        return f"{bolts.count} × {thread}-6H through {depth:g} (drill Ø{bolts.hole:g})"
+        return f"{bolts.count} × {thread}-6H through {auxiliary(depth)}, drill Ø{bolts.hole:g}"
     return f"{bolts.count} × Ø{bolts.hole:g} H13 through"
 
 
@@ -308,11 +308,9 @@ def _slot(part: Part, model: WaveGeneratorModel) -> Callout | None:
     slide = next((slide for slide in slides_of(model.parts) if slide.above is part), None)
     if slot is None or slide is None:
         return None
-    ends = (
-        f"ends R{plain(rounded(slot.width / 2))}, {plain(rounded(2 * slot.reach))} long"
-        if slot.closed
-        else "open at both ends"
-    )
+    # The width of the slot makes its round ends.
+    round_end = auxiliary(slot.width / 2, "R")
+    ends = f"ends {round_end}, {plain(rounded(2 * slot.reach))} long" if slot.closed else "open at both ends"
     lines = (
         f"slot {slot.width:g} {_limits((0.0, slide.zone))}, {slot.depth:g} {_limits(slide.depth_limits)} deep",
         f"from the back, {ends}; Ra 0.8",

@@ -63,6 +63,12 @@ def drawn(value: float, rows: Iterable[Sized]) -> str:
     return plain(rounded(value))
 
 
+def auxiliary(value: float, symbol: str = "") -> str:
+    """How a size (`value`, mm; with a `symbol` before it, as R for a radius) stands on a drawing that follows from
+    others: in parentheses, which say that it has no tolerance (ISO 129-1)."""
+    return f"({symbol}{plain(rounded(value))})"
+
+
 def plain(value: float) -> str:
     """A size (`value`, mm) to a tenth of a micrometre at most, without noughts at its end."""
     return f"{value:.{FINEST}f}".rstrip("0").rstrip(".")

@@ -27,6 +27,10 @@ ECCENTRICITY, TILTS = "wg_eccentricity_mm", ("wg_tilt_major_deg", "wg_tilt_minor
 OF_THE_WAVE_GENERATOR = ("wg_eccentricity", "wg_tilt")
 """How the vector errors that a wave generator makes begin, in [contributors]."""
 
+WIDTH, SLOT_DEPTH, BLOCK_HEIGHT = "width", "slot, depth", "block, height"
+FLANGE_TO_GROOVE = "flange to ring groove"
+"""Names of the lengths along the axis in the table."""
+
 
 @dataclass(frozen=True)
 class Dimension:
@@ -117,9 +121,9 @@ def _sizes(part: Part, model: WaveGeneratorModel) -> list[Dimension]:
     if isinstance(first, Prism):
         heights = sum(piece.height for piece in part.body if isinstance(piece, Prism))
         if isinstance(part.contour, Circle):
-            rows.limits("width", heights, (-_thinner(heights), 0.0), "", "held by the ring")
+            rows.limits(WIDTH, heights, (-_thinner(heights), 0.0), "", "held by the ring")
         else:
-            rows.limits("width", heights, general_limits(heights), "", "ISO 2768-m")
+            rows.limits(WIDTH, heights, general_limits(heights), "", "ISO 2768-m")
     _fitted(rows, part, model)
     key = part.bore.key if isinstance(part.bore, KeywayBore) else None
     if key is not None and isinstance(part.bore, KeywayBore):
@@ -158,7 +162,7 @@ def _fitted(rows: _Rows, part: Part, model: WaveGeneratorModel) -> None:
                 cut, wide = ring.groove_class, ring.groove_width
                 held = piece.groove.bottom - first.top
                 longer = _thinner(model.profiled[0].size[2])
-                rows.limits("flange to ring groove", held, (0.0, longer), "", "held by the ring")
+                rows.limits(FLANGE_TO_GROOVE, held, (0.0, longer), "", "held by the ring")
                 rows.limits("ring groove, diameter", ring.groove, deviations(cut, ring.groove), cut, "DIN 471")
                 rows.limits("ring groove, width", wide, deviations("H13", wide), "H13", "DIN 471")
     if part.bore is None:
@@ -177,9 +181,9 @@ def _slides(parts: tuple[Part, ...]) -> list[Dimension]:
         slot, block = _Rows(slide.above.name), _Rows(slide.below.name)
         source = f"clearance {slide.clearance:g} with its mate"
         slot.limits("slot", slide.slot.width, (0.0, slide.zone), "", source)
-        slot.limits("slot, depth", slide.slot.depth, slide.depth_limits, "", "clear of the block")
+        slot.limits(SLOT_DEPTH, slide.slot.depth, slide.depth_limits, "", "clear of the block")
         block.limits("block", slide.block.width, (-slide.zone, 0.0), "", source)
-        block.limits("block, height", slide.block.height, slide.height_limits, "", "clear of the slot")
+        block.limits(BLOCK_HEIGHT, slide.block.height, slide.height_limits, "", "clear of the slot")
         found += slot.rows + block.rows
     return found
 

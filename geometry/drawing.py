@@ -21,7 +21,7 @@ from hdopt.files import JsonReady
 from hdopt.geometry.arcs import outline_of_slot, sample
 from hdopt.geometry.check import CheckFailed
 from hdopt.geometry.contour import Circle
-from hdopt.geometry.digits import drawn
+from hdopt.geometry.digits import auxiliary, drawn
 from hdopt.geometry.features import DBore, KeywayBore, polar
 from hdopt.geometry.part import Part, Prism, ProfiledPart
 from hdopt.geometry.sheet import SMALL, TEXT, Point, Sheet
@@ -159,10 +159,12 @@ def _front_view(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], 
     _cutting_plane(sheet, place, low_y - 3 * over, high_y + 3 * over)
 
     left, bottom = place.point(low_x, 0)[0], place.point(0, low_y)[1]
-    tall = f"{high_y - low_y:.3f}"
-    sheet.dimension(place.point(0, low_y), place.point(0, high_y), left - 15, f"{tall}  (major axis)", True)
-    wide = f"{high_x - low_x:.3f}"
-    sheet.dimension(place.point(low_x, 0), place.point(high_x, 0), bottom + 27, f"{wide}  (minor axis)", False)
+    tall, wide = f"{high_y - low_y:.3f}", f"{high_x - low_x:.3f}"
+    if isinstance(carrier.contour, Circle):
+        # The discs' diameter and their offset make them.
+        tall, wide = f"({tall})", f"({wide})"
+    sheet.dimension(place.point(0, low_y), place.point(0, high_y), left - 15, f"{tall}  major axis", True)
+    sheet.dimension(place.point(low_x, 0), place.point(high_x, 0), bottom + 27, f"{wide}  minor axis", False)
     _bore_callout(sheet, place, job, high_x, low_y)
     _bolt_callout(sheet, place, parts, low_x, high_y)
     if isinstance(carrier.contour, Circle):
@@ -201,7 +203,7 @@ def _bore_callout(sheet: Sheet, place: Placed, job: Job, right: float, bottom: f
     lines = [f"⌀{2 * bore.radius:g} {_fit_of(job, seen)}"]
     if isinstance(bore, KeywayBore):
         depth = 2 * bore.radius + bore.key.hub_depth
-        lines += [f"keyway {bore.key.width:g} JS9", f"{depth:g} +{bore.key.hub_depth_tolerance:g}/0 (d + t2)"]
+        lines += [f"keyway {bore.key.width:g} JS9", f"d + t2 = {depth:g} +{bore.key.hub_depth_tolerance:g}/0"]
     if isinstance(bore, DBore):
         lines.append(f"flat {bore.flat:g} from the axis")
     knee = place.point(right, bottom)
@@ -246,9 +248,12 @@ def _section(sheet: Sheet, place: Placed, made: list[tuple[Part, cq.Solid]], job
     bottom = boxes[:, 1].min()
     line = place.point(0, bottom)[1]
     sheet.text((place.point((low + high) / 2, 0)[0], place.point(0, top)[1] - 16), "A – A", 5, "middle", bold=True)
-    sheet.dimension(place.point(-half, bottom), place.point(half, bottom), line + 9, drawn(2 * half, ()), False)
+    # Two discs and the gap between them make the width that they have together, all parts the whole.
+    wide = drawn(2 * half, ()) if len(job.model.profiled) == 1 else auxiliary(2 * half)
+    sheet.dimension(place.point(-half, bottom), place.point(half, bottom), line + 9, wide, False)
     if high - low > 2 * half + 1e-6:
-        sheet.dimension(place.point(low, bottom), place.point(high, bottom), line + 18, drawn(high - low, ()), False)
+        whole = auxiliary(high - low)
+        sheet.dimension(place.point(low, bottom), place.point(high, bottom), line + 18, whole, False)
     _edge_callouts(sheet, place, made, top)
     _seat_dimension(sheet, place, job, high)
     _holding_bore(sheet, place, job, low)
@@ -377,7 +382,8 @@ def _title_block(sheet: Sheet, job: Job, scale: float) -> None:
         if not isinstance(job.model.profiled[0].contour, Circle)
         else f"discs: {drive.wave_generator.bearing_thickness:g} mm inside the flexspline's inner wall at its tips",
         f"hdopt {job.identity.version}, study {job.identity.study}, fingerprint {job.identity.fingerprint}",
-        f"dimensions in mm; scale {ratio}; first-angle projection; ISO 8015; ISO 2768-1 m; ISO 22081",
+        f"dimensions in mm; scale {ratio}; first-angle projection; ISO 8015; ISO 2768-1 m; ISO 22081; "
+        "in parentheses: auxiliary",
     )
     for row, line in enumerate(lines):
         sheet.text((x + 4, y + 16 + 5.6 * row), line, SMALL + 0.2)

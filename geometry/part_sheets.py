@@ -11,6 +11,7 @@ from hdopt.geometry.arcs import outline_of_slot, outline_of_strip, sample
 from hdopt.geometry.assembly_sheet import assembly_sheet, draw_section
 from hdopt.geometry.balloons import draw_balloon, places_around, point_out
 from hdopt.geometry.callouts import Callout, callouts_of
+from hdopt.geometry.chains import axial_lengths
 from hdopt.geometry.contour import Circle
 from hdopt.geometry.digits import drawn, plain
 from hdopt.geometry.drawing import FRONT, SCALES, Placed, draw_view
@@ -19,7 +20,7 @@ from hdopt.geometry.mating_drawing import fill_mating_sheet
 from hdopt.geometry.part import Part, Prism
 from hdopt.geometry.sheet import FRAME_HEIGHT, TEXT, Sheet, Solid, text_width
 from hdopt.geometry.sheet_details import draw_details, mark_details
-from hdopt.geometry.sheet_lengths import STACK, axial_spans, draw_lengths
+from hdopt.geometry.sheet_lengths import STACK, draw_lengths
 from hdopt.geometry.sheet_title import BORDER, HEIGHT, TITLE_TOP, WIDTH, draw_border, draw_title, part_number
 from hdopt.geometry.step import ProductData
 from hdopt.geometry.views import seen_from
@@ -134,7 +135,7 @@ def _section(sheet: Sheet, place: Placed, part: Part, solid: cq.Solid, rows: Seq
     top, bottom = place.point(0, box[4])[1], place.point(0, box[1])[1]
     middle = place.point((part.bottom + part.top) / 2, 0)[0]
     sheet.text((middle, top - 14), "A – A", 5, "middle", bold=True)
-    draw_lengths(sheet, axial_spans(part), (place.point(0, 0)[0], bottom), place.scale, rows)
+    draw_lengths(sheet, axial_lengths(part), (place.point(0, 0)[0], bottom), place.scale, rows)
     _diameters(sheet, place, part, rows)
     mark_details(sheet, part, place.point(0, 0), place.scale)
     draw_details(sheet, part, DETAILS)

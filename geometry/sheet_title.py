@@ -19,7 +19,8 @@ TITLE_LEFT, TITLE_TOP = 232.0, 209.0
 NOTES = (
     "general tolerances: lengths ISO 2768-1 m; ISO 22081: profile of a surface 0.1 to the first datum",
     "edges ISO 13715: outside -0.1 to -0.3, inside +0.2 max; surfaces Ra 1.6 where not said otherwise",
-    "ISO 8015; datums ISO 5459; frames ISO 1101, ISO 1660; boxed: theoretically exact; mm; 20 °C",
+    "ISO 8015; datums ISO 5459; frames ISO 1101, ISO 1660; boxed: theoretically exact; "
+    "in parentheses: auxiliary; mm; 20 °C",
 )
 
 
