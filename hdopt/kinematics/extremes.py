@@ -197,18 +197,27 @@ def _held_high(waveform: Callable[[Array], Array], theta: Array, values: Array, 
 def zoom_lowest(function: Callable[[Array], Array], theta: Array, values: Array, period: float = 2 * np.pi) -> float:
     """Least value of `function` near the lowest local minima of its `values` at the angles `theta` (rad, (n,)) of one
     `period`."""
+    return lowest_and_where(function, theta, values, period)[1]
+
+
+def lowest_and_where(
+    function: Callable[[Array], Array], theta: Array, values: Array, period: float = 2 * np.pi
+) -> tuple[float, float]:
+    """Angle (rad, within a `period` from 0) and least value of `function` near the lowest local minima of its `values`
+    at the angles `theta` (rad, (n,)) of one `period`, rad."""
     local = np.flatnonzero((values <= np.roll(values, 1)) & (values <= np.roll(values, -1)))
     local = local[np.argsort(values[local])[:CANDIDATES]]
     gaps = np.diff(np.append(theta, theta[0] + period))
     half = np.maximum(gaps[local], gaps[local - 1])[:, None]
-    centres, best = theta[local], float(values.min())
+    centres, place, best = theta[local], float(theta[values.argmin()]), float(values.min())
     for _ in range(ZOOMS):
         fine = centres[:, None] + half * np.linspace(-1, 1, ZOOM_POINTS)
         found = function(fine.ravel()).reshape(fine.shape)
-        best = min(best, float(found.min()))
+        if found.min() < best:
+            place, best = float(fine.ravel()[found.argmin()]) % period, float(found.min())
         centres = fine[np.arange(len(centres)), found.argmin(axis=1)]
         half = half * 2.0 / (ZOOM_POINTS - 1)
-    return best
+    return place, best
 
 
 def walked_peak_to_peak_arcmin(

@@ -21,7 +21,7 @@ def extremes_arcmin(model: ExtendedModel) -> tuple[float, float]:
     Of a motion in both directions, over both passes together. Effects whose orders do not fit into the relative turn
     (a bearing's) are met in the one turn that their phases describe.
     """
-    found = [_of_pass(model, direction) for direction in model.operation.directions]
+    found = [pass_extremes_arcmin(model, direction) for direction in model.operation.directions]
     return min(low for low, _ in found), max(high for _, high in found)
 
 
@@ -31,7 +31,9 @@ def peak_to_peak_arcmin(model: ExtendedModel) -> float:
     return high - low
 
 
-def _of_pass(model: ExtendedModel, direction: float) -> tuple[float, float]:
+def pass_extremes_arcmin(model: ExtendedModel, direction: float) -> tuple[float, float]:
+    """Infimum and supremum of the kinematic error of `model` over one full relative turn that is passed in one
+    `direction` (+1 or -1), arcmin; effects too fine for the grid as in `extremes_arcmin`."""
     fine = model.too_fine
     coarse = model.with_effects([effect for effect in model.effects if effect not in fine])
     theta, values = coarse.relative_turn(direction)

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.kinematics.extremes import extremes_arcmin, held_peak_to_peak, tooth_width_peak_to_peak_arcmin
+from hdopt.kinematics.extremes import (
+    extremes_arcmin,
+    held_peak_to_peak,
+    interpolated_waveform,
+    lowest_and_where,
+    tooth_width_peak_to_peak_arcmin,
+)
 from hdopt.kinematics.waveform import DEFAULT_METHOD, relative_turn, relative_turn_points
 from hdopt.recordings.orders import ModelOrder, model_orders
 from hdopt.simulation import ExtendedModel
 from hdopt.simulation.extremes import extremes_arcmin as extended_extremes_arcmin
+from hdopt.simulation.extremes import pass_extremes_arcmin
 from hdopt.study import Study
 from hdopt.workflow.effect_selection import extended_model
 from hdopt.workflow.effect_table import effect_orders
@@ -66,6 +74,27 @@ def converged_extremes_arcmin(study: Study, method: str = DEFAULT_METHOD) -> tup
     if study.effects:
         return extended_extremes_arcmin(model_of(study, method))
     return extremes_arcmin(study.drive, study.errors, method)
+
+
+def extremes_of(shown: WaveformResult, study: Study) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The lowest and the highest point of the waveform `shown` of a `study`, each as its input angle (rad) and its
+    converged error (arcmin): those of the direction shown, between the points of the grid too.
+
+    Effects too fine for the grid, which the waveform leaves out, count in the errors and move no angle.
+    """
+    drive = study.drive
+    span = 2 * np.pi * drive.geometry.beat_phases
+    waveform: Callable[[Array], Array]
+    if study.effects:
+        model = model_of(study, shown.method)
+        low, high = pass_extremes_arcmin(model, shown.direction)
+        waveform = partial(resolved(model).waveform, direction=shown.direction)
+    else:
+        low, high = extremes_arcmin(drive, study.errors, shown.method)
+        waveform = interpolated_waveform(drive, study.errors, shown.method)
+    lowest, _ = lowest_and_where(waveform, shown.theta, shown.waveform, span)
+    highest, _ = lowest_and_where(lambda x: -waveform(x), shown.theta, -shown.waveform, span)
+    return (lowest, low), (highest, high)
 
 
 def held_arcmin(study: Study, method: str = DEFAULT_METHOD) -> float:

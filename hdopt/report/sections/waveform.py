@@ -19,12 +19,16 @@ POINTS_PER_TURN = 180
 BEAT_POINTS_PER_TURN = 120
 HOVER = "%{x:.1f} deg: %{y:.3f} arcmin"
 
+Extremes = tuple[tuple[float, float], tuple[float, float]]
+"""The lowest and the highest point of a waveform, each as angle, rad, and error, arcmin."""
+
 
 def waveform_section(
     theta: Array,
     ke_arcmin: Array,
     *,
     peak_to_peak_arcmin: float | None = None,
+    extremes: Extremes | None = None,
     requirement_arcmin: float | None = None,
     key: str = "waveform",
 ) -> Section:
@@ -32,8 +36,9 @@ def waveform_section(
 
     `theta` input angle, rad, rising evenly over one relative turn of both splines, shape (n,), its end given or left
     out; `ke_arcmin` the error there, shape (n,), at least 90 points a turn. `peak_to_peak_arcmin` is the converged
-    value where the grid's own is not to be shown; `requirement_arcmin` is what it is held against. `key` begins the
-    keys of its figures.
+    value where the grid's own is not to be shown, `extremes` the lowest and the highest point between which it lies,
+    each as angle (rad) and error (arcmin), where those of the grid are not to be marked; `requirement_arcmin` is what
+    it is held against. `key` begins the keys of its figures.
     """
     turns = _by_turn(theta, ke_arcmin)
     peak_to_peak = float(np.ptp(ke_arcmin)) if peak_to_peak_arcmin is None else peak_to_peak_arcmin
@@ -54,7 +59,7 @@ def waveform_section(
             Figure(
                 f"{key}-beat",
                 f"The error over {counted(len(turns), 'input turn')}",
-                _beat(theta, ke_arcmin, peak_to_peak),
+                _beat(theta, ke_arcmin, extremes or _of_the_grid(theta, ke_arcmin)),
                 "Every turn of the wave generator, and the envelope of its peaks. The flexspline falls behind by 1/N "
                 "of a turn each time, so its teeth meet those of the circular spline anew only after "
                 f"{counted(len(turns), 'turn')}.",
@@ -104,7 +109,14 @@ def _by_turn(theta: Array, ke_arcmin: Array) -> Array:
     return np.asarray(np.interp(wanted, theta, ke_arcmin), float)
 
 
-def _beat(theta: Array, ke_arcmin: Array, peak_to_peak: float) -> go.Figure:
+def _of_the_grid(theta: Array, ke_arcmin: Array) -> Extremes:
+    lowest, highest = (
+        (float(theta[index]), float(ke_arcmin[index])) for index in (ke_arcmin.argmin(), ke_arcmin.argmax())
+    )
+    return lowest, highest
+
+
+def _beat(theta: Array, ke_arcmin: Array, extremes: Extremes) -> go.Figure:
     low, high = _extremes_by_turn(theta, ke_arcmin)
     middle = np.arange(len(low)) + 0.5
     step = max(1, len(theta) // (len(low) * BEAT_POINTS_PER_TURN))
@@ -127,22 +139,22 @@ def _beat(theta: Array, ke_arcmin: Array, peak_to_peak: float) -> go.Figure:
             line={"width": 2, "color": INK, "shape": "spline", "smoothing": 0.6},
             hovertemplate="turn %{x:.0f}: %{y:.3f} arcmin<extra></extra>",
         )
-    extremes = (int(ke_arcmin.argmax()), "top center"), (int(ke_arcmin.argmin()), "bottom center")
-    for index, position in extremes:
+    (_, lowest), (_, highest) = extremes
+    for (angle, error), position in zip(extremes, ("bottom center", "top center"), strict=True):
         made.add_scatter(
-            x=[theta[index] / (2 * math.pi)],
-            y=[ke_arcmin[index]],
+            x=[angle / (2 * math.pi)],
+            y=[error],
             mode="markers+text",
             showlegend=False,
-            text=[f"{ke_arcmin[index]:.3f}".replace("-", "−")],
+            text=[f"{error:.3f}".replace("-", "−")],
             textposition=position,
             marker={"size": 8, "color": VERMILLION},
             textfont={"color": VERMILLION},
             name="Highest" if position.startswith("top") else "Lowest",
             hovertemplate="turn %{x:.2f}: %{y:.3f} arcmin",
         )
-    margin = 0.12 * peak_to_peak
-    made.update_yaxes(range=[ke_arcmin.min() - margin, ke_arcmin.max() + margin])
+    margin = 0.12 * (highest - lowest)
+    made.update_yaxes(range=[min(lowest, ke_arcmin.min()) - margin, max(highest, ke_arcmin.max()) + margin])
     made.update_xaxes(range=[0, len(low)])
     return made
 

@@ -18,7 +18,7 @@ from hdopt.study import Study
 from hdopt.workflow.effect_selection import extended_model, inclusion
 from hdopt.workflow.effect_table import effect_table, remarks
 from hdopt.workflow.steps import Context, StepResult, requirement_arcmin
-from hdopt.workflow.waveform import WaveformResult, converged_extremes_arcmin, resolved, waveform_of
+from hdopt.workflow.waveform import WaveformResult, converged_extremes_arcmin, extremes_of, resolved, waveform_of
 
 PAPER_ORDERS = ("1/N", "1", "2", "2(1+1/2N)", "2(1+1/N)")
 """The orders that Jia 2021, Table 6 names."""
@@ -72,7 +72,13 @@ def waveform(study: Study, context: Context) -> StepResult:
     low, high = converged_extremes_arcmin(study)
     converged = high - low
     required = requirement_arcmin(study)
-    section = waveform_section(shown.theta, shown.waveform, peak_to_peak_arcmin=converged, requirement_arcmin=required)
+    section = waveform_section(
+        shown.theta,
+        shown.waveform,
+        peak_to_peak_arcmin=converged,
+        extremes=extremes_of(shown, study),
+        requirement_arcmin=required,
+    )
     results = {"method": shown.method, "peak_to_peak_arcmin": converged, "required_arcmin": required}
     return StepResult((_with_words(section, words_of(shown, study)),), results)
 
