@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import os
@@ -258,6 +259,37 @@ def test_nothing_is_wider_than_the_screen_and_all_views_are_drawn(browser, page_
         if size[0] > 1088:  # side by side: a projector's 720 lines show all of it
             assert page.evaluate("document.documentElement.scrollHeight") <= size[1]
         assert page.errors == []
+
+
+TEXTS = """(() => {
+  const kept = [], draw = CanvasRenderingContext2D.prototype.fillText;
+  CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+    const { width, actualBoundingBoxAscent: up, actualBoundingBoxDescent: down, actualBoundingBoxLeft: left } =
+      this.measureText(text);
+    if (!this.getTransform().b) {  // what is turned stands beside an axis
+      kept.push([this.canvas.parentElement.className, text, x - left, y - up, x - left + width, y + down]);
+    }
+    draw.apply(this, arguments);
+  };
+  document.getElementById("theme").click();
+  return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(kept))));
+})()"""
+"""Every level text of the views, drawn anew: its view, its words, and its box."""
+
+
+@pytest.mark.parametrize("size", [(390, 844), (800, 1600), (1400, 1600), (1920, 1080)])
+def test_no_two_texts_of_a_view_read_as_one(browser, page_file, size):
+    """On one line they stand three quarters of a character's height apart at least. Fault caught: the colour bar's unit
+    beside the last tick of the angle, "360 arcmin"."""
+    with browser.open(page_file, size) as page:
+        texts = page.evaluate(TEXTS)
+    assert {view.split()[-1] for view, *_ in texts} == set("waveform cloud carpet orders contact bending".split())
+    assert [text for _, text, *_ in texts].count("arcmin") == 1
+    apart = 0.75 * (14 if size[0] > 1760 else 11)
+    for (view, one, *a), (other_view, other, *b) in itertools.combinations(texts, 2):
+        on_one_line = min(a[3], b[3]) > max(a[1], b[1])
+        if view == other_view and on_one_line:
+            assert max(a[0], b[0]) - min(a[2], b[2]) >= apart, f"{view}: {one!r} beside {other!r}"
 
 
 @pytest.mark.parametrize("size", [(390, 844), (1280, 900)])

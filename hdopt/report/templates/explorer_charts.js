@@ -190,18 +190,19 @@ globalThis.HdoptCharts = (() => {
   barSheet.height = 256;
 
   const colourBar = (ctx, at, x, scale, table) => {
-    const height = at.bottom - at.top;
+    // The unit stands above the bar: below it, it would read on from the last tick of the angle, "360 arcmin".
+    const top = at.top + 1.7 * size, height = at.bottom - top;
     if (barSheet.table !== table) {
       const own = barSheet.getContext("2d"), image = own.createImageData(1, 256);
       new Uint32Array(image.data.buffer).set([...table].reverse());
       own.putImageData(image, 0, 0);
       barSheet.table = table;
     }
-    ctx.drawImage(barSheet, x, at.top, 10, height);
+    words(ctx, "arcmin", x, at.top + 0.5 * size, colours.muted);
+    ctx.drawImage(barSheet, x, top, 10, height);
     for (const value of ticks(scale[0], scale[1], height / 40)) {
       words(ctx, short(value), x + 14, at.bottom - ((value - scale[0]) / (scale[1] - scale[0])) * height, colours.muted);
     }
-    words(ctx, "arcmin", x, at.bottom + 1.2 * size, colours.muted);
   };
 
   // Peak-to-peak against one input: the tolerance cloud, the path of this input alone, the present point and the limit.
