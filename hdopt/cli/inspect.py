@@ -165,18 +165,10 @@ def _lines(found: Inspection, no_drive: bool) -> Iterator[str]:
         t = found.one_turn
         spread = f"{t.mean():.4g} arcmin mean, {t.min():.4g} to {t.max():.4g}"
         yield f"peak-to-peak over one input turn: {spread}, {counted(len(t), 'turn')}"
-    turns = counted(f"{found.turns:.4g}", "input turn")
-    yield f"peak-to-peak over the recording ({turns}): {found.recording_peak_to_peak:.4g} arcmin"
-    if found.beat is not None:
-        b = found.beat
-        yield f"peak-to-peak over the full beat ({b.source}): {b.value:.4g} arcmin ({b.low:.4g} to {b.high:.4g})"
-        yield "  this is what a maker's angular transmission accuracy means: one output turn, one direction"
+    if found.locked:
+        yield "peak-to-peak, rms, slope and drift over the input's turns: none, the input is locked"
     else:
-        how = " with --drive" if no_drive else ""
-        yield f"peak-to-peak over the full beat: not known; record a whole output turn, or a quarter of one{how}"
-    yield f"rms: {found.rms:.4g} arcmin; steepest slope: {found.slope_per_deg:.4g} arcmin per deg of input" + (
-        f", {found.slope_arcsec_per_s:.4g} arcsec/s" if found.slope_arcsec_per_s is not None else ""
-    )
+        yield from _lines_of_turning(found, no_drive)
     yield from _lines_of_repeats(found)
     for line in sorted(found.orders, key=lambda o: -o.amplitude_arcmin)[:6]:
         if line.amplitude_arcmin < NIL_ARCMIN:
@@ -191,6 +183,24 @@ def _lines(found: Inspection, no_drive: bool) -> Iterator[str]:
         yield verdict_line(limit, UNITS)
 
 
+def _lines_of_turning(found: Inspection, no_drive: bool) -> Iterator[str]:
+    """The figures that need an input that turns."""
+    turns = counted(f"{found.turns:.4g}", "input turn")
+    yield f"peak-to-peak over the recording ({turns}): {found.recording_peak_to_peak:.4g} arcmin"
+    if found.beat is not None:
+        b = found.beat
+        yield f"peak-to-peak over the full beat ({b.source}): {b.value:.4g} arcmin ({b.low:.4g} to {b.high:.4g})"
+        yield "  this is what a maker's angular transmission accuracy means: one output turn, one direction"
+    else:
+        how = " with --drive" if no_drive else ""
+        yield f"peak-to-peak over the full beat: not known; record a whole output turn, or a quarter of one{how}"
+    slope = "steepest slope: not known, the input turns too little"
+    if found.slope_per_deg is not None:
+        slope = f"steepest slope: {found.slope_per_deg:.4g} arcmin per deg of input"
+    rate = "" if found.slope_arcsec_per_s is None else f", {found.slope_arcsec_per_s:.4g} arcsec/s"
+    yield f"rms: {found.rms:.4g} arcmin; {slope}{rate}"
+
+
 def _lines_of_repeats(found: Inspection) -> Iterator[str]:
     if found.returned is not None:
         yield f"return error: {found.returned.median:.4g} arcmin median, {found.returned.largest:.4g} largest"
@@ -199,7 +209,8 @@ def _lines_of_repeats(found: Inspection) -> Iterator[str]:
     if found.gauge is not None:
         g = found.gauge
         yield f"gauge: repeatability {g.repeatability:.3g}, reproducibility of mountings {g.reproducibility:.3g} arcmin"
-    yield f"drift over the recording: {found.drift:.3g} arcmin"
+    if found.drift is not None:
+        yield f"drift over the recording: {found.drift:.3g} arcmin"
     if found.torsion is not None:
         k, t = found.torsion.stiffness, found.torsion.knees
         yield f"stiffness K1 {k[0]:.4g}, K2 {k[1]:.4g}, K3 {k[2]:.4g} Nm/rad, knees {t[0]:.3g} and {t[1]:.3g} Nm"
@@ -215,7 +226,8 @@ def _batch_lines(batch: Batch) -> Iterator[str]:
             yield f"{drive.name}: not read: {drive.error}"
         else:
             mark = "  <- outlier" if drive.outlier else ""
-            yield f"{drive.name}: peak-to-peak {drive.peak_to_peak:.4g} arcmin ({drive.verdict or 'no limit'}){mark}"
+            height = "none, the input is locked" if drive.peak_to_peak is None else f"{drive.peak_to_peak:.4g} arcmin"
+            yield f"{drive.name}: peak-to-peak {height} ({drive.verdict or 'no limit'}){mark}"
     if batch.performance is not None:
         p = batch.performance
         yield f"Ppk {p.ppk:.3g} ({p.low:.3g} to {p.high:.3g}), {counted(p.n, 'drive')}, limit {batch.limit:g} arcmin"

@@ -172,14 +172,15 @@ def repeatability(parts: Sequence[Cells]) -> float | None:
     return math.sqrt(squares / freedom) if freedom else None
 
 
-def steepest_slope(cells: Cells) -> tuple[float, float]:
+def steepest_slope(cells: Cells) -> tuple[float, float] | None:
     """Steepest slope of the error against the input angle, arcmin per deg, and its standard uncertainty.
 
-    A straight line over `SLOPE_WINDOW_DEG` of neighbouring `cells` of one pass.
+    A straight line over `SLOPE_WINDOW_DEG` of neighbouring `cells` of one pass; None where no pass has as many without
+    a gap.
     """
     half = max(2, round(math.radians(SLOPE_WINDOW_DEG) / cells.width / 2))
     ones = np.ones(2 * half + 1)
-    steepest, doubt = 0.0, 0.0
+    found: list[tuple[float, float]] = []
     for index in np.unique(cells.pass_index):
         rows = np.flatnonzero(cells.pass_index == index)
         rows = rows[np.argsort(cells.place[rows])]
@@ -191,10 +192,9 @@ def steepest_slope(cells: Cells) -> tuple[float, float]:
         spread = sums[3] - sums[0] ** 2 / len(ones)
         slope = np.abs((sums[2] - sums[0] * sums[1] / len(ones)) / spread)
         whole = place[2 * half :] - place[: -2 * half] == 2 * half
-        if whole.any() and slope[whole].max() > steepest:
-            steepest = float(slope[whole].max())
-            doubt = float(np.median(cells.sigma) / np.sqrt(np.median(spread)))
-    return steepest, doubt
+        if whole.any():
+            found.append((float(slope[whole].max()), float(np.median(cells.sigma) / np.sqrt(np.median(spread)))))
+    return max(found, default=None)
 
 
 def drift(cells: Cells) -> float:

@@ -44,7 +44,11 @@ class OrderLine:
 
 @dataclass(frozen=True)
 class Inspection(ShownAsTable):
-    """The acceptance sheet of one drive; all figures in arcmin at the output unless another unit is named."""
+    """The acceptance sheet of one drive; all figures in arcmin at the output unless another unit is named.
+
+    What is None was not measured: `recording_peak_to_peak`, `rms`, `drift` and `uncertainty` (the standard one of a
+    peak-to-peak) need an input that turns, `slope_per_deg` one that turns by ten degrees.
+    """
 
     names: tuple[str, ...]
     serial: str
@@ -52,19 +56,19 @@ class Inspection(ShownAsTable):
     ratio: float
     turns: float
     one_turn: Array
-    recording_peak_to_peak: float
+    recording_peak_to_peak: float | None
     beat: Beat | None
-    rms: float
+    rms: float | None
     returned: Return | None
     repeatability: float | None
-    slope_per_deg: float
+    slope_per_deg: float | None
     slope_arcsec_per_s: float | None
     orders: tuple[OrderLine, ...]
-    drift: float
+    drift: float | None
     torsion: Torsion | None
     starting_torque: float | None
     gauge: Gauge | None
-    uncertainty: float
+    uncertainty: float | None
     checks: Mapping[str, str]
     limits: tuple[Decision, ...]
     understood: tuple[str, ...]
@@ -76,6 +80,11 @@ class Inspection(ShownAsTable):
     def missed(self) -> bool:
         """Whether any limit is missed beyond doubt."""
         return any(limit.verdict == "missed" for limit in self.limits)
+
+    @property
+    def locked(self) -> bool:
+        """Whether the input was locked in every recording: then nothing is known of an error along its turns."""
+        return not self.cells
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `hdopt inspect`; keys as in the interface contract."""
@@ -177,7 +186,8 @@ def _spread(values: Array) -> dict[str, float] | None:
 class Unit:
     """One drive of a batch: figures in arcmin, `verdict` of its peak-to-peak ("" without a limit), or why its file
     could not be read: then there are no figures. `figure` says which peak-to-peak stands there: "beat", or "recording"
-    where that is not known."""
+    where that is not known. What is None was not measured: all of it where the input was locked, `one_turn` where no
+    whole turn was recorded, `return_error` where nothing came back."""
 
     name: str
     peak_to_peak: float | None = None
@@ -225,7 +235,7 @@ class Batch(ShownAsTable):
         """The peak-to-peak of every drive, with the limit. `backend` is "plotly" or "matplotlib"."""
         import plotly.graph_objects as go
 
-        read = [drive for drive in self.drives if not drive.error]
+        read = [drive for drive in self.drives if drive.peak_to_peak is not None]
         points = go.Scatter(x=[d.name for d in read], y=[d.peak_to_peak for d in read], mode="markers")
         figure = go.Figure(points, {"xaxis_title": "drive", "yaxis_title": "peak-to-peak, arcmin"})
         return drawn(figure if self.limit is None else figure.add_hline(self.limit, line_dash="dash"), backend)

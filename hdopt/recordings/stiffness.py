@@ -13,8 +13,9 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import ARCMIN
+from hdopt.recordings.figures import neighbour_noise
 from hdopt.recordings.passes import find_passes
-from hdopt.recordings.recording import Recording
+from hdopt.recordings.recording import OF_ROUNDING, Recording
 
 GRID = 24
 """Places tried for each knee, evenly over the torque; the best is refined between its neighbours."""
@@ -23,12 +24,14 @@ GRID = 24
 @dataclass(frozen=True)
 class Torsion:
     """Stiffness (Nm/rad) below, between and above the knees (Nm), `hysteresis_loss_arcmin` the loop's width at zero
-    torque (None where the sweep does not come back), `rms_arcmin` what the three lines leave, `torque` and `windup`
-    (arcmin) the mean curve of both directions that was fitted."""
+    torque (None where the sweep does not come back) and `loss_sigma_arcmin` its standard uncertainty by the scatter of
+    single samples, the encoder's step and what is stated of the sensors, `rms_arcmin` what the three lines leave,
+    `torque` and `windup` (arcmin) the mean curve of both directions that was fitted."""
 
     stiffness: tuple[float, float, float]
     knees: tuple[float, float]
     hysteresis_loss_arcmin: float | None
+    loss_sigma_arcmin: float
     rms_arcmin: float
     torque: Array
     windup: Array
@@ -57,7 +60,9 @@ def torsion_of(recording: Recording) -> Torsion | None:
         width = np.abs(means[0] - means[1])
         loss = float(np.interp(0.0, grid, width)) if np.isfinite(np.interp(0.0, grid, width)) else None
     stiffness, knees, left = _three_lines(grid[seen], both[seen])
-    return Torsion(stiffness, knees, loss, left, grid[seen], both[seen])
+    one = neighbour_noise(recording.error_arcmin) ** 2 + (recording.quantum_arcmin * OF_ROUNDING) ** 2
+    sigma = math.sqrt(sum(one / max(len(curves), 1) for curves in branches.values()) + 2 * recording.sensor_arcmin**2)
+    return Torsion(stiffness, knees, loss, sigma, left, grid[seen], both[seen])
 
 
 def _hinges(torque: Array, first: float, second: float) -> Array:

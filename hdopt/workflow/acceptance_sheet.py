@@ -31,6 +31,7 @@ LEAST_OF_A_BEAT = 0.25
 orders are 10 times those of the whole beat, at 10 turns 44 times."""
 HIGHEST_WHOLE_ORDER = 8
 ORIGIN_UNKNOWN = "whole order of the input"
+LOCKED = "the input is locked"
 MAKERS_FIGURE = (
     "makers state the angular transmission accuracy over one turn of the output in one direction: the full beat"
 )
@@ -74,10 +75,12 @@ def acceptance_sheet(
     moving = [r for r in recordings if not r.input_locked]
     sweeps = [t for t in map(torsion_of, recordings) if t is not None]
     parts = tuple(figures.cells_of(r) for r in moving)
+    mounted = [name for name, r in zip(mountings, recordings, strict=bool(mountings)) if not r.input_locked]
     fit = fit_waveform(moving, drive, seed) if drive is not None and moving else None
     turned = [figures.turn_peak_to_peaks(cells)[0] for cells in parts]
     one_turn = np.concatenate(turned) if turned else np.empty(0)
-    slope, slope_sigma = max((figures.steepest_slope(cells) for cells in parts), default=(0.0, 0.0))
+    slopes = [slope for slope in map(figures.steepest_slope, parts) if slope is not None]
+    slope, slope_sigma = max(slopes, default=(None, 0.0))
     doubt = _uncertainty(moving, parts, fit)
     found = Inspection(
         names=tuple(r.name for r in recordings),
@@ -86,19 +89,19 @@ def acceptance_sheet(
         ratio=recordings[0].ratio,
         turns=max(r.turns for r in recordings),
         one_turn=one_turn,
-        recording_peak_to_peak=max((figures.directional_peak_to_peak(c) for c in parts), default=0.0),
+        recording_peak_to_peak=max((figures.directional_peak_to_peak(c) for c in parts), default=None),
         beat=_beat(moving, parts, fit, doubt, seed),
-        rms=math.sqrt(float(np.mean([figures.rms(c) ** 2 for c in parts]))) if parts else 0.0,
+        rms=math.sqrt(float(np.mean([figures.rms(c) ** 2 for c in parts]))) if parts else None,
         returned=next((back for back in map(figures.return_error, parts) if back is not None), None),
         repeatability=figures.repeatability(parts) if parts else None,
         slope_per_deg=slope,
         slope_arcsec_per_s=_slope_in_time(moving, slope, speed_rpm),
         orders=_orders(moving, drive),
-        drift=max((figures.drift(c) for c in parts), key=abs, default=0.0),
+        drift=max((figures.drift(c) for c in parts), key=abs, default=None),
         torsion=sweeps[0] if sweeps else None,
         starting_torque=next((t for t in map(starting_torque_nm, recordings) if t is not None), None),
-        gauge=gauge([figures.directional_peak_to_peak(c) for c in parts], list(mountings)) if mountings else None,
-        uncertainty=doubt,
+        gauge=gauge([figures.directional_peak_to_peak(c) for c in parts], mounted) if mounted else None,
+        uncertainty=doubt if parts else None,
         checks=_checks(moving, parts, fit),
         limits=(),
         understood=tuple(f"{r.name}: {said}" for r in recordings for said in r.understood),
@@ -154,8 +157,10 @@ def _turns(recording: Recording) -> float:
     return turns_with_ends(recording.turns, float(np.median(np.abs(np.diff(recording.input_angle)))) / TURN)
 
 
-def _slope_in_time(recordings: Sequence[Recording], slope: float, speed_rpm: float | None) -> float | None:
+def _slope_in_time(recordings: Sequence[Recording], slope: float | None, speed_rpm: float | None) -> float | None:
     """The slope (arcmin per deg of input) as a rate at the output, arcsec/s, at a speed or the usual one."""
+    if slope is None:
+        return None
     if speed_rpm is not None:
         return slope * 60 * speed_rpm * 6
     for recording in recordings:
@@ -212,7 +217,7 @@ def _separable_spectrum(angle: Array, error: Array, orders: list[float]) -> Orde
 def _checks(recordings: Sequence[Recording], parts: Sequence[Cells], fit: WaveformFit | None) -> dict[str, str]:
     """Ratio, orientation, skew and slipped counts, a sentence each."""
     if not recordings:
-        return {"ratio": "not checked: the input is locked"}
+        return {"ratio": f"not checked: {LOCKED}"}
     said = [s for r in recordings for s in (*r.understood, *r.warnings) if "ratio" in s or "against input/" in s]
     found = {"ratio": said[0] if said else "not checked: only an error was recorded, or the angles move too little"}
     if fit is not None:
@@ -255,13 +260,14 @@ def _model_warnings(parts: Sequence[Cells], fit: WaveformFit | None) -> list[str
 def _decisions(found: Inspection, limits: Mapping[str, float], slope_sigma: float) -> tuple[Decision, ...]:
     """Every limit held against its figure."""
     made: list[Decision] = []
-    doubt = found.uncertainty
+    doubt = found.uncertainty or 0.0
     for name, limit in limits.items():
         value, sigma, note = _figure(found, name, doubt, slope_sigma)
         decision = decide(name, value, sigma, limit, note)
         if name == "peak_to_peak" and decision.met is not False:
-            recorded = found.recording_peak_to_peak or None
-            part = decide(name, recorded, doubt, limit, "over the part recorded: the whole beat has no less")
+            part = decide(
+                name, found.recording_peak_to_peak, doubt, limit, "over the part recorded: the whole beat has no less"
+            )
             decision = part if part.met is False else decision
         made.append(decision)
     return tuple(made)
@@ -270,6 +276,8 @@ def _decisions(found: Inspection, limits: Mapping[str, float], slope_sigma: floa
 def _figure(found: Inspection, name: str, doubt: float, slope_sigma: float) -> tuple[float | None, float, str]:
     """A figure by its name in `--limit`: value, standard uncertainty, and what it is."""
     beat, back, torsion = found.beat, found.returned, found.torsion
+    if found.locked and name != "hysteresis_loss":
+        return None, doubt, LOCKED
     if name == "peak_to_peak":
         if beat is None:
             return None, doubt, "too little of the beat was recorded, or there is no drive to extrapolate with"
@@ -278,14 +286,22 @@ def _figure(found: Inspection, name: str, doubt: float, slope_sigma: float) -> t
         half = max(beat.high - beat.value, beat.value - beat.low) / 1.96
         return beat.value, half, f"over the full beat, {beat.source}"
     values: dict[str, tuple[float | None, float, str]] = {
-        "one_turn": (float(found.one_turn.max()) if len(found.one_turn) else None, doubt, "largest of all input turns"),
-        "recording": (found.recording_peak_to_peak or None, doubt, "over the recording, one direction"),
+        "one_turn": (float(found.one_turn.max()), doubt, "largest of all input turns")
+        if len(found.one_turn)
+        else (None, doubt, "no whole input turn was recorded"),
+        "recording": (found.recording_peak_to_peak, doubt, "over the recording, one direction"),
         "rms": (found.rms, doubt / math.sqrt(max(found.turns, 1.0)), ""),
         "return_error": (None, 0.0, "one direction only was recorded")
         if back is None
         else (abs(back.median), back.sigma / math.sqrt(len(back.curve)), "median"),
-        "repeatability": (found.repeatability, doubt / math.sqrt(max(found.turns, 1.0)), ""),
-        "slope": (found.slope_per_deg, slope_sigma, ""),
-        "hysteresis_loss": (None if torsion is None else torsion.hysteresis_loss_arcmin, doubt, "at zero torque"),
+        "repeatability": (None, 0.0, "no stretch of an input turn was passed twice in one direction")
+        if found.repeatability is None
+        else (found.repeatability, doubt / math.sqrt(max(found.turns, 1.0)), ""),
+        "slope": (None, 0.0, f"no {figures.SLOPE_WINDOW_DEG:g} deg of the input were passed without a gap")
+        if found.slope_per_deg is None
+        else (found.slope_per_deg, slope_sigma, ""),
+        "hysteresis_loss": (None, 0.0, "no torque was swept up and down against a locked input")
+        if torsion is None or torsion.hysteresis_loss_arcmin is None
+        else (torsion.hysteresis_loss_arcmin, torsion.loss_sigma_arcmin, "at zero torque"),
     }
     return values[name]

@@ -42,8 +42,9 @@ def inspect_many(
     sound = [unit for unit in units if not unit.error]
     if not sound:
         raise HdoptError(f"none of {len(units)} recordings can be read; the first: {units[0].error[:200]}")
-    values = [unit.peak_to_peak for unit in sound if unit.peak_to_peak is not None]
-    far = {sound[k].name for k in outliers(values)}
+    measured = [(unit.name, unit.peak_to_peak) for unit in sound if unit.peak_to_peak is not None]
+    values = [value for _, value in measured]
+    far = {measured[k][0] for k in outliers(values)}
     limit = required.get("peak_to_peak")
     batch = Batch(
         tuple(replace(unit, outlier=unit.name in far and not unit.error) for unit in units),
@@ -75,8 +76,8 @@ def _unit(recording: Recording | str | Path, source: RecordedDrive, limits: dict
     return Unit(
         name,
         sheet.recording_peak_to_peak if sheet.beat is None else sheet.beat.value,
-        "recording" if sheet.beat is None else "beat",
-        float(sheet.one_turn.max()) if len(sheet.one_turn) else 0.0,
+        "" if sheet.locked else "recording" if sheet.beat is None else "beat",
+        float(sheet.one_turn.max()) if len(sheet.one_turn) else None,
         sheet.rms,
         None if sheet.returned is None else sheet.returned.median,
         verdict,

@@ -50,11 +50,14 @@ def _summary(found: Inspection) -> Section:
         values["Its 95 % interval"] = f"{b.low:.3f} to {b.high:.3f} arcmin"
     if len(found.one_turn):
         values["Largest in one input turn"] = f"{found.one_turn.max():.3f} arcmin"
-    if found.cells:
+    if found.recording_peak_to_peak is not None:
         values["Over the recording, one direction"] = f"{found.recording_peak_to_peak:.3f} arcmin"
     if found.returned is not None:
         values["Return error, median"] = f"{found.returned.median:.3f} arcmin"
-    values["Standard uncertainty of a peak-to-peak"] = f"{found.uncertainty:.3f} arcmin"
+    if found.uncertainty is not None:
+        values["Standard uncertainty of a peak-to-peak"] = f"{found.uncertainty:.3f} arcmin"
+    if found.locked:
+        values["Error along the input's turns"] = "none, the input is locked"
     items: list[Item] = [*(_ruling(decision) for decision in found.limits), KeyFigures(values)]
     if found.limits:
         frame = pd.DataFrame(
@@ -264,7 +267,7 @@ def batch_report(batch: Batch) -> Report:
     """Many drives: `batch` as one table and one plot."""
     import pandas as pd
 
-    sound = [drive for drive in batch.drives if not drive.error]
+    sound = [drive for drive in batch.drives if not drive.error and drive.peak_to_peak is not None]
     made = figure("Drive", "Peak-to-peak (arcmin)", 380)
     for outlier, colour, name in ((False, BLUE, "drive"), (True, VERMILLION, "outlier")):
         part = [drive for drive in sound if drive.outlier == outlier]
