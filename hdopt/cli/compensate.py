@@ -92,10 +92,10 @@ def _lines(found: Compensated, output: Path) -> Iterator[str]:
     for warning in found.warnings:
         yield f"note: {warning}"
     if found.worth:
-        from hdopt.workflow.compensate import VOID, homing_words
+        from hdopt.workflow.compensate import homing_words
 
         yield homing_words(found.homing)
-        yield f"void {VOID}"
+        yield f"void {found.void}"
     elif not found.judged:
         yield (
             f"nothing written: {counted(found.stretches, 'stretch', 'stretches')} of an eighth of an output turn: "

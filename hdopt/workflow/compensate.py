@@ -89,8 +89,8 @@ class Compensated(ShownAsTable):
     `before` and `after` of the held-out parts together, each part scored by a choice made without it; `predicted` for a
     fresh recording of the same length, with its 95 % interval `low`, `high`; `both` is what is left in each direction,
     `ways` what to expect of it there, and `speeds` (r/min) what to expect at each speed where the recordings differ.
-    `worth` says whether the fall is beyond chance (`evidence` standard errors, over so many `stretches` of the record;
-    fewer than three say nothing).
+    `strain_wave` says whether it is of a harmonic drive, `worth` whether the fall is beyond chance (`evidence` standard
+    errors, over so many `stretches` of the record; fewer than three say nothing).
     """
 
     found: Found
@@ -112,11 +112,17 @@ class Compensated(ShownAsTable):
     stretches: int = 0
     ways: Mapping[str, Expected] = field(default_factory=dict)
     speeds: Mapping[float, Expected] = field(default_factory=dict)
+    strain_wave: bool = True
 
     @property
     def judged(self) -> bool:
         """Whether the record is long enough to say that the fall is beyond chance, or is not."""
         return self.stretches >= FEWEST_STRETCHES
+
+    @property
+    def void(self) -> str:
+        """When it holds no more, after the word 'void'."""
+        return VOID_OF_STRAIN_WAVE if self.strain_wave else VOID
 
     def facts(self) -> dict[str, Any]:
         """What the file says of itself: method, what it leaves, what it needs, what makes it void."""
@@ -127,7 +133,7 @@ class Compensated(ShownAsTable):
             "peak_to_peak_expected_arcmin": round(self.predicted, 4),
             **{f"peak_to_peak_expected_at_{speed:.4g}_rpm": str(one) for speed, one in self.speeds.items()},
             "homing": homing_words(self.homing),
-            "void": VOID,
+            "void": self.void,
         }
 
     def to_dict(self, file: str | None) -> dict[str, Any]:
@@ -161,7 +167,7 @@ class Compensated(ShownAsTable):
             "heldout_rms_arcmin": self.scores,
             "homing_rms_arcmin_per_deg": {"input": self.homing[0], "output": self.homing[1]},
             "needs": homing_words(self.homing),
-            "void": VOID,
+            "void": self.void,
             "warnings": list(self.warnings),
         }
 
@@ -202,10 +208,8 @@ def of_speed(found: Found) -> dict[str, Any] | None:
     return {"lag_arcmin_per_rpm": found.lag, "speeds": own}
 
 
-VOID = (
-    "after the wave generator, circular spline or flexspline was taken out or turned, after an encoder or its "
-    "zero was changed, and at a load or temperature far from the recording's"
-)
+VOID = "after an encoder or its zero was changed, and at a load or temperature far from the recording's"
+VOID_OF_STRAIN_WAVE = f"after the wave generator, circular spline or flexspline was taken out or turned, {VOID}"
 
 
 def homing_words(homing: tuple[float, float]) -> str:
@@ -308,6 +312,7 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
             for name, way in _ways(rows).items()
         },
         _by_speed(rows, each),
+        drive is not None,
     )
 
 
@@ -404,6 +409,11 @@ def _warnings(rows: Rows, held_out: str, recordings: Sequence[Recording]) -> tup
         said.append(
             f"{rows.span_turns:.3g} of the {rows.ratio:g} input turns of a beat were recorded: beyond them the table "
             "is an extrapolation, and what it leaves there was not seen; record a whole output turn"
+        )
+    if (neighbours := neighbours_of(recordings)) > 1:
+        said.append(
+            f"{neighbours} samples each are averaged: peak-to-peaks here leave out what single samples scatter beyond "
+            "their means"
         )
     if held_out == STRETCHES:
         said.append("one pass of at most one output turn: held out are stretches of it; record two output turns")

@@ -567,3 +567,11 @@ def test_a_decimal_comma_in_a_limit_is_named():
 
     with pytest.raises(HdoptError, match=r"has a decimal comma; write a point"):
         parse_limits("peak_to_peak=1,5arcmin")
+
+
+def test_a_binary_file_is_called_no_text_file(tmp_path):
+    """Fault caught: the words of a decoder, 'charmap' codec can't decode."""
+    path = tmp_path / "bin.csv"
+    path.write_bytes(b"time_s,input_deg,output_deg\n" + bytes(range(128, 256)) * 30)
+    with pytest.raises(HdoptError, match=r"bin.csv is not a text file: its byte \d+ is no character; give a recording"):
+        read_recording(path, 80.0)
