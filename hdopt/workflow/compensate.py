@@ -258,7 +258,8 @@ def write_compensation(made: Compensated, files: Mapping[str, Path]) -> None:
 def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms: int | None, seed: int) -> Compensated:
     """The compensation from the records of `recordings`; `drive`, `terms`, `seed` and errors as for `compensate`."""
     moving = _moving(recordings, terms)
-    rows = gather(moving, neighbours_of(moving))
+    neighbours = neighbours_of(moving)
+    rows = gather(moving, neighbours)
     still, lag, whole = _without_lag(rows, drive, seed)
     fold, held_out = folds(rows)
     paths = paths_of(rows, half_about(still, still.error))
@@ -304,6 +305,7 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
         rows.ratio,
         (
             *_warnings(rows, held_out, moving),
+            *_averaged(neighbours),
             *(_too_few(len(common), terms, off, float(np.ptp(again))) if worth else ()),
         ),
         stretches,
@@ -403,17 +405,18 @@ def _too_few(count: int, terms: int | None, off: float, left: float) -> tuple[st
     return (f"{count} coefficients are {off:.3g} arcmin peak-to-peak off what was fitted; --terms 0 writes a table",)
 
 
+def _averaged(neighbours: int) -> tuple[str, ...]:
+    """What is said where so many `neighbours` make a row."""
+    said = f"{neighbours} samples each are averaged: peak-to-peaks here leave out what single samples scatter beyond"
+    return (f"{said} their means",) if neighbours > 1 else ()
+
+
 def _warnings(rows: Rows, held_out: str, recordings: Sequence[Recording]) -> tuple[str, ...]:
     said = [w for r in recordings for w in r.warnings]
     if turns_with_ends(rows.span_turns, 1 / rows.rows_per_turn) < rows.ratio:
         said.append(
             f"{rows.span_turns:.3g} of the {rows.ratio:g} input turns of a beat were recorded: beyond them the table "
             "is an extrapolation, and what it leaves there was not seen; record a whole output turn"
-        )
-    if (neighbours := neighbours_of(recordings)) > 1:
-        said.append(
-            f"{neighbours} samples each are averaged: peak-to-peaks here leave out what single samples scatter beyond "
-            "their means"
         )
     if held_out == STRETCHES:
         said.append("one pass of at most one output turn: held out are stretches of it; record two output turns")

@@ -169,7 +169,7 @@ def test_command_writes_every_form(tmp_path, capsys, form):
     assert {"terms", "file"} <= set(content)
     text = out.read_text()
     assert {"csv": "k_input,j_output", "json": '"terms"', "c": "hdopt_error_arcmin"}[form] in text
-    assert "home both shafts" in text and "void" in text and "after the wave generator" in text
+    assert "home both shafts" in text and "void" in text and "after an encoder or its zero" in text
     assert "home both shafts" in capsys.readouterr().out
 
 

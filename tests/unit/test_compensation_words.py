@@ -16,10 +16,8 @@ def test_only_a_harmonic_drive_has_a_wave_generator_to_take_out(strain_wave, sai
     assert ("wave generator" in said) is strain_wave
 
 
-@pytest.mark.parametrize(("neighbours", "told"), [(1, False), (4, True)])
-def test_averaged_samples_are_told(monkeypatch, neighbours, told):
+@pytest.mark.parametrize(("neighbours", "told"), [(1, False), (2, True), (4, True)])
+def test_averaged_samples_are_told(neighbours, told):
     """Faults caught: peak-to-peaks of means that pass for those of samples; told where every sample is a row."""
-    monkeypatch.setattr(compensate, "neighbours_of", lambda recordings: neighbours)
-    rows = SimpleNamespace(span_turns=200.0, rows_per_turn=100.0, ratio=80.0)
-    said = compensate._warnings(rows, "output turns", [SimpleNamespace(warnings=())])
-    assert any("4 samples each are averaged" in one for one in said) is told
+    said = compensate._averaged(neighbours)
+    assert any(f"{neighbours} samples each are averaged" in one for one in said) is told
