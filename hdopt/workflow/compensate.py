@@ -258,8 +258,7 @@ def write_compensation(made: Compensated, files: Mapping[str, Path]) -> None:
 def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms: int | None, seed: int) -> Compensated:
     """The compensation from the records of `recordings`; `drive`, `terms`, `seed` and errors as for `compensate`."""
     moving = _moving(recordings, terms)
-    neighbours = neighbours_of(moving)
-    rows = gather(moving, neighbours)
+    rows = gather(moving, neighbours := neighbours_of(moving))
     still, lag, whole = _without_lag(rows, drive, seed)
     fold, held_out = folds(rows)
     paths = paths_of(rows, half_about(still, still.error))
