@@ -13,7 +13,7 @@ from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
 from hdopt.recordings import figures
-from hdopt.recordings.capability import gauge
+from hdopt.recordings.capability import Gauge, gauge
 from hdopt.recordings.decision import Decision, decide
 from hdopt.recordings.figures import Cells
 from hdopt.recordings.orders import ModelOrder, OrderSpectrum, model_orders, order_spectrum
@@ -75,10 +75,7 @@ def acceptance_sheet(
     moving = [r for r in recordings if not r.input_locked]
     sweeps = [t for t in map(torsion_of, recordings) if t is not None]
     parts = tuple(figures.cells_of(r) for r in moving)
-    mounted = [name for name, r in zip(mountings, recordings, strict=bool(mountings)) if not r.input_locked]
     fit = fit_waveform(moving, drive, seed) if drive is not None and moving else None
-    turned = [figures.turn_peak_to_peaks(cells)[0] for cells in parts]
-    one_turn = np.concatenate(turned) if turned else np.empty(0)
     slopes = [slope for slope in map(figures.steepest_slope, parts) if slope is not None]
     slope, slope_sigma = max(slopes, default=(None, 0.0))
     doubt = _uncertainty(moving, parts, fit)
@@ -88,7 +85,7 @@ def acceptance_sheet(
         conditions=label.conditions,
         ratio=recordings[0].ratio,
         turns=max(r.turns for r in recordings),
-        one_turn=one_turn,
+        one_turn=np.concatenate([np.empty(0), *(figures.turn_peak_to_peaks(cells)[0] for cells in parts)]),
         recording_peak_to_peak=max((figures.directional_peak_to_peak(c) for c in parts), default=None),
         beat=_beat(moving, parts, fit, doubt, seed),
         rms=math.sqrt(float(np.mean([figures.rms(c) ** 2 for c in parts]))) if parts else None,
@@ -100,7 +97,7 @@ def acceptance_sheet(
         drift=max((figures.drift(c) for c in parts), key=abs, default=None),
         torsion=sweeps[0] if sweeps else None,
         starting_torque=next((t for t in map(starting_torque_nm, recordings) if t is not None), None),
-        gauge=gauge([figures.directional_peak_to_peak(c) for c in parts], mounted) if mounted else None,
+        gauge=_gauge(recordings, parts, mountings),
         uncertainty=doubt if parts else None,
         checks=_checks(moving, parts, fit),
         limits=(),
@@ -110,6 +107,14 @@ def acceptance_sheet(
         orientation=_orientation(fit),
     )
     return replace(found, limits=_decisions(found, limits, slope_sigma))
+
+
+def _gauge(recordings: Sequence[Recording], parts: Sequence[Cells], mountings: Sequence[str]) -> Gauge | None:
+    """The gauge study over the `mountings` of those recordings that turn, whose cells are `parts`; None without any."""
+    if not mountings:
+        return None
+    mounted = [name for name, r in zip(mountings, recordings, strict=True) if not r.input_locked]
+    return gauge([figures.directional_peak_to_peak(cells) for cells in parts], mounted)
 
 
 def _orientation(fit: WaveformFit | None) -> dict[str, Any] | None:
