@@ -22,6 +22,7 @@ from hdopt.figures import drawn
 from hdopt.files import ShownAsTable, write_text
 from hdopt.recordings.recording import Recording, turns_with_ends
 from hdopt.recordings.rows import Rows, gather
+from hdopt.words import counted
 from hdopt.workflow.compensation_speeds import TERMS as OWN_TERMS
 from hdopt.workflow.compensation_speeds import lag_in, of_each_speed, own_of_each_speed, speeds_rpm
 from hdopt.workflow.compensation_trials import (
@@ -406,8 +407,10 @@ def _too_few(count: int, terms: int | None, off: float, left: float) -> tuple[st
 
 def _averaged(neighbours: int) -> tuple[str, ...]:
     """What is said where so many `neighbours` make a row."""
-    said = f"{neighbours} samples each are averaged: peak-to-peaks here leave out what single samples scatter beyond"
-    return (f"{said} their means",) if neighbours > 1 else ()
+    if neighbours == 1:
+        return ()
+    each = f"{counted(neighbours, 'sample')} each are averaged"
+    return (f"{each}: peak-to-peaks here leave out what single samples scatter beyond their means",)
 
 
 def _warnings(rows: Rows, held_out: str, recordings: Sequence[Recording]) -> tuple[str, ...]:
