@@ -24,7 +24,7 @@ from hdopt.study.write import study_toml
 from hdopt.tolerance.sampling import SAMPLINGS
 from hdopt.words import counted
 from hdopt.workflow.placed import numbers_named
-from hdopt.workflow.stack import drive_problem_of
+from hdopt.workflow.stack import drive_problem_of, needed_beside_the_drive
 from hdopt.workflow.steps.profiles import alternatives
 
 if TYPE_CHECKING:
@@ -157,8 +157,7 @@ def _check(drive: Drive) -> None:
 
 def _lacking(study: Study) -> list[str]:
     """The sections that the cloud of drives needs and `study` has not."""
-    varies = "contributors" if "contributors" in study.sections else "tolerances"
-    return [f"[{name}]" for name in (varies, "requirement") if name not in study.sections]
+    return [f"[{name}]" for name in needed_beside_the_drive(study) if name not in study.sections]
 
 
 def _notes(study: Study) -> tuple[str, ...]:

@@ -137,13 +137,20 @@ def study_problem(study: AnyProblem) -> ToleranceProblem:
     )
 
 
+def needed_beside_the_drive(study: Study) -> tuple[str, ...]:
+    """The sections that a stack of drives of `study` needs beside those of the drive: callouts may stand in place of
+    tolerances."""
+    contributors = study.find("contributors", ContributorsSection)
+    varies = () if contributors is not None and contributors.rows else ("tolerances",)
+    return (*varies, "requirement")
+
+
 @numbers_named
 def drive_problem_of(study: Study) -> DriveProblem:
     """The drives of a `study` under its [tolerances] and [contributors], without effects: their response, arcmin, and
     their random inputs. Raises `HdoptError` where it has neither of both or no [requirement]."""
     contributors = study.find("contributors", ContributorsSection)
-    varies = () if contributors is not None and contributors.rows else ("tolerances",)
-    study.require(("drive", "wave_generator", *varies, "requirement"), "a stack")
+    study.require(("drive", "wave_generator", *needed_beside_the_drive(study)), "a stack")
     tolerances = study.find("tolerances", TolerancesBase) or TolerancesSection()
     requirement = study.section("requirement", RequirementSection, "a stack")
     return drive_problem(

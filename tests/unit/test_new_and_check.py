@@ -16,6 +16,7 @@ from hdopt.study.defaults import defaults_taken, used_by
 from hdopt.study.nearest import UNIT, near_keys
 from hdopt.study.schema import ANY_NAME, SECTIONS, known_paths, section_model
 from hdopt.workflow.check_study import PROBES, check_study
+from hdopt.workflow.explore import explorer_page
 from hdopt.workflow.study_reference import section_reference, study_reference
 
 OWN = """[drive]
@@ -199,6 +200,17 @@ def test_callouts_alone_are_stacked(tmp_path, capsys):
     assert found[0] == found[1]
     file.write_text(text.partition("[contributors]")[0] + "[contributors]\n")
     assert "needs a [tolerances] section" in said(capsys, "stack", str(file), "-n", "2048")[2]
+
+
+def test_an_explorer_needs_what_a_stack_needs(tmp_path):
+    """Fault caught: an empty [contributors] taken for callouts, and the page refused that may do without a cloud."""
+    file = tmp_path / "own.toml"
+    callout = 'bore = { callout = "coaxiality", value_mm = 0.02, feeds = "axis_eccentricity" }'
+    for callouts, cloud in (("", False), (callout, True)):
+        file.write_text(f"{OWN}\n[requirement]\npeak_to_peak_arcmin = 0.8\n[contributors]\n{callouts}\n")
+        page = explorer_page(hdopt.load_study(file), 16)
+        assert (len(page.cloud) > 0) is cloud
+        assert any("the study has no [tolerances]" in note for note in page.notes) is not cloud
 
 
 @pytest.mark.parametrize("value", [True, "keyway", 14.0, 6])
