@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hdopt.diagnosis.inference import fit as fitting
 from hdopt.diagnosis.search import candidates as weighing
 from hdopt.diagnosis.search import completion as completing
 from hdopt.diagnosis.search import explore as exploring
@@ -762,7 +763,7 @@ def test_parts_that_do_not_show_may_cost_a_little_of_the_gain(monkeypatch, lost,
 
 
 def test_a_base_beside_the_leader_is_the_one_to_beat_where_it_is_better(monkeypatch):
-    monkeypatch.setattr(weighing, "evaluate", lambda problem, errors, offsets, terms, parts: (terms, parts))
+    monkeypatch.setattr(fitting, "evaluate", lambda problem, errors, offsets, terms, parts: (terms, parts))
     for alone, expected in ((0.5, 0.5), (2.0, 1.0)):
         left = {((), ()): Told(0.0, objective=alone)}
         monkeypatch.setattr(weighing, "refine", lambda fit, iterations, left=left: left[tuple(map(tuple, fit))])

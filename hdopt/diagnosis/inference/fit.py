@@ -491,6 +491,12 @@ def in_shape(fit: Fit, index: int, shape: Shape) -> Fit:
     return evaluate(fit.problem, fit.errors, fit.offsets, terms, fit.coefficients)
 
 
+def with_terms(fit: Fit, keep: Sequence[int]) -> Fit:
+    """`fit` with the terms numbered in `keep` alone, all else as it stands."""
+    terms, coefficients = [fit.terms[i] for i in keep], [fit.coefficients[i] for i in keep]
+    return evaluate(fit.problem, fit.errors, fit.offsets, terms, coefficients)
+
+
 def extend(fit: Fit, terms: Sequence[Term]) -> Fit:
     """`fit` with further terms, at coefficients of zero."""
     return evaluate(

@@ -9,7 +9,7 @@ import numpy as np
 
 from hdopt.diagnosis.inference.base_fit import fit_base, is_far
 from hdopt.diagnosis.inference.catalogue import is_outside
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, extend, refine
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, extend, refine, with_terms
 from hdopt.diagnosis.inference.normal_equations import gains_of_subsets, solved
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import SMALL_RIDGE, TINY
@@ -193,6 +193,4 @@ def without_each(fit: Fit) -> list[Fit]:
 
 def with_only(fit: Fit, keep: Sequence[int]) -> Fit:
     """`fit` with the terms numbered in `keep` alone, refitted from where they stand."""
-    terms, parts = [fit.terms[i] for i in keep], [fit.coefficients[i] for i in keep]
-    fewer = evaluate(fit.problem, fit.errors, fit.offsets, terms, parts)
-    return refine(fewer, fit.problem.settings.fit.again_iterations)
+    return refine(with_terms(fit, keep), fit.problem.settings.fit.again_iterations)

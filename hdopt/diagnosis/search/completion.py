@@ -113,9 +113,7 @@ def by_waves(state: SearchState, first: Candidate) -> list[Candidate]:
     """
     settings, fit = state.settings, first.fit
     left = state.above_noise(fit)
-    if not may_grow(first) or has_bending(fit):
-        return []
-    if not is_far_more_than_noise(left, state):
+    if not may_grow(first) or has_bending(fit) or not is_far_more_than_noise(left, state):
         return []
     known = (*first.effects, *state.plan.skip)
     sets = [[*fit.terms, waves] for waves in long_waves(fit.problem) if waves.effect not in known]

@@ -21,7 +21,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.diagnosis.inference.base_fit import thinned
 from hdopt.diagnosis.inference.catalogue import is_outside
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine, term_columns
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine, term_columns, with_terms
 from hdopt.diagnosis.inference.noise import predictable_share
 from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.search.guess import Guess
@@ -195,10 +195,8 @@ def _without_idle(fit: Fit, first: int) -> Fit:
     """`fit` without those of its terms from the `first` on, but for the mesh, its last, that do not pay for themselves:
     a line may have held what the mesh's sines left of it, and nothing of the mesh as the zones meet it."""
     for at in reversed(range(first, len(fit.terms) - 1)):
-        keep = fit.all_but(at)
-        terms, own = [fit.terms[i] for i in keep], [fit.coefficients[i] for i in keep]
-        fewer = evaluate(fit.problem, fit.errors, fit.offsets, terms, own)
-        fewer = refine(fewer, fit.problem.settings.fit.known_iterations, move_shapes=False)
+        known = fit.problem.settings.fit.known_iterations
+        fewer = refine(with_terms(fit, fit.all_but(at)), known, move_shapes=False)
         fit = min(fewer, fit, key=_score)
     return fit
 
@@ -210,7 +208,7 @@ def _score(fit: Fit) -> float:
 
 
 def _alone(fit: Fit, others: int) -> ZoneRipple:
-    without = evaluate(fit.problem, fit.errors, fit.offsets, fit.terms[:others], fit.coefficients[:others])
+    without = with_terms(fit, range(others))
     # What stands beside is no part of it, so that no shape of it can be moved and fitted again.
     held = tuple(replace(term, steps={}) for term in fit.terms[others:])
     alone = replace(fit, terms=held, coefficients=fit.coefficients[others:])
