@@ -14,6 +14,7 @@ from test_verdict_rules import CLEAN, FIRED, NAMED, held
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.other_laws import OtherLaw
 from hdopt.diagnosis.checks.repeated_passes import NOTHING_REPEATED, RepeatedPasses
+from hdopt.diagnosis.inference import fit as fitting
 from hdopt.diagnosis.inference.catalogue import SCALE, SKEW, VARYING_CONTACT
 from hdopt.diagnosis.inference.cross_validation import HeldOut
 from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut
@@ -482,7 +483,7 @@ def test_what_is_gained_by_descriptions_alone_is_known_by_leaving_them_out(monke
         asked.append(([term.effect for term in terms], coefficients, errors, offsets))
         return SimpleNamespace(objective=40.0)
 
-    monkeypatch.setattr(candidates, "evaluate", evaluate)
+    monkeypatch.setattr(fitting, "evaluate", evaluate)
     monkeypatch.setattr(candidates, "refine", lambda fit, iterations: SimpleNamespace(objective=16.0))
     found = candidate({"hysteresis": 3.0, "_jump": 1.0})
     found.gain = 5.0
