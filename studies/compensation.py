@@ -68,6 +68,7 @@ def run_case(seed: int, effect: str, severity: float, drive: Drive, terms: int |
     from hdopt.recordings.read import recording_from_table
     from hdopt.recordings.rows import gather
     from hdopt.workflow.compensate import compensate
+    from hdopt.workflow.compensation_samples import samples_of
     from hdopt.workflow.compensation_trials import neighbours_of, said_of
 
     spec = cases.Spec("single" if effect else "nothing", seed, (effect,) if effect else (), severity)
@@ -87,19 +88,19 @@ def run_case(seed: int, effect: str, severity: float, drive: Drive, terms: int |
         assert fresh.time is not None, "every table of the bench has its time"
         truths = [truth[np.searchsorted(table["time_s"].to_numpy(), fresh.time)] for truth in truths]
     neighbours = neighbours_of(seen)
-    rows = gather([fresh], neighbours)
-    left, held = (gather([replace(fresh, error_arcmin=fresh.error_arcmin - one)], neighbours) for one in truths)
-    after = rows.error - said_of(made.found, rows)
+    each = samples_of([fresh], gather([fresh], neighbours), neighbours).each
+    left, held = (fresh.error_arcmin - one for one in truths)
+    after = each.error - said_of(made.found, each)
     return Case(
         seed,
         effect,
         made.method,
         made.worth,
-        float(np.ptp(rows.error)),
+        float(np.ptp(each.error)),
         float(np.ptp(after)),
-        float(np.ptp(left.error)),
+        float(np.ptp(left)),
         made.recordings[-1].expected,
-        float(np.ptp(held.error)),
+        float(np.ptp(held)),
     )
 
 

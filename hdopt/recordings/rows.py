@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hdopt.arrays import Array, Index
 from hdopt.effects.conditions import Conditions
-from hdopt.recordings.passes import find_passes
+from hdopt.recordings.passes import Passes, find_passes
 from hdopt.recordings.recording import TURN, Recording
 
 MOST_ROWS = 10_000
@@ -81,8 +81,15 @@ def gather(recordings: Sequence[Recording], neighbours: int = 1) -> Rows:
     )
 
 
-def _one_record(recording: Recording, neighbours: int) -> dict[str, Any]:
-    """The columns of one recording's rows; None for a channel that it does not have."""
+def row_of_each_sample(recordings: Sequence[Recording], neighbours: int) -> Index:
+    """The row of `gather(recordings, neighbours)` that each sample of all `recordings` went into, (N,), from 0."""
+    parts = [(_rows_of(recording, neighbours)[0], len(recording)) for recording in recordings]
+    counts = np.concatenate([np.diff(np.r_[starts, n]) for starts, n in parts])
+    return np.repeat(np.arange(len(counts)), counts)
+
+
+def _rows_of(recording: Recording, neighbours: int) -> tuple[Index, Passes, Index]:
+    """The sample that each row begins with, the passes, and the part between gaps of each sample of one recording."""
     n = len(recording)
     segment = recording.segment if recording.segment is not None else np.zeros(n, np.int64)
     if recording.input_locked:
@@ -94,7 +101,13 @@ def _one_record(recording: Recording, neighbours: int) -> dict[str, Any]:
         passes = find_passes(recording.input_angle)
         cell = np.arange(n) // neighbours
     change = (np.diff(cell) != 0) | (np.diff(passes.index) != 0) | (np.diff(segment) != 0)
-    starts = np.r_[0, np.flatnonzero(change) + 1]
+    return np.r_[0, np.flatnonzero(change) + 1], passes, segment
+
+
+def _one_record(recording: Recording, neighbours: int) -> dict[str, Any]:
+    """The columns of one recording's rows; None for a channel that it does not have."""
+    n = len(recording)
+    starts, passes, segment = _rows_of(recording, neighbours)
     counts = np.diff(np.r_[starts, n]).astype(float)
 
     def mean(values: Array | None) -> Any:

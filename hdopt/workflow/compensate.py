@@ -22,7 +22,7 @@ from hdopt.figures import drawn
 from hdopt.files import ShownAsTable, write_text
 from hdopt.recordings.recording import Recording, turns_with_ends
 from hdopt.recordings.rows import Rows, gather
-from hdopt.words import counted
+from hdopt.workflow.compensation_samples import Samples, samples_of
 from hdopt.workflow.compensation_speeds import TERMS as OWN_TERMS
 from hdopt.workflow.compensation_speeds import lag_in, of_each_speed, own_of_each_speed, speeds_rpm
 from hdopt.workflow.compensation_trials import (
@@ -85,7 +85,8 @@ class Expected:
 
 @dataclass(frozen=True)
 class Compensated(ShownAsTable):
-    """A compensation, and what it leaves on parts that the fit did not see; peak-to-peak in arcmin.
+    """A compensation, and what it leaves on parts that the fit did not see; peak-to-peak in arcmin, of samples as
+    recorded however many of them were averaged for the fit.
 
     `before` and `after` of the held-out parts together, each part scored by a choice made without it; `predicted` for a
     fresh recording of the same length, with its 95 % interval `low`, `high`; `both` is what is left in each direction,
@@ -259,61 +260,61 @@ def write_compensation(made: Compensated, files: Mapping[str, Path]) -> None:
 def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms: int | None, seed: int) -> Compensated:
     """The compensation from the records of `recordings`; `drive`, `terms`, `seed` and errors as for `compensate`."""
     moving = _moving(recordings, terms)
-    rows = gather(moving, neighbours := neighbours_of(moving))
+    rows, samples = _gathered(moving)
+    each = samples.each
     still, lag, whole = _without_lag(rows, drive, seed)
+    still_samples = samples.with_error(each.error - lag * signed_rpm(each))
     fold, held_out = folds(rows)
+    part = fold[samples.row]
     paths = paths_of(rows, half_about(still, still.error))
     trials = tried(
         (still, fold),
         terms,
         paths,
         lambda train: None if whole is None or drive is None else model_of(train, drive, seed, whole.sign),
+        still_samples,
     )
-    before = centred(rows.error, rows, fold)
+    before = centred(each.error, each, part)
     made = candidates(still, whole, terms, paths)
-    nested, method = choose({name: left for name, left in trials.items() if name in made}, fold)
+    nested, method = choose({name: left for name, left in trials.items() if name in made}, part)
     common, off = made[method]
     # What no other recording met is extrapolated in angle when held out; a fresh run over the same angles is not.
-    again = centred(still.error - said_of(common, still), rows, np.zeros_like(fold))
-    own, with_own = own_of_each_speed(rows, again, min(OWN_TERMS, terms or OWN_TERMS))
+    again = centred(still_samples.each.error - said_of(common, still_samples.each), each, np.zeros_like(part))
+    own, with_own = own_of_each_speed(rows, samples, again, min(OWN_TERMS, terms or OWN_TERMS))
     found = with_speed(common, lag, own)
     if isinstance(found, OfSpeed) and found.own:
         gained = with_own != again
         nested, again = np.where(gained, with_own, nested), with_own
         trials[method + EACH_SPEED] = np.where(gained, with_own, trials[method])
         method += EACH_SPEED
-    worth, evidence, stretches = _worth(before, nested, rows)
-    left = np.where(met_elsewhere(rows), trials[method], again)
+    worth, evidence, stretches = _worth(before, nested, each)
+    left = np.where(met_elsewhere(rows)[samples.row], trials[method], again)
     rng = np.random.default_rng(seed)
-    each = _each(rows, left, np.ones(len(rows), np.bool_), rng)
-    predicted, low, high = _predicted(each)
+    of_each = _each(each, left, np.ones(len(each), np.bool_), rng)
+    predicted, low, high = _predicted(of_each)
     return Compensated(
         found,
         method,
-        worth and bool(np.ptp(nested) < np.ptp(before)),
+        worth and _peaks_fall(samples, before, nested),
         evidence,
         float(np.ptp(before)),
         float(np.ptp(nested)),
         predicted,
         low,
         high,
-        {name: float(np.ptp(nested[rows.direction == way])) for name, way in _ways(rows).items()},
-        _per_recording(moving, rows, (before, nested), each),
+        {name: float(np.ptp(nested[each.direction == way])) for name, way in _ways(rows).items()},
+        _per_recording(moving, each, (before, nested), of_each),
         held_out,
         {NONE: float(np.std(before))} | {name: float(np.std(left)) for name, left in trials.items()},
         homing_arcmin(found, rows.ratio),
         rows.ratio,
         (
             *_warnings(rows, held_out, moving),
-            *_averaged(neighbours),
             *(_too_few(len(common), terms, off, float(np.ptp(again))) if worth else ()),
         ),
         stretches,
-        {
-            name: Expected(*_predicted(_each(rows, left, rows.direction == way, rng)))
-            for name, way in _ways(rows).items()
-        },
-        _by_speed(rows, each),
+        _by_way(each, left, rng),
+        _by_speed(rows, of_each),
         drive is not None,
     )
 
@@ -321,6 +322,12 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
 def _ways(rows: Rows) -> dict[str, float]:
     """The directions that `rows` were recorded in, +1 and -1; {} where nothing reverses."""
     return {"forward": 1.0, "backward": -1.0} if rows.reverses else {}
+
+
+def _by_way(each: Rows, left: Array, rng: np.random.Generator) -> dict[str, Expected]:
+    """What to expect in each direction of the samples `each`, of which so much is `left` (n,)."""
+    ways = _ways(each).items()
+    return {name: Expected(*_predicted(_each(each, left, each.direction == way, rng))) for name, way in ways}
 
 
 def _by_speed(rows: Rows, each: Sequence[tuple[float, float]]) -> dict[float, Expected]:
@@ -339,6 +346,13 @@ def _moving(recordings: Sequence[Recording], terms: int | None) -> list[Recordin
     if not moving:
         raise HdoptError("the input is locked in every recording; a compensation needs recordings that turn")
     return moving
+
+
+def _gathered(recordings: Sequence[Recording]) -> tuple[Rows, Samples]:
+    """The rows that are fitted, and the samples of the `recordings` behind them, which are judged."""
+    neighbours = neighbours_of(recordings)
+    rows = gather(recordings, neighbours)
+    return rows, samples_of(recordings, rows, neighbours)
 
 
 def _without_lag(rows: Rows, drive: Drive | None, seed: int) -> tuple[Rows, float, WaveformFit | None]:
@@ -375,6 +389,12 @@ def _worth(before: Array, after: Array, rows: Rows) -> tuple[bool, float, int]:
     return evidence > SURE, min(evidence, 1e6), len(fall)
 
 
+def _peaks_fall(samples: Samples, before: Array, after: Array) -> bool:
+    """Whether peak-to-peak falls from `before` to `after`, (n,) each of the `samples`, by the means that were fitted:
+    noise makes the extremes of samples, and its chance must not decide."""
+    return bool(np.ptp(samples.means(after)) < np.ptp(samples.means(before)))
+
+
 def _predicted(each: Sequence[tuple[float, float]]) -> tuple[float, float, float]:
     """Peak-to-peak to expect of a fresh recording of this length, with a 95 % interval: the mean over the recordings,
     of `each` of which value and standard deviation are known."""
@@ -403,14 +423,6 @@ def _too_few(count: int, terms: int | None, off: float, left: float) -> tuple[st
     if not terms or off < SMALL * left:
         return ()
     return (f"{count} coefficients are {off:.3g} arcmin peak-to-peak off what was fitted; --terms 0 writes a table",)
-
-
-def _averaged(neighbours: int) -> tuple[str, ...]:
-    """What is said where so many `neighbours` make a row."""
-    if neighbours == 1:
-        return ()
-    each = f"{counted(neighbours, 'sample')} each are averaged"
-    return (f"{each}: peak-to-peaks here leave out what single samples scatter beyond their means",)
 
 
 def _warnings(rows: Rows, held_out: str, recordings: Sequence[Recording]) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from hdopt.compensation.pursuit import dictionary, independent_share, pursue
 from hdopt.compensation.surface import Harmonics, nothing
 from hdopt.recordings.recording import TURN
 from hdopt.recordings.rows import Rows
+from hdopt.workflow.compensation_samples import Samples
 from hdopt.workflow.compensation_trials import centred, folds, part_of
 
 TERMS = 16
@@ -65,32 +66,34 @@ def lag_in(rows: Rows, left: Array) -> float:
     return lag_of(left, columns, rpm, independent_share(rest))
 
 
-def own_of_each_speed(rows: Rows, left: Array, terms: int) -> tuple[dict[float, Harmonics], Array]:
+def own_of_each_speed(rows: Rows, samples: Samples, left: Array, terms: int) -> tuple[dict[float, Harmonics], Array]:
     """What each speed (r/min, negative backward ->) of the records in `rows` has of its own in what a common
-    compensation has `left` (n,) arcmin, at most so many `terms` each, none where they do not pay; and what is left (n,)
-    with them, held out.
+    compensation has `left` (N,) arcmin of their `samples`, at most so many `terms` each, none where they do not pay;
+    and what is left (N,) with them, held out.
 
     A load that swings lags behind in time: ahead in angle one way, behind it the other. {} where all turn at one speed.
     """
     known, rpm = speeds_rpm(rows), signed_rpm(rows)
     groups = of_each_speed(known)
-    again, own = left.copy(), {}
+    again, own, means = left.copy(), {}, samples.means(left)
     for group, way in itertools.product(groups if len(groups) > 1 else (), (-1.0, 1.0)):
         speed = way * (known[group[0]] or 0.0)
         mine = np.isin(rows.record, group) & (rows.direction == way)
         if not mine.any():
             continue
-        part, rest = part_of(rows, mine), left[mine]
+        part, rest = part_of(rows, mine), means[mine]
+        behind, here = samples.of_rows(mine), mine[samples.row]
+        each, had = behind.each, left[here]
         steady = np.abs(rpm[mine] - speed) < STEADY * abs(speed)
         fold = _parts(part)
-        tried = rest.copy()
+        tried, parts = had.copy(), fold[behind.row]
         for k in range(int(fold.max()) + 1):
             found = _fitted(part, rest, (fold != k) & steady, terms)
-            tried[fold == k] -= found.at(*_angles(part, fold == k))
-        pays = _pays(part, centred(rest, part, np.zeros_like(fold)), centred(tried, part, np.zeros_like(fold)))
+            tried[parts == k] -= found.at(*_angles(each, parts == k))
+        pays = _pays(each, centred(had, each, np.zeros_like(parts)), centred(tried, each, np.zeros_like(parts)))
         own[speed] = _fitted(part, rest, steady, terms) if pays else nothing()
         if pays:
-            again[mine] = tried
+            again[here] = tried
     return own, again
 
 

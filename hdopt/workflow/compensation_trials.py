@@ -22,6 +22,7 @@ from hdopt.drive.geometry import Drive
 from hdopt.effects.tooth_mesh import mesh_order
 from hdopt.recordings.recording import TURN, Recording
 from hdopt.recordings.rows import Rows, neighbours_for
+from hdopt.workflow.compensation_samples import Samples
 from hdopt.workflow.waveform_fit import WaveformFit, fit_rows, offset_columns
 
 FOLDS = 4
@@ -94,23 +95,26 @@ def tried(
     terms: int | None,
     paths: Paths,
     fit: Callable[[Rows], WaveformFit | None],
+    samples: Samples,
 ) -> dict[str, Array]:
-    """What each way leaves (n,) arcmin on every part, fitted to the others; `split` is the rows and the part of each.
+    """What each way leaves (N,) arcmin of the `samples` of every part, fitted to the rows of the others; `split` is
+    these rows (n,) and the part of each.
 
     Where the others show no damaged tooth, the way that has one leaves what `TEETH` does.
 
     `terms`, `paths` as for `candidates`; `fit` gives the model fitted to some rows, None for harmonics alone.
     """
     rows, fold = split
+    each, part = samples.each, fold[samples.row]
     trials: dict[str, Array] = {}
     for k in range(int(fold.max()) + 1):
-        train, test = part_of(rows, fold != k), fold == k
+        train, test = part_of(rows, fold != k), part == k
         for name, (found, _) in candidates(train, fit(train), terms, some_of(paths, fold != k)).items():
-            left = trials.setdefault(name, np.full(len(rows), np.nan))
-            left[test] = rows.error[test] - said_of(found, rows)[test]
+            left = trials.setdefault(name, np.full(len(each), np.nan))
+            left[test] = each.error[test] - said_of(found, each, test)
     for name, left in trials.items():
         trials[name] = np.where(np.isnan(left), trials[TEETH], left) if np.isnan(left).any() else left
-    return {name: centred(left, rows, fold) for name, left in trials.items()}
+    return {name: centred(left, each, part) for name, left in trials.items()}
 
 
 def model_of(rows: Rows, drive: Drive, seed: int, sign: float | None = None) -> WaveformFit:
@@ -238,20 +242,15 @@ def _crossing(left: Array, zeros: Array, paths: Paths) -> Crossing:
     return crossing_of(left, zeros, paths, independent_share(rest))
 
 
-def said_of(found: Found, rows: Rows) -> Array:
-    """What `found` says of all `rows` (n,), means of samples as they are: the path since a reversal needs those
-    before."""
-    count = max(1, round(rows.averaged))
-    apart = TURN / rows.rows_per_turn / count
-    path = path_of(rows, found.crossing)
-    value = np.zeros(len(rows))
-    for place in range(count):
-        theta = rows.theta + (place - (count - 1) / 2) * apart
-        if isinstance(found, OfSpeed):
-            value += found.at(theta, theta / rows.ratio, path, signed_rpm(rows)) / count
-        else:
-            value += found.at(theta, theta / rows.ratio, path) / count
-    return value
+def said_of(found: Found, each: Rows, some: Mask | None = None) -> Array:
+    """What `found` says (arcmin) of `some` of the rows `each`, (n,) of one sample each, or of all: the path since a
+    reversal needs those before."""
+    path = path_of(each, found.crossing)
+    mine = slice(None) if some is None else some
+    theta = each.theta[mine]
+    if isinstance(found, OfSpeed):
+        return found.at(theta, theta / each.ratio, path[mine], signed_rpm(each)[mine])
+    return np.asarray(found.at(theta, theta / each.ratio, path[mine]), float)
 
 
 def centred(values: Array, rows: Rows, fold: Index) -> Array:

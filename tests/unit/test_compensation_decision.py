@@ -20,6 +20,7 @@ from hdopt.study import load_study
 from hdopt.workflow import compensate as module
 from hdopt.workflow import compensation_trials as trials_module
 from hdopt.workflow.compensate import compensation_of
+from hdopt.workflow.compensation_samples import Samples
 
 RATIO, TURN, NOISE, PER_TURN = 80.0, 2 * np.pi, 0.01, 20
 SWINGS = Harmonics(np.array([2]), np.array([0]), np.array([0.3]), np.zeros(1), -0.07, Crossing(20.0, 0.0, True))
@@ -97,7 +98,7 @@ def test_the_seed_reaches_the_fits_and_the_draws_and_the_held_out_parts_keep_the
         asked.append((len(rows), drive, seed, sign))
         return SimpleNamespace(sign=-1.0)
 
-    def tried(split, _terms, _paths, fit):
+    def tried(split, _terms, _paths, fit, _samples):
         rows, fold = split
         for k in range(int(fold.max()) + 1):
             assert fit(rows.rows(fold != k)).sign == -1.0
@@ -194,7 +195,7 @@ def test_a_way_that_a_part_does_not_show_is_judged_by_what_it_falls_back_to(monk
         return made if next(begun) == 2 else made | {"a damaged tooth": (SWINGS, 0.0)}
 
     monkeypatch.setattr(trials_module, "candidates", some)
-    tried = trials_module.tried((rows, fold), 64, {}, lambda _: None)
+    tried = trials_module.tried((rows, fold), 64, {}, lambda _: None, Samples(rows, np.arange(len(rows))))
     assert not np.isnan(tried["a damaged tooth"]).any()
     same = tried["a damaged tooth"] == tried["model, teeth and harmonics"]
     assert same[fold == 2].all() and not same[fold != 2].any()
