@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -11,6 +11,7 @@ from hdopt.errors import HdoptError
 from hdopt.files import write_text
 from hdopt.recordings.capability import outliers, performance
 from hdopt.recordings.recording import Recording
+from hdopt.recordings.repeats import fingerprint
 from hdopt.recordings.sheet import Batch, Unit
 from hdopt.workflow.acceptance_sheet import acceptance_sheet
 from hdopt.workflow.inspect import limits_for
@@ -30,15 +31,16 @@ def inspect_many(
     """Inspect each of `recordings` (files or records) as a drive of its own, on the engine in force.
 
     `drive` and `limits` as for `inspect`; `seed` for fits and intervals. A file that cannot be read is a row that says
-    so. `files` to write: {"csv": PATH} the table, {"report": PATH} one HTML page. Raises `HdoptError` where none can be
-    read, and before any work where a file cannot be written.
+    so, and one that holds the rows of another before it: it is no second drive. `files` to write: {"csv": PATH} the
+    table, {"report": PATH} one HTML page. Raises `HdoptError` where none can be read, and before any work where a file
+    cannot be written.
     """
     from hdopt.parallel.engine import engine_from
 
     source, wanted = recorded_drive(drive), checked_files(files, FILES)
     required = dict(limits_for(source, limits))
     work = partial(_unit, source=source, limits=required, seed=seed)
-    units = list(engine_from(None).map(work, list(recordings)))
+    units = _once_each(engine_from(None).map(work, list(recordings)))
     sound = [unit for unit in units if not unit.error]
     if not sound:
         raise HdoptError(f"none of {len(units)} recordings can be read; the first: {units[0].error[:200]}")
@@ -66,14 +68,34 @@ def write_batch(batch: Batch, files: Mapping[str, Path]) -> None:
         write_text(files["report"], render(batch_report(batch)))
 
 
-def _unit(recording: Recording | str | Path, source: RecordedDrive, limits: dict[str, float], seed: int) -> Unit:
+def _once_each(units: Iterable[tuple[Unit, str]]) -> list[Unit]:
+    """The `units`, each with its recording's fingerprint ("" where it could not be read): of equal ones the first
+    counts, the others say so."""
+    found: list[Unit] = []
+    seen: dict[str, str] = {}
+    for unit, print_of in units:
+        if print_of in seen:
+            said = f"the same rows as {seen[print_of]}: a recording counts for one drive; give this drive's own"
+            found.append(Unit(unit.name, error=said))
+            continue
+        if print_of:
+            seen[print_of] = unit.name
+        found.append(unit)
+    return found
+
+
+def _unit(
+    recording: Recording | str | Path, source: RecordedDrive, limits: dict[str, float], seed: int
+) -> tuple[Unit, str]:
+    """The figures of one drive, and its recording's fingerprint, "" where it could not be read."""
     name = recording.name if isinstance(recording, Recording) else Path(recording).name
     try:
-        sheet = acceptance_sheet(source.recordings(recording), source.drive, limits, seed=seed)
+        read = source.recordings(recording)
+        sheet = acceptance_sheet(read, source.drive, limits, seed=seed)
     except HdoptError as error:
-        return Unit(name, error=str(error))
+        return Unit(name, error=str(error)), ""
     verdict = next((d.verdict for d in sheet.limits if d.name == "peak_to_peak"), "")
-    return Unit(
+    unit = Unit(
         name,
         sheet.recording_peak_to_peak if sheet.beat is None else sheet.beat.value,
         "" if sheet.locked else "recording" if sheet.beat is None else "beat",
@@ -83,3 +105,4 @@ def _unit(recording: Recording | str | Path, source: RecordedDrive, limits: dict
         verdict,
         sheet.missed,
     )
+    return unit, fingerprint(read[0])

@@ -12,6 +12,7 @@ from hdopt.errors import HdoptError
 from hdopt.recordings.bench import Bench, load_bench
 from hdopt.recordings.read import read_recording
 from hdopt.recordings.recording import Recording
+from hdopt.recordings.repeats import refuse_repeats
 from hdopt.study import Study, load_study, shipped_drives
 from hdopt.workflow.measured_parts import words_on_measured_parts
 
@@ -41,7 +42,8 @@ class RecordedDrive:
 
     def recordings(self, given: AnyRecordings) -> list[Recording]:
         """The recordings of this drive: those `given` as records stay, files are read. The first one read warns of what
-        was `overruled`, and says what was done to tables of measured parts."""
+        was `overruled`, and says what was done to tables of measured parts. Raises `HdoptError` where a file cannot be
+        used, or a recording was given twice: all that is taken together here counts as measured once each."""
         if isinstance(given, Recording | str | Path):
             given = [given]
         found = []
@@ -53,6 +55,7 @@ class RecordedDrive:
             recording = self.read(item)
             found.append(replace(recording, warnings=(*said, *recording.warnings)))
             said = ()
+        refuse_repeats(found)
         return found
 
 

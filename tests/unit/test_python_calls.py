@@ -150,8 +150,9 @@ def test_inspect_and_compensate_take_every_form_of_a_drive_alike(recording, tmp_
     hdopt.inspect([recording], study, files={"csv": tmp_path / "sheet.csv", "bench": tmp_path / "bench.toml"})
     again = hdopt.recorded_drive("csf-25-80", bench=tmp_path / "bench.toml")
     assert hdopt.inspect(recording, again, limits).rms == pytest.approx(sheets[0]["rms_arcmin"])
-    batch = hdopt.inspect_many([recording, hdopt.read_recording(recording, 80.0)], "csf-25-80", limits)
-    assert batch.drives[0] == batch.drives[1]
+    either = [recording, hdopt.read_recording(recording, 80.0)]
+    of_file, of_record = (hdopt.inspect_many([one], "csf-25-80", limits) for one in either)
+    assert of_file.drives == of_record.drives
     made = hdopt.compensate(recording, "csf-25-80", 8, files={"json": tmp_path / "table.json"})
     assert made.worth == (tmp_path / "table.json").exists()
 
