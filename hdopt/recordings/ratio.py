@@ -94,12 +94,12 @@ def _refuse(checks: Checks, scale: Scale) -> None:
         hint = "one angle looks to be in turns and the other in degrees; check the units in --columns"
     elif abs(abs(found) - (given + 1)) < 0.3:
         hint = (
-            f"this is N + 1: the circular spline is the output here, or the nameplate is off by one; if so give "
-            f"--drive none --ratio {round(abs(found))}, or a study with these teeth"
+            f"this is N + 1: of a strain wave gear the circular spline is the output here, or the nameplate is off by "
+            f"one; if so give --drive none --ratio {round(abs(found))}, or a study with these teeth"
         )
     elif abs(abs(found) - (given - 1)) < 0.3:
         hint = (
-            f"this is N - 1: the ratio given is that of the circular spline as output, or off by one; if so give "
-            f"--drive none --ratio {round(abs(found))}, or a study with these teeth"
+            f"this is N - 1: of a strain wave gear the ratio given is that of the circular spline as output, or off by "
+            f"one; if so give --drive none --ratio {round(abs(found))}, or a study with these teeth"
         )
     checks.refuse(f"the output moves as for a ratio of {found:.6g}, the ratio given is {given:g}; {hint}")

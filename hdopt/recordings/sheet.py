@@ -46,6 +46,8 @@ class OrderLine:
 class Inspection(ShownAsTable):
     """The acceptance sheet of one drive; all figures in arcmin at the output unless another unit is named.
 
+    `strain_wave` says whether it is of a harmonic drive: what is said of another gear does without its parts.
+
     What is None was not measured: `recording_peak_to_peak`, `rms`, `drift` and `uncertainty` (the standard one of a
     peak-to-peak) need an input that turns, `slope_per_deg` one that turns by ten degrees.
     """
@@ -75,6 +77,7 @@ class Inspection(ShownAsTable):
     warnings: tuple[str, ...]
     cells: tuple[Cells, ...] = field(repr=False)
     orientation: Mapping[str, Any] | None = None
+    strain_wave: bool = True
 
     @property
     def missed(self) -> bool:

@@ -31,6 +31,7 @@ LEAST_OF_A_BEAT = 0.25
 orders are 10 times those of the whole beat, at 10 turns 44 times."""
 HIGHEST_WHOLE_ORDER = 8
 ORIGIN_UNKNOWN = "whole order of the input"
+ONCE_AN_OUTPUT_TURN = "once an output turn"
 LOCKED = "the input is locked"
 MAKERS_FIGURE = (
     "makers state the angular transmission accuracy over one turn of the output in one direction: the full beat"
@@ -105,6 +106,7 @@ def acceptance_sheet(
         warnings=(*(w for r in recordings for w in r.warnings), *_model_warnings(parts, fit)),
         cells=parts,
         orientation=_orientation(fit),
+        strain_wave=drive is not None,
     )
     return replace(found, limits=_decisions(found, limits, slope_sigma))
 
@@ -183,10 +185,10 @@ def _orders(recordings: Sequence[Recording], drive: Drive | None) -> tuple[Order
     if recording.turns < 1:
         return ()
     known = model_orders(recording.ratio)
-    given = [o.order for o in known]
+    if drive is None:
+        known = (replace(known[0], origin=ONCE_AN_OUTPUT_TURN),)
     whole = [ModelOrder(f"{k}", float(k), ORIGIN_UNKNOWN) for k in range(1, HIGHEST_WHOLE_ORDER + 1)]
-    listed = [*(known if drive is not None else known[:1]), *whole]
-    wanted = {o.order: o for o in reversed(listed) if drive is None or o.order in given or o.origin == ORIGIN_UNKNOWN}
+    wanted = {o.order: o for o in reversed([*known, *whole])}
     cells = figures.cells_of(recording)
     forward = cells.direction == (1.0 if (cells.direction > 0).mean() >= 0.5 else -1.0)
     usable = sorted(

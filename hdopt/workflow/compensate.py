@@ -210,8 +210,9 @@ def of_speed(found: Found) -> dict[str, Any] | None:
     return {"lag_arcmin_per_rpm": found.lag, "speeds": own}
 
 
-VOID = "after an encoder or its zero was changed, and at a load or temperature far from the recording's"
-VOID_OF_STRAIN_WAVE = f"after the wave generator, circular spline or flexspline was taken out or turned, {VOID}"
+_ANY = "after an encoder or its zero was changed, and at a load or temperature far from the recording's"
+VOID = f"after the gear was taken apart or one of its shafts was coupled anew, {_ANY}"
+VOID_OF_STRAIN_WAVE = f"after the wave generator, circular spline or flexspline was taken out or turned, {_ANY}"
 
 
 def homing_words(homing: tuple[float, float]) -> str:

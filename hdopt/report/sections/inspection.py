@@ -102,6 +102,9 @@ def _ruling(decision: Decision) -> Ruling:
     return Ruling(decision.met, f"{name}{note} {abs(decision.value):.4g} {unit}, at most {allowed}: {by}.")
 
 
+UPRIGHT = "What stands upright is the input's"
+OF_SPLINES = " and the circular spline's; what leans is the flexspline's."
+OF_A_GEAR = " or comes with it; what leans turns with another shaft or wheel."
 WAYS = ((1.0, BLUE, "forward"), (-1.0, VERMILLION, "backward"))
 """Direction of a pass, its colour and its name."""
 
@@ -119,7 +122,7 @@ def _waveform(found: Inspection) -> Section:
                 "carpet",
                 "The beat: every input turn, one above the other",
                 carpet,
-                "What stands upright is the input's and the circular spline's; what leans is the flexspline's.",
+                UPRIGHT + (OF_SPLINES if found.strain_wave else OF_A_GEAR),
             )
         )
     if found.returned is not None:
