@@ -1,6 +1,9 @@
 """Real recordings of others: what the diagnosis says of them, and what it leaves unsaid."""
 
+import re
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -11,9 +14,13 @@ from hdopt.diagnosis.predict import predict
 from hdopt.recordings.passes import find_passes
 from hdopt.recordings.read import read_recording, recording_from_table
 from hdopt.study import load_study
+from hdopt.workflow.compensate import compensate
+from hdopt.workflow.inspect import inspect
+from hdopt.workflow.recorded_drive import recorded_drive
 
 pytestmark = pytest.mark.recordings
 
+ROOT = Path(__file__).parents[2]
 PLANETARY = 7.2
 REVERSING = "time=time_s:s,input=odrive_pos_rad:rad,output=output_pos_rad:rad"
 STIFFNESS = "time=time_s:s,error=encoder_pos_rad:rad,torque=output_torque_Nm:Nm"
@@ -163,3 +170,29 @@ def test_trails_hidden_from_the_tool_agree_with_the_one_it_saw(recordings):
     for trail in read[1:]:
         difference = trail - read[0]
         assert np.std(difference - difference.mean()) < 2.0
+
+
+def test_the_page_from_the_bench_has_the_study_that_it_asks_for():
+    """Would catch a page that goes on from a file that no reader has, or from another drive than these tests take."""
+    page = (ROOT / "docs" / "from-the-bench.md").read_text(encoding="utf-8")
+    (study,) = re.findall(r"```toml\n(.*?)```", page, re.S)
+    assert tomllib.loads(study) == tomllib.loads(SCALED_CSF_17_100)
+
+
+def test_the_page_from_the_bench_says_what_its_commands_answer(recordings, tmp_path):
+    """Would catch figures on the page that the commands no longer give: 15.4 of 33 arcmin stood there."""
+    page = " ".join((ROOT / "docs" / "from-the-bench.md").read_text(encoding="utf-8").split())
+    reversing = recorded_drive("none", PLANETARY, REVERSING)
+    made = compensate(recordings / "planetary-7to1-reversing.csv", reversing, files={"c": tmp_path / "actuator.c"})
+    assert f"leaves {made.after:.1f} of {made.before:.1f} arcmin on strokes" in page
+    assert f"expects {made.predicted:.1f} ({made.low:.1f} to {made.high:.1f}) of a fresh recording" in page
+    (call,) = re.findall(r"double (hdopt_error_arcmin\(.*?\))", (tmp_path / "actuator.c").read_text())
+    assert call.replace("double ", "") in page
+    mount = recorded_drive(mount_drive(tmp_path, "scaled"), None, MOUNT.format("ra_error_arcsec_mean"))
+    short = compensate(recordings / "csf-17-100-mount.csv", mount)
+    assert not short.judged and f"{short.after:.2f} of {short.before:.2f} arcmin is left" in page
+    sheet = inspect(recordings / "csf-17-100-mount.csv", mount)
+    said = f"{sheet.one_turn.mean():.2f} arcmin, over the recording {sheet.recording_peak_to_peak:.2f} arcmin"
+    assert said in page and f"{sheet.slope_arcsec_per_s:.2f} arcsec of error a second" in page
+    torsion = inspect(recordings / "planetary-7to1-stiffness.csv", recorded_drive("none", PLANETARY, STIFFNESS)).torsion
+    assert f"{round(torsion.hysteresis_loss_arcmin, -1):.0f} arcmin wide" in page
