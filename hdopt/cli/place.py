@@ -22,7 +22,8 @@ def placed(message: str, context: click.Context | None, work: FilesOfWork) -> st
     """`message` with the options of the command and the values of the study that it speaks of before it; where it
     names neither an option nor a file, with the study's or the recordings' names."""
     places = [] if context is None else list(dict.fromkeys(_options(message, context)))
-    if work.values is not None and work.facts.get("source", "") not in message and "--set " not in message:
+    of_study = work.facts.get("source", "") not in message and "--set " not in message
+    if work.values is not None and of_study and not _begins_with_an_input(message, work):
         of_options = () if context is None else _numbers_of_options(message, context)
         places += work.values(without_numbers(message, of_options))
     if places:
@@ -73,6 +74,11 @@ def _numbers_of_options(message: str, context: click.Context) -> Iterator[float]
     for option, name, one, _ in _values(context):
         if isinstance(one, int | float) and (re.search(rf"{option}\b", message) or shows(message, one, name)):
             yield float(one)
+
+
+def _begins_with_an_input(message: str, work: FilesOfWork) -> bool:
+    """Whether `message` speaks of a file that was read: its numbers are of that file, whatever a study holds."""
+    return any(message.startswith(path.name) for path in work.inputs)
 
 
 def _names_an_input(message: str, context: click.Context | None, work: FilesOfWork) -> bool:

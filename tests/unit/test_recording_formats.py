@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from hdopt.cli import main
 from hdopt.errors import HdoptError
 from hdopt.recordings.bench import Bench, bench_text, load_bench
 from hdopt.recordings.columns import Column
@@ -386,7 +387,9 @@ def test_bench_file_round_trip(truth, tmp_path):
 def test_what_is_given_beside_a_bench_file_is_not_silently_stronger(truth, tmp_path):
     """Would catch a ratio, or columns with their calibration, that replace those of the bench without a word."""
     time, theta, output = truth
-    pd.DataFrame({"t": time, "in": theta, "out": output}).to_csv(tmp_path / "r.csv", index=False)
+    for name, rows in (("r", slice(None)), ("s", slice(None, None, 2))):
+        table = pd.DataFrame({"t": time[rows], "in": theta[rows], "out": output[rows]})
+        table.to_csv(tmp_path / f"{name}.csv", index=False)
     columns = {
         "time": Column("t", "s"),
         "input": Column("in", "rad"),
@@ -394,13 +397,13 @@ def test_what_is_given_beside_a_bench_file_is_not_silently_stronger(truth, tmp_p
     }
     (tmp_path / "bench.toml").write_text(bench_text(columns, 79.5))
     given = "time=t:s,input=in:rad,output=out:rad"
-    twice = [tmp_path / "r.csv"] * 2
-    first, second = recorded_drive("none", RATIO, given, tmp_path / "bench.toml").recordings(twice)
+    both = [tmp_path / "r.csv", tmp_path / "s.csv"]
+    first, second = recorded_drive("none", RATIO, given, tmp_path / "bench.toml").recordings(both)
     assert sum("the ratio is 80 as given with --ratio; the 79.5 of the bench file" in w for w in first.warnings) == 1
     assert sum("those of the bench file, with their signs, steps and calibration" in w for w in first.warnings) == 1
     assert not any("bench file" in warning for warning in second.warnings)
     (tmp_path / "bench.toml").write_text(bench_text(columns, RATIO))
-    same_again = recorded_drive("none", RATIO, None, tmp_path / "bench.toml").recordings(twice)
+    same_again = recorded_drive("none", RATIO, None, tmp_path / "bench.toml").recordings(both)
     assert not any("bench file" in warning for recording in same_again for warning in recording.warnings)
     with pytest.raises(HdoptError, match="the bench file's ratio is 81, that of the drive csf-25-80 is"):
         recorded_drive("csf-25-80", None, None, Bench("", 81.0))
@@ -569,9 +572,39 @@ def test_a_decimal_comma_in_a_limit_is_named():
         parse_limits("peak_to_peak=1,5arcmin")
 
 
-def test_a_binary_file_is_called_no_text_file(tmp_path):
-    """Fault caught: the words of a decoder, 'charmap' codec can't decode."""
-    path = tmp_path / "bin.csv"
-    path.write_bytes(b"time_s,input_deg,output_deg\n" + bytes(range(128, 256)) * 30)
-    with pytest.raises(HdoptError, match=r"bin.csv is not a text file: its byte \d+ is no character; give a recording"):
+FIRST_LINE = b"time_s,input_angle_deg,output_angle_deg\n"
+NUMBERS = b"".join(b"%d,%d,%.4f\n" % (k, 5 * k, 5 * k / 80) for k in range(9000))
+NO_TEXT = {
+    "a decoder's own words": (FIRST_LINE + bytes(range(128, 256)) * 30, 2, len(FIRST_LINE) + 1),
+    "nothing but zeros": (bytes(5000), 1, 0),
+    "characters of Windows": (b"\xfd\x05<`\xd5" + NUMBERS, 1, 1),
+    "beyond the first lines": (FIRST_LINE + NUMBERS + b"\xe9\x8f", 9002, len(FIRST_LINE + NUMBERS)),
+}
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize(("content", "line", "byte"), NO_TEXT.values(), ids=NO_TEXT)
+def test_a_binary_file_is_called_no_text_file(tmp_path, content, line, byte, packed):
+    """Faults caught: the words of a decoder, 'charmap' codec can't decode; a byte counted from where a piece of the
+    file begins; 'holds no rows', or a request to choose among columns of garbage."""
+    path = tmp_path / ("bin.csv.gz" if packed else "bin.csv")
+    path.write_bytes(gzip.compress(content) if packed else content)
+    said = rf"{path.name} is not a text file: line {line}, byte {byte} is no character; give a recording as text"
+    with pytest.raises(HdoptError, match=said):
         read_recording(path, 80.0)
+
+
+def test_zeros_that_a_power_cut_left_are_a_row_that_is_dropped(tmp_path):
+    """Fault caught: a text file refused for its last bytes."""
+    path = tmp_path / "cut.csv"
+    path.write_bytes(FIRST_LINE + NUMBERS[:9000] + b"\n" + bytes(400))
+    assert len(read_recording(path, 80.0)) > 500
+
+
+def test_a_number_in_a_files_refusal_is_none_of_the_studys(tmp_path, capsys):
+    """Fault caught: 'csf-25-80.toml, line 59, clearances.slot_1_width_mm: bin.csv is not a text file: ... byte 6'."""
+    (tmp_path / "bin.csv").write_bytes(b"a,b,c,\x00")
+    with pytest.raises(SystemExit) as ended:
+        main(["inspect", str(tmp_path / "bin.csv"), "--drive", "csf-25-80"])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.startswith("hdopt: bin.csv is not a text file: line 1, byte 6 is no character")

@@ -89,11 +89,6 @@ def read_table(path: Path, wanted: Sequence[str] | None = None) -> Table:
         raise MissingLibrary(
             f"{path.name} needs the library {library}, which is not installed; pip install 'hdopt[{EXTRAS[library]}]'"
         ) from error
-    except UnicodeDecodeError as error:
-        raise HdoptError(
-            f"{path.name} is not a text file: its byte {error.start} is no character; give a recording as text, or "
-            f"with the ending of its own format in place of {kind}"
-        ) from error
     except Exception as error:
         # The libraries of eight formats raise each their own errors, down to struct.error and KeyError.
         said = (str(error).splitlines() or [""])[0][:200] or type(error).__name__

@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SAMPLE_BYTES = 65_536
+BINARY = re.compile(rb"[\x00-\x06\x0e-\x19\x1c-\x1f]")
+"""Control characters that no logger writes into a header."""
+FIRST_BYTES = 512
+"""In which they are looked for: a power cut may leave zeros at the end of a text file."""
 COMMENTS = ("#", "%", "//", '"#', "!")
 SEPARATORS = (";", "\t", "|", ",", " ")
 SEPARATOR_NAMES = {";": "semicolon", "\t": "tab", "|": "bar", ",": "comma", " ": "blanks"}
@@ -59,6 +63,8 @@ def read(path: Path, wanted: Sequence[str] | None) -> Table:
     """
     raw = _open(path)
     encoding = _encoding(raw)
+    if (binary := BINARY.search(raw[:FIRST_BYTES])) and not encoding.startswith("utf-16"):
+        raise _no_text(path, raw.count(b"\n", 0, binary.start()) + 1, binary.start())
     lines = raw.decode(encoding, errors="replace").splitlines()
     if lines and lines[0].startswith("PHD2 version"):
         from hdopt.recordings.formats.phd2 import read as read_guide_log
@@ -67,13 +73,38 @@ def read(path: Path, wanted: Sequence[str] | None) -> Table:
     layout = find_layout(lines if len(raw) < SAMPLE_BYTES else lines[:-1], encoding, path.name)
     names = list(layout.header)
     use = list(wanted) if wanted and set(wanted) <= set(names) else None
-    frame, left_out = _frame(path, layout, use)
+    try:
+        frame, left_out = _frame(path, layout, use)
+    except UnicodeDecodeError as error:
+        raise _no_text(path, *_undecodable(path, encoding)) from error
     units = dict(zip(names, layout.units, strict=False))
     channels: dict[str, Channel] = {}
     for name in [str(column) for column in frame]:
         channels[name] = _channel(frame.pop(name), layout, units.get(name, ""))
     others = tuple(name for name in names if name not in channels)
     return Table(channels, _notes(layout), others, left_out)
+
+
+def _no_text(path: Path, line: int, byte: int) -> HdoptError:
+    """The refusal of a file whose `byte` (from 0), in this `line` (from 1), is no character."""
+    return HdoptError(
+        f"{path.name} is not a text file: line {line}, byte {byte} is no character; give a recording as text (UTF-8), "
+        "or with the ending of its own format"
+    )
+
+
+def _undecodable(path: Path, encoding: str) -> tuple[int, int]:
+    """The line (from 1) and the byte (from 0) of a file at which its `encoding` ends; the last ones where a line feed
+    is no character of its own (UTF-16)."""
+    line = begin = 0
+    with _unpacked(path) as stream:
+        for line, raw in enumerate(stream, start=1):
+            try:
+                raw.decode(encoding.removesuffix("-sig"))
+            except UnicodeDecodeError as error:
+                return line, begin + error.start
+            begin += len(raw)
+    return line, begin
 
 
 def _frame(path: Path, layout: Layout, use: list[str] | None) -> tuple[pd.DataFrame, tuple[str, ...]]:
@@ -165,7 +196,7 @@ def _encoding(raw: bytes) -> str:
     ):
         if raw.startswith(mark):
             return name
-    if len(raw) > 3 and raw[1:4:2] == b"\0\0":
+    if len(raw) > 3 and raw[0] and raw[1:4:2] == b"\0\0":
         return "utf-16-le"
     try:
         codecs.getincrementaldecoder("utf-8")().decode(raw)
