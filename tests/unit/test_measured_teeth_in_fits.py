@@ -108,9 +108,10 @@ def test_no_table_leaves_a_fit_as_it_is():
 def test_recordings_of_a_drive_with_tables_say_what_was_done_to_them(study, tmp_path):
     """With the first file alone: a table that was re-centred is another one than was measured."""
     theta = np.linspace(0, 720, 400)
-    angles = {"input_angle_deg": theta, "output_angle_deg": theta / 80 - np.sin(np.radians(2 * theta)) / 60}
-    pd.DataFrame(angles).to_csv(tmp_path / "a.csv", index=False)
-    first, second = recorded_drive(study).recordings([tmp_path / "a.csv", tmp_path / "a.csv"])
+    for name, size in (("a", 1.0), ("b", 1.1)):
+        angles = {"input_angle_deg": theta, "output_angle_deg": theta / 80 - size * np.sin(np.radians(2 * theta)) / 60}
+        pd.DataFrame(angles).to_csv(tmp_path / f"{name}.csv", index=False)
+    first, second = recorded_drive(study).recordings([tmp_path / "a.csv", tmp_path / "b.csv"])
     assert [name for name in ("cs_teeth", "fs_teeth") if any(name in said for said in first.warnings)] == [
         "cs_teeth",
         "fs_teeth",
