@@ -54,7 +54,8 @@ class SearchResult(ShownAsTable):
     """What a search found. `best` is feasible unless `feasible` says no; then it is the design nearest to the limits.
 
     `active` lists limits and bounds that hold the best design, with the price of each; `optimality_residual` is how far
-    the first-order conditions are from holding there, as a share of the objective's slope.
+    the first-order conditions are from holding there, as a share of the objective's slope. Where no design keeps all
+    limits there is no optimum: nothing is listed, and the residual is not a number.
     """
 
     study: str
@@ -205,5 +206,5 @@ class Verification:
 
 def choose(solutions: Sequence[Solution]) -> Solution:
     """The least of the feasible `solutions` in the objective with what structures cost; where none is feasible, the one
-    nearest to the limits."""
-    return min(solutions, key=lambda s: (0.0 if s.feasible else s.violation, s.weighed))
+    nearest to the limits: by the one that it breaks most, then by all together."""
+    return min(solutions, key=lambda s: ((0.0, 0.0) if s.feasible else s.broken, s.weighed))

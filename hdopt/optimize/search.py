@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 from hdopt.interruption import answering_interruptions
@@ -10,6 +11,7 @@ from hdopt.optimize.evaluation import record, record_of
 from hdopt.optimize.fronts import Progress, front_objectives, trace_front
 from hdopt.optimize.minimax import GLOBAL, LOCAL
 from hdopt.optimize.multipliers import prices
+from hdopt.optimize.nearest import nearest
 from hdopt.optimize.nlopt_adapter import INTERRUPTED, Effort, find_algorithm
 from hdopt.optimize.problem import DesignProblem
 from hdopt.optimize.records import Front, SearchResult, choose
@@ -58,12 +60,15 @@ def search_designs(
                 found, spent = trace_front(setup, method, objective, solved, progress)
                 made.append(found)
                 evaluations += spent
+        if not choose(solved).feasible:
+            solved, spent = _nearest(setup, method, solved)
+            evaluations += spent
     except KeyboardInterrupt:
         interrupted = True
         if not solved:
             raise
     best = choose(solved)
-    held, residual = prices(best.problem, best.values)
+    held, residual = prices(best.problem, best.values) if best.feasible else ([], math.nan)
     return SearchResult(
         study=study,
         objective=setup.settings.objective,
@@ -85,6 +90,13 @@ def search_designs(
         solutions=tuple(solved),
         notes=notes,
     )
+
+
+def _nearest(setup: Setup, method: Method, solved: Sequence[Solution]) -> tuple[list[Solution], int]:
+    """Of each of the `solved` combinations, none of which keeps the limits of `setup`, the design nearest to them by
+    `method`; and how many designs that took."""
+    found = [nearest(setup.problem(solution.combination), solution, method) for solution in solved]
+    return found, sum(new.evaluations - old.evaluations for new, old in zip(found, solved, strict=True))
 
 
 def _each_solved(setup: Setup, method: Method, progress: Progress) -> Iterator[Solution]:

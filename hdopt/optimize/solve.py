@@ -15,6 +15,9 @@ from hdopt.optimize.nlopt_adapter import Effort, Outcome
 from hdopt.optimize.objectives import NOMINAL, ROBUST
 from hdopt.optimize.problem import DesignProblem
 
+DECIMALS = 5
+"""Of shares of a bound by which limits are broken: as finely as a record says whether one is."""
+
 
 @dataclass(frozen=True)
 class Solution:
@@ -45,6 +48,15 @@ class Solution:
     @property
     def violation(self) -> float:
         return self.outcome.evaluation.violation if self.outcome.evaluation else np.inf
+
+    @property
+    def broken(self) -> tuple[float, float]:
+        """By how much the limit is broken that is broken most, and all of them together, in shares of their bounds;
+        without what rounding adds, by which designs that break the same one alike would differ."""
+        if self.outcome.evaluation is None:
+            return np.inf, np.inf
+        excess = np.maximum(self.outcome.evaluation.constraints, 0.0)
+        return round(float(excess.max(initial=0.0)), DECIMALS), round(float(excess.sum()), DECIMALS)
 
 
 @dataclass(frozen=True)
