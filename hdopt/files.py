@@ -172,6 +172,17 @@ def cells_of(line: str) -> list[str]:
     return [cell.replace(",", ".") if DECIMAL_COMMA.fullmatch(cell) else cell for cell in cells]
 
 
+def are_names(cells: Iterable[str]) -> bool:
+    """Whether the `cells` of a line can name columns: none is a number, as in a row whose other cell is spoilt."""
+    return not any(map(_is_number, cells))
+
+
+def on_commas(line: str, cells: Sequence[str], wanted: int) -> str:
+    """What to do about a `line` that decimal commas may have cut into more `cells` than the `wanted` ones."""
+    several = len(cells) > wanted and not set(";\t") & set(line)
+    return "; between decimal commas, semicolons must part the cells" if several else ""
+
+
 DEEP = 100
 """Brackets open at a time beyond any sound file."""
 

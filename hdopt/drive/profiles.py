@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from hdopt.arrays import Array
 from hdopt.drive.values import DriveError, require, require_positive
 from hdopt.errors import HdoptError, shown
-from hdopt.files import cells_of, read_text
+from hdopt.files import are_names, cells_of, on_commas, read_text
 from hdopt.keywords import names_keywords
 from hdopt.words import counted
 
@@ -283,8 +283,14 @@ class MeasuredProfile:
             f"{where} has {counted(len(angles), 'point')}; at least {self.MINIMUM_POINTS} are needed",
         )
         require(
-            bool(np.all(np.isfinite(angles)) and np.all(np.isfinite(radii)) and np.all(radii > 0)),
-            f"{where} holds an angle that is not finite or a radius that is not a finite number above 0",
+            bool(np.all(np.isfinite(angles)) and np.all(np.isfinite(radii))),
+            f"{where} holds an angle or a radius that is not finite; leave the point out",
+        )
+        least = radii.argmin()
+        require(
+            radii[least] > 0,
+            f"{where} has the radius {radii[least]:.6g} mm at {math.degrees(angles[least]):.6g} deg; radii must be "
+            "above 0, in the second column",
         )
         require(
             math.isfinite(self.noise) and self.noise >= 0, f"{where}: noise is {self.noise!r} mm; it must be 0 or above"
@@ -316,7 +322,7 @@ class MeasuredProfile:
 
     @classmethod
     def from_csv(cls, path: str | Path, noise: float = 0.0) -> MeasuredProfile:
-        """Read `angle_deg,radius_mm` rows (a header line is optional, `#` starts a comment)."""
+        """Read the rows of `read_polar`, angle_deg, radius_mm; `noise`, mm, as in the class."""
         return cls(*read_polar(Path(path), "measured profile"), noise, source=str(path))
 
     @property
@@ -349,44 +355,70 @@ class MeasuredProfile:
         return float(abs(np.sum(r**3 * np.exp(1j * phi)) / 3) / (np.sum(r**2) / 2))
 
 
-_OTHER_UNIT = re.compile(r"(?<![a-zA-Z])(?:rad|[uµμ]m|inch|cm)(?![a-zA-Z])")
-"""What a header says of angles that are not in deg, or radii that are not in mm."""
+POLAR = ("angle_deg", "radius_mm")
+"""Names of the columns of a measured curve."""
+_OTHER_UNIT = re.compile(r"(?<![a-zA-Z])(?:rad|gon|arcmin|turns?|[uµμ]m|inch|cm|x_mm|y_mm|diameter)(?![a-zA-Z])", re.I)
+"""What a header says of angles that are not in deg, or of lengths that are no radii in mm."""
 
 
 def read_polar(path: Path, what: str) -> tuple[Array, Array]:
-    """Angles (rad) and radii (mm) from the CSV file `path` of rows angle_deg, radius_mm, (n,) each, as they stand.
+    """Angles (rad) and radii (mm) from the CSV file `path` of rows angle_deg, radius_mm, (n,) each, as they stand; a
+    last point that closes the turn is left out.
 
-    A header line is optional, `#` starts a comment; between semicolons or tabs, numbers may have a decimal comma.
-    Raises `DriveError`, for a header that names other units too, that names `what`, file and line.
+    A header line is optional, `#` starts a comment; between semicolons or tabs, numbers may have a decimal comma. A
+    header with both names may have more columns, and in any order. Raises `DriveError`, for a header that names other
+    units too, that names `what`, file and line.
     """
     try:
         text = read_text(path, "a CSV text file", foreign=True)
     except HdoptError as error:
         raise DriveError(f"{what} {path}: cannot be read ({error})") from error
     points: list[tuple[float, float]] = []
+    names: list[str] = []
     header_allowed = True
     for number, line in enumerate(text.splitlines(), 1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
-        try:
-            angle, radius = (float(cell) for cell in cells_of(line))
-        except ValueError:
-            require(
-                header_allowed,
-                f"{what} {path}, line {number}: {shown(line)}; each line must hold two numbers, angle_deg,radius_mm",
-            )
-            other = _OTHER_UNIT.search(line)
-            require(
-                other is None,
-                f"{what} {path}, line {number}: {shown(line)} names {other[0] if other else ''}; give angles in deg "
-                "and radii in mm, and name the columns so",
-            )
+        cells = [cell.strip() for cell in cells_of(line)]
+        where = f"{what} {path}, line {number}: {shown(line)}"
+        if header_allowed and are_names(cells):
+            names = _named(cells, where)
         else:
-            points.append((math.radians(angle), radius))
+            points.append(
+                _point(cells, names, f"{where}; each line must hold", on_commas(line, cells, len(names) or 2))
+            )
         header_allowed = False
     require(bool(points), f"{what} {path} holds no points; give lines of angle_deg,radius_mm")
     angles, radii = np.array(points).T
+    if len(angles) > 1 and math.isclose(abs(angles[-1] - angles[0]), 2 * math.pi, abs_tol=1e-9):
+        angles, radii = angles[:-1], radii[:-1]
     return angles, radii
+
+
+def _named(names: list[str], where: str) -> list[str]:
+    """The `names` of a header that has those of angle and radius; none where it has other words for the two. `where`
+    begins the message of a header that does not fit."""
+    if set(POLAR) <= set(names):
+        return names
+    other = _OTHER_UNIT.search(" ".join(names))
+    require(
+        other is None,
+        f"{where} names {other[0] if other else ''}; give angles in deg and radii in mm, and name the columns "
+        f"{','.join(POLAR)}",
+    )
+    return []
+
+
+def _point(cells: list[str], names: list[str], where: str, hint: str) -> tuple[float, float]:
+    """Angle (rad) and radius (mm) of a row of `cells`, by the `names` of their columns where a header gave them;
+    `where` begins and `hint` ends the message of a row that holds something else."""
+    beyond = bool(names) and any(cells[len(names) :])
+    try:
+        angle, radius = map(float, [cells[names.index(name)] for name in POLAR] if names and not beyond else cells)
+    except (ValueError, IndexError):
+        raise DriveError(f"{where} two numbers, {','.join(POLAR)}{hint}") from None
+    require(math.isfinite(angle) and math.isfinite(radius), f"{where} finite numbers; leave the point out")
+    return math.radians(angle), radius
 
 
 def parallel_profile(profile: WaveGeneratorProfile, distance: float, points: int = 1440) -> MeasuredProfile:

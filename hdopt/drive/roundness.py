@@ -108,6 +108,4 @@ def read_roundness(path: Path) -> tuple[Array, Array]:
     """
     angles, radii = read_polar(path, "measured roundness")
     require(len(angles) >= 16, f"measured roundness {path} has {counted(len(angles), 'point')}; at least 16 are needed")
-    if abs(angles[-1] - angles[0]) == 2 * math.pi:
-        angles, radii = angles[:-1], radii[:-1]
     return angles, radii

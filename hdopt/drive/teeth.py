@@ -12,7 +12,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.drive.values import DriveError, require
 from hdopt.errors import HdoptError, shown
-from hdopt.files import cells_of, read_text
+from hdopt.files import are_names, cells_of, on_commas, read_text
 from hdopt.keywords import names_keywords
 
 KINDS = ("cumulative", "single")
@@ -152,14 +152,9 @@ def _rows(text: str, path: Path) -> list[tuple[int, str, float]]:
             rows.append((int(tooth), side, float(value)))
         except ValueError:
             where = f"measured teeth {path}, line {number}: {shown(line)}"
-            require(header_allowed, f"{where}; each line must hold tooth, flank, fp_um{_on_commas(line, cells)}")
+            header = header_allowed and are_names(cells)
+            require(header, f"{where}; each line must hold tooth, flank, fp_um{on_commas(line, cells, 3)}")
             in_mm = len(cells) == 3 and re.search(r"(?<![a-zA-Z])mm\b", cells[-1])
             require(not in_mm, f"{where}; deviations must be in um: give them times 1000, and name the column fp_um")
         header_allowed = False
     return rows
-
-
-def _on_commas(line: str, cells: list[str]) -> str:
-    """What to do about a `line` that decimal commas may have cut into too many `cells`."""
-    several = len(cells) > 3 and not set(";\t") & set(line)
-    return "; between decimal commas, semicolons must part the cells" if several else ""

@@ -114,7 +114,9 @@ class WaveGeneratorSection(Section):
     def build_profile(self, drive: DriveGeometry, folder: Path) -> WaveGeneratorProfile:
         undeformed = drive.flexspline_inner_radius
         semi_major = undeformed + drive.module if self.semi_major_mm is None else self.semi_major_mm
-        self._check_deflection(semi_major - undeformed, drive)
+        if self.profile != "measured":
+            remedy = "give the sizes of one drive, or leave semi_major_mm and semi_minor_mm out"
+            _check_deflection(semi_major - undeformed, drive, f"semi_major_mm is {self.semi_major_mm}", remedy)
         if self.profile == "ellipse":
             if self.semi_minor_mm is None:
                 return Ellipse.of_equal_perimeter(undeformed, semi_major)
@@ -127,17 +129,15 @@ class WaveGeneratorSection(Section):
             return TwoDisk(undeformed, semi_major - undeformed, math.radians(self.wrap_angle_deg))
         if self.file is None:
             raise MissingValue("the measured profile", "wave_generator.file")
-        return self._measured(folder / self.file)
-
-    def _check_deflection(self, deflection: float, drive: DriveGeometry) -> None:
-        """Refuse a wave generator of another drive, whose size is far from the flexspline's."""
-        if self.profile != "measured" and not 0 < deflection <= MOST_DEFLECTION * drive.module:
-            size = f"{abs(deflection):.4g} mm {'beyond' if deflection > 0 else 'below'}"
-            raise HdoptError(
-                f"semi_major_mm is {self.semi_major_mm}, {size} drive.flexspline_inner_radius_mm = "
-                f"{drive.flexspline_inner_radius:g}; a wave generator deflects the flexspline by about one module, "
-                f"{drive.module:g} mm here: give the sizes of one drive, or leave semi_major_mm and semi_minor_mm out"
-            )
+        measured = self._measured(folder / self.file)
+        table = (
+            f"the table {self.file} puts the flexspline's inner wall at {measured.semi_major:.5g} mm on the major axis"
+        )
+        remedy = (
+            "measure radii in mm from the axis, and say by surface whether they are those of the cam or the bearing"
+        )
+        _check_deflection(measured.semi_major - undeformed, drive, table, remedy)
+        return measured
 
     def _measured(self, file: Path) -> WaveGeneratorProfile:
         """The flexspline's inner wall: the measured table itself, or the bearing's thickness outside it."""
@@ -152,6 +152,17 @@ class WaveGeneratorSection(Section):
         if self.bearing_thickness_mm is None:
             raise MissingValue("a measured cam", "wave_generator.bearing_thickness_mm")
         return parallel_profile(measured, self.bearing_thickness_mm)
+
+
+def _check_deflection(deflection: float, drive: DriveGeometry, said: str, remedy: str) -> None:
+    """Refuse a wave generator of another `drive`, that would deflect the flexspline by `deflection`, mm, which is far
+    from a module; `said` begins the message and `remedy` ends it."""
+    if not 0 < deflection <= MOST_DEFLECTION * drive.module:
+        raise HdoptError(
+            f"{said}, {abs(deflection):.4g} mm {'beyond' if deflection > 0 else 'below'} "
+            f"drive.flexspline_inner_radius_mm = {drive.flexspline_inner_radius:g}; a wave generator deflects the "
+            f"flexspline by about one module, {drive.module:g} mm here: {remedy}"
+        )
 
 
 class TeethSection(Section):

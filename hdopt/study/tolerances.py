@@ -142,7 +142,7 @@ class MeasuredRow(Row):
     distribution: Literal["measured"]
     """A measured sample."""
     file: str
-    """CSV of one number a line, in the error's unit, relative to the study file."""
+    """CSV of one number a line, with a decimal point or comma, in the error's unit, relative to the study file."""
 
     def build(self, folder: Path) -> Distribution:
         return MeasuredSample.from_csv(folder / self.file, **self.bounds)

@@ -21,10 +21,12 @@ from numpy.typing import ArrayLike
 
 from hdopt.arrays import Array
 from hdopt.errors import HdoptError, shown
-from hdopt.files import read_text
+from hdopt.files import DECIMAL_COMMA, read_text
 from hdopt.keywords import names_keywords
 
 INFINITY = math.inf
+DIGITS = tuple("0123456789+-.,")
+"""How a line begins that is no header but a number, if a spoilt one."""
 
 
 class Distribution(Protocol):
@@ -345,24 +347,26 @@ class MeasuredSample(Truncated):
 
     @classmethod
     def from_csv(cls, path: str | Path, lower: float = -INFINITY, upper: float = INFINITY) -> MeasuredSample:
-        """Read one number a line (a header line is allowed, `#` starts a comment)."""
+        """Read one number a line, with a decimal point or comma (a header line is allowed, `#` starts a comment)."""
         path = Path(path)
         try:
-            lines = read_text(path, "a CSV text file").splitlines()
+            lines = read_text(path, "a CSV text file", foreign=True).splitlines()
         except HdoptError as error:
             raise HdoptError(f"measured sample {path}: cannot be read ({error})") from error
         values: list[float] = []
+        header_allowed = True
         for number, line in enumerate(lines, 1):
-            cell = line.split("#")[0].strip().rstrip(",")
+            cell = line.split("#")[0].strip().rstrip(",;\t ")
             if not cell:
                 continue
             try:
-                values.append(float(cell))
+                values.append(float(cell.replace(",", ".") if DECIMAL_COMMA.fullmatch(cell) else cell))
             except ValueError:
                 require(
-                    not values and number == 1,
+                    header_allowed and not cell.startswith(DIGITS),
                     f"measured sample {path}, line {number}: {shown(line)}; each line must hold one number",
                 )
+            header_allowed = False
         return cls(values=values, source=str(path), lower=lower, upper=upper)
 
     @cached_property

@@ -139,7 +139,10 @@ def test_measured_profile_is_read_from_a_file(tmp_path):
             lambda: MeasuredProfile(np.linspace(0, 3, 100), np.full(100, 30.0)),
             "has no point for 188 deg after 171.9 deg",
         ),
-        (lambda: MeasuredProfile(np.arange(0, 6.28, 0.1), np.full(63, np.inf)), "holds an angle that is not finite"),
+        (
+            lambda: MeasuredProfile(np.arange(0, 6.28, 0.1), np.full(63, np.inf)),
+            "holds an angle or a radius that is not finite",
+        ),
         (
             lambda: MeasuredProfile(PHI[:720], Ellipse(31.0, 30.0).radius(PHI[:720])),
             "has no point for",
@@ -160,7 +163,7 @@ def test_impossible_profiles_are_refused(make, message):
     [
         ("angle,radius\n1,2\nx,3\n", "line 3: 'x,3'; each line must hold two numbers"),
         ("", "holds no points"),
-        ("1,2,3\n4,5,6\n", "line 2: '4,5,6'; each line must hold two numbers"),
+        ("1,2,3\n4,5,6\n", "line 1: '1,2,3'; each line must hold two numbers"),
     ],
 )
 def test_broken_profile_files_are_refused_with_the_line(text, message, tmp_path):

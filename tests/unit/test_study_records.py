@@ -9,6 +9,7 @@ from hdopt.drive.geometry import DriveGeometry
 from hdopt.drive.profiles import MeasuredProfile, parallel_profile
 from hdopt.drive.roundness import MeasuredRoundness, read_roundness
 from hdopt.drive.teeth import MeasuredTeeth, read_teeth
+from hdopt.errors import HdoptError
 from hdopt.study.costs import ExponentialRow, PiecewiseRow, PowerRow, ReciprocalRow, TableRow
 from hdopt.study.drive import (
     ClearancesSection,
@@ -184,10 +185,36 @@ def test_a_measured_cam_lies_inside_the_bearing(tmp_path):
     radius = 24 + 0.4 * np.cos(2 * np.radians(angle))
     rows = [f"{a},{r:.9f}" for a, r in zip(angle, radius, strict=True)]
     (tmp_path / "cam.csv").write_text("angle_deg,radius_mm\n" + "\n".join(rows) + "\n")
-    drive = DriveGeometry(100, 102, 0.5, math.radians(20), 24.0)
     keys = {"profile": "measured", "width_mm": 8.0, "file": "cam.csv", "noise_um": 2.0, "bearing_thickness_mm": 3.0}
     table = MeasuredProfile.from_csv(tmp_path / "cam.csv", 0.002)
     phi = np.linspace(0, 2 * math.pi, 7)
-    for surface, expected in (("bearing", table), ("cam", parallel_profile(table, 3.0))):
+    for surface, inside, expected in (("bearing", 24.0, table), ("cam", 27.0, parallel_profile(table, 3.0))):
+        drive = DriveGeometry(100, 102, 0.5, math.radians(20), inside)
         built = WaveGeneratorSection(**keys, surface=surface).build_profile(drive, tmp_path)
         assert built.radius(phi) == pytest.approx(expected.radius(phi), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("surface", "times", "said"),
+    [
+        (
+            "bearing",
+            1000,
+            r"at 24400 mm on the major axis, 2\.438e\+04 mm beyond drive\.flexspline_inner_radius_mm = 24;",
+        ),
+        ("bearing", 2, "at 48.8 mm on the major axis, 24.8 mm beyond"),
+        ("bearing", 1 / 25.4, "at 0.96063 mm on the major axis, 23.04 mm below"),
+        ("cam", 1, "at 27.4 mm on the major axis, 3.4 mm beyond"),
+    ],
+    ids=["um", "diameters", "inches", "the bearing called a cam"],
+)
+def test_a_measured_curve_of_another_size_is_refused(surface, times, said, tmp_path):
+    """As an ellipse of that size is: its error was computed, with a note that the teeth miss each other by 23 mm."""
+    angle = np.arange(0, 360, 2.0)
+    radius = (24 + 0.4 * np.cos(2 * np.radians(angle))) * times
+    rows = [f"{a},{r:.9f}" for a, r in zip(angle, radius, strict=True)]
+    (tmp_path / "cam.csv").write_text("\n".join(rows))
+    keys = {"profile": "measured", "width_mm": 8.0, "file": "cam.csv", "bearing_thickness_mm": 3.0}
+    drive = DriveGeometry(100, 102, 0.5, math.radians(20), 24.0)
+    with pytest.raises(HdoptError, match=rf"{said}.*measure radii in mm from the axis, and say by surface"):
+        WaveGeneratorSection(**keys, surface=surface).build_profile(drive, tmp_path)
