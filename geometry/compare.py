@@ -112,12 +112,19 @@ def _header(path: Path, lines: Sequence[tuple[int, str]]) -> tuple[int, list[str
     raise HdoptError(f"{path}: a line must name the columns {','.join(POLAR)} or {','.join(CARTESIAN)}; add it")
 
 
-def fit_cam(points: Array, contour: Contour, probe_radius: float = 0.0, method: FitMethod = "least_squares") -> CamFit:
+def fit_cam(
+    points: Array,
+    contour: Contour,
+    probe_radius: float = 0.0,
+    method: FitMethod = "least_squares",
+    source: str = "array",
+) -> CamFit:
     """Turn and move measured points onto a contour: by `method` so that the sum of squared deviations is least, or the
     largest one (the minimum zone that ISO 1101 judges a form by).
 
     `points` of shape (n, 2), mm, are centres of a ball of `probe_radius` mm that touches the cam from outside (0: they
-    are on the surface). Raises `HdoptError` where points are missing over more than 30 degrees or are not of this cam.
+    are on the surface), and `source` the file that they came from, which `HdoptError` names where points are missing
+    over more than 30 degrees or are not of this cam.
     """
     if not 0 <= probe_radius < math.inf:
         raise HdoptError(f"the probe radius is {probe_radius:g} mm; it must be a finite number, 0 or above")
@@ -127,7 +134,7 @@ def fit_cam(points: Array, contour: Contour, probe_radius: float = 0.0, method: 
         return contour.deviation(_moved(points, x)) - probe_radius
 
     middle = np.array([0.0, contour.offset]) if isinstance(contour, Circle) else np.zeros(2)
-    _require_all_round(points - points.mean(0))
+    _require_all_round(points - points.mean(0), source)
     best = _least_squares(residuals, points.mean(0) - middle, turns)
     if method == "minimum_zone":
         best = _least_largest(residuals, best, turns)
@@ -137,7 +144,7 @@ def fit_cam(points: Array, contour: Contour, probe_radius: float = 0.0, method: 
     deviation = residuals(best)
     if np.abs(deviation).max() > FARTHEST:
         raise HdoptError(
-            f"the points lie up to {np.abs(deviation).max():.4g} mm off the cam of this study; give its own "
+            f"{source}: the points lie up to {np.abs(deviation).max():.4g} mm off the cam of this study; give its own "
             "measurement, the probe's radius (--probe-radius-mm), or --surface bearing"
         )
     angle = np.mod(np.arctan2(at[:, 0], at[:, 1]), 2 * math.pi)
@@ -211,12 +218,13 @@ def _normals(points: Array, contour: Contour) -> Array:
     return np.asarray(normal / np.hypot(*normal.T)[:, None])
 
 
-def _require_all_round(points: Array) -> None:
+def _require_all_round(points: Array, source: str) -> None:
+    """Raise `HdoptError` that names their `source` where `points` (n, 2) leave a large part of a turn out."""
     angle = np.sort(np.mod(np.arctan2(points[:, 0], points[:, 1]), 2 * math.pi))
     gap = float(np.diff(np.append(angle, angle[0] + 2 * math.pi)).max())
     if gap > LARGEST_GAP:
         raise HdoptError(
-            f"the points leave {math.degrees(gap):.3g} deg of the cam out; gaps of up to "
+            f"{source}: the points leave {math.degrees(gap):.3g} deg of the cam out; gaps of up to "
             f"{math.degrees(LARGEST_GAP):g} deg are allowed: measure all round"
         )
 

@@ -62,14 +62,16 @@ def _speaks_of(name: str, message: str) -> bool:
 
 def values_named(document: Document, message: str) -> tuple[str, ...]:
     """Where in `document` the values stand that `message` shows, 'FILE, line N, a.b' each; a value that stands there
-    more than once is left out beside one that does not, and above three places."""
+    more than once is left out beside one that does not, and above three places; of several, those stand whose name
+    `message` speaks of."""
     shown: dict[float, list[Keys]] = {}
     for path in leaves(document.data):
         value = _at(document.data, path)
         if _stands(document, path) and shows(message, value, path[-1]):
             shown.setdefault(float(value), []).append(path)
-    alone = [paths for paths in shown.values() if len(paths) == 1]
-    several = [paths for paths in shown.values() if len(paths) <= MOST_ALIKE]
+    meant = [[path for path in paths if _speaks_of(path[-1], message)] or paths for paths in shown.values()]
+    alone = [paths for paths in meant if len(paths) == 1]
+    several = [paths for paths in meant if len(paths) <= MOST_ALIKE]
     return tuple(document.where(path) for paths in alone or several for path in paths)
 
 

@@ -132,10 +132,8 @@ def compare(
     job = make_job(study.drive, export_options(study), study.name, bounds, study.data.get("contributors"))
     name, contour = _nominal(job, surface, part)
     points = read_cam(Path(measured))
-    fits: dict[FitMethod, CamFit] = {
-        "least_squares": fit_cam(points, contour, probe_radius_mm),
-        "minimum_zone": fit_cam(points, contour, probe_radius_mm, "minimum_zone"),
-    }
+    methods: tuple[FitMethod, ...] = ("least_squares", "minimum_zone")
+    fits = {method: fit_cam(points, contour, probe_radius_mm, method, str(measured)) for method in methods}
     if fit not in fits:
         raise HdoptError(unknown_name("fit", fit, fits))
     allowed, least = bounds.get("wg_eccentricity_mm"), 2 * fits["minimum_zone"].largest

@@ -56,11 +56,12 @@ def _sections_placed(document: Document) -> Iterator[None]:
 
 
 def _place(message: str, document: Document) -> str:
-    """Where in `document` to look for what `message` says; "" where it says that itself, or speaks of nothing in it."""
+    """Where in `document` to look for what `message` says; "" where it says that itself, speaks of nothing in it, or
+    begins with another file: numbers are that one's, whatever the study holds."""
     if found := _SECTION.match(message):
         path = tuple(part for part in found.groups() if part)
         return document.where(path).removesuffix(f", {'.'.join(path)}")
-    if document.source in message or f"{document.set_by} " in message:
+    if document.source in message or f"{document.set_by} " in message or _begins_with_a_file(message):
         return ""
     return "; ".join(places_named(document, message)[:MOST_NAMED])
 
@@ -90,3 +91,12 @@ def _names(recordings: Any) -> str:
     given = [recordings] if isinstance(recordings, Recording | str | Path) else list(recordings)
     names = [item.name if isinstance(item, Recording) else str(item) for item in given]
     return ", ".join(names[:MOST_NAMED]) + (f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else "")
+
+
+def _begins_with_a_file(message: str) -> bool:
+    """Whether `message` begins with the path of a file, 'cam.csv: ...' or 'cam.csv, line 3: ...'."""
+    name = message.partition(": ")[0].rpartition(", line ")
+    try:
+        return Path(name[0] or name[2]).is_file()
+    except (OSError, ValueError):  # longer than names may be
+        return False

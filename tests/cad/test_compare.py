@@ -204,6 +204,8 @@ def test_unusable_measurements_are_refused(text, message, tmp_path, capsys):
     (tmp_path / "cam.csv").write_text(text)
     code, said = run(capsys, tmp_path / "cam.csv")
     assert code == 2 and re.search(message, said.err), said.err
+    # Would catch a refusal that points to a line of the study, whose 162 teeth its 162 deg happen to equal.
+    assert said.err.startswith(f"hdopt: {tmp_path / 'cam.csv'}"), said.err
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])

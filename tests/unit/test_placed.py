@@ -11,12 +11,13 @@ import hdopt
 from hdopt.cli import main
 from hdopt.cli.app import COMMANDS, _placing, cli
 from hdopt.cli.place import placed
-from hdopt.errors import EngineFailed
+from hdopt.errors import EngineFailed, HdoptError
 from hdopt.files import FilesOfWork, note_input, watching_files
 from hdopt.parallel.cluster import Dask
 from hdopt.study import leaves, load_study
 from hdopt.study.document import parse_document
 from hdopt.study.named import keys_named, places_named, shows, values_named
+from hdopt.workflow.placed import numbers_named
 
 STUDY = """drive = "csf-25-80"
 
@@ -136,6 +137,36 @@ def test_a_common_number_is_taken_only_beside_its_name():
     assert values_named(document, "0.25 and 0.75") == ("s.toml, line 5, d",)
     # Would catch a refusal without a line because its value stands in the study twice.
     assert values_named(document, "0.25 is too small") == ("s.toml, line 3, b", "s.toml, line 4, c")
+
+
+def test_of_keys_with_one_value_the_one_that_is_spoken_of_is_meant():
+    """A width of 0.5 mm that is too small was said to be the module too."""
+    document = parse_document("module_mm = 0.5\nwidth_mm = 0.5\n", "s.toml")
+    assert values_named(document, "its axial width is 0.5 mm; 1.7 mm are needed") == ("s.toml, line 2, width_mm",)
+    assert len(values_named(document, "0.5 mm are too small")) == 2
+
+
+@pytest.mark.parametrize("where", ["cam.csv: ", "cam.csv, line 3: ", "{folder}/my cam.csv: "])
+def test_a_message_that_begins_with_a_file_points_to_no_study(where, tmp_path, monkeypatch):
+    """In Python as on the command line: its numbers are of that file, whatever values of the study they equal."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("cam.csv", "my cam.csv"):
+        (tmp_path / name).write_text("")
+    said = "the points leave 102.5 deg of the cam out"
+
+    @numbers_named
+    def refused(study):
+        raise HdoptError(where.format(folder=tmp_path) + said)
+
+    @numbers_named
+    def without_file(study):
+        raise HdoptError(said)
+
+    study = load_study("csf-25-80", ["wave_generator.width_mm=102.5"])
+    with pytest.raises(HdoptError, match=rf"^{re.escape(where.format(folder=tmp_path) + said)}$"):
+        refused(study)
+    with pytest.raises(HdoptError, match=rf"^--set wave_generator.width_mm: {said}$"):
+        without_file(study)
 
 
 WORDS = st.sampled_from(
