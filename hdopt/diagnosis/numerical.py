@@ -10,6 +10,8 @@ MAD_TO_SIGMA = 1.4826
 """Standard deviation of a Gaussian over its median absolute deviation."""
 NORMAL_95 = 1.96
 """Half width of a 95 % interval in standard deviations."""
+VARIANCE_OF_A_SQUARE = 2.0
+"""Variance of the square of a standard normal number."""
 RIDGE = 1e-6
 """Share of a unit column's power added to a Gram matrix: nearly parallel columns stay solvable to six digits."""
 SMALL_RIDGE = 1e-8

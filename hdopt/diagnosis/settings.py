@@ -606,6 +606,12 @@ class VerdictSettings:
         "choice: log evidence by which another law of speed or time must explain better: 0 to 1 over that of six "
         "delays and of 45 plays and frictions, 15 and 682 over that of a delay and a play which were drag",
     )
+    other_law_inexact: float = threshold(
+        1e-3,
+        "1",
+        "choice: share of what a term explains that its own form may leave to another law; laws of the speed a seventh "
+        "apart differ by 1.4e-3",
+    )
     together: float = threshold(
         0.125,
         "1",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +10,9 @@ import pandas as pd
 import pytest
 
 from hdopt.diagnosis.checks.other_laws import OtherLaw, other_law
+from hdopt.diagnosis.inference.fit import evaluate
+from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.search.candidates import joint_fit
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.stages import begin
@@ -247,6 +251,30 @@ def test_rough_noise_and_each_law_cost_evidence(monkeypatch):
     fit = recorded(0.5)
     once, rough = other_law(fit, 1.0).log_evidence, other_law(fit, 2.0).log_evidence
     assert once + np.log(3) == pytest.approx(2 * (rough + np.log(3)))
+
+
+def test_what_a_terms_own_form_may_leave_is_no_other_law(monkeypatch):
+    """A law that follows a delay but for a part of it, which the record holds as well, is another one only where that
+    part is more than a thousandth of what the delay explains. Would catch a play beside a delay that is refused, at a
+    millionth of an arcmin of noise, for the way in which its crossing is drawn."""
+    fit = recorded(1.0, size=3.0)
+    probe = FitProbe(fit, keep=())
+    own = probe.white_columns(fit.terms[0])[:, 0] * float(fit.coefficients[0][0])
+    part = np.sin(np.arange(len(own)))
+    for share, other in ((3e-4, False), (3e-3, True)):
+        size = np.sqrt(share) * np.linalg.norm(own) / np.linalg.norm(part)
+        held = _with_error(fit, size * part)
+        columns = fit.terms[0].columns + (size / fit.coefficients[0][0]) * part[:, None]
+        law = {"speed": [columns]}
+        monkeypatch.setattr(type(DELAY), "other_laws", lambda self, conditions, term, motion, law=law: law)
+        assert (other_law(held, 1.0).log_evidence > DEFAULT.verdict.other_law) is other
+
+
+def _with_error(fit, more):
+    """`fit` of rows whose error has so much `more` in it (n,), arcmin, by noise of 0.02 arcmin."""
+    rows = replace(fit.problem.rows, error=fit.problem.rows.error + more)
+    problem = replace(fit.problem, rows=rows, noise=Noise.white(rows, 0.02))
+    return evaluate(problem, fit.errors, fit.offsets, fit.terms, fit.coefficients)
 
 
 def test_effects_without_other_laws_are_not_asked(monkeypatch):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
@@ -281,10 +282,21 @@ def test_a_plain_effect_that_takes_up_nearly_all_completes_a_set(completion, in_
 
 
 @pytest.mark.parametrize(
+    ("left", "more", "completes"), [(0.3, 1.9, True), (0.3, 2.0, False), (0.1, 1.0, True), (0.1, 1.2, False)]
+)
+def test_what_is_left_may_be_as_much_as_the_noise_varies_by(completion, in_rows, left, more, completes):
+    """The power of n rows of noise is known to sqrt(2 n) variances, in 95 of 100 to 1.96 of these: so much may be left,
+    but not most of what was. Would catch a play beside a delay that takes up all that the delay left, a tenth of the
+    noise, and is refused for what the noise happened to be."""
+    found = completion(in_rows(900.0, ("delay",), left), Beside("friction", more * math.sqrt(2 / ROWS)))
+    assert (("delay", "friction") in [one.effects for one in found]) is completes
+
+
+@pytest.mark.parametrize(
     ("first", "beside"),
     [
         ((0.04, ("delay",)), Beside("friction", 0.0)),
-        ((0.2, ("delay",)), Beside("friction", 0.03)),
+        ((0.2, ("delay",)), Beside("friction", 0.11)),
         ((0.2, ("delay",)), Beside("friction", 0.0, may_be_said=False)),
         ((0.2, ("delay",)), Beside("friction", 0.0, other_law=5.0 + DEFAULT.verdict.other_law)),
         ((0.2, ("delay",)), Beside("friction", 0.0, width=SETTINGS.narrow + 1)),

@@ -32,9 +32,12 @@ class OtherLaw:
 def other_law(fit: Fit, inflation: float) -> OtherLaw:
     """The term of `fit` whose own law is beaten most by another, everything else fitted anew in one linear step, in
     noise rougher by `inflation`; each other law that is tried costs its odds, and coefficients beyond the term's own
-    cost theirs by Schwarz's criterion.
+    cost theirs by Schwarz's criterion. The own law stands where the other explains no more beyond it than what the
+    term's own form may leave: the crossing of a play, or a speed that changes while a delay passes, is not modelled to
+    the last thousandth.
     """
     found = OtherLaw()
+    inexact = fit.problem.settings.verdict.other_law_inexact
     for index, term in enumerate(fit.terms):
         laws = properties_of(term.effect).other_laws(fit.problem.rows, term, fit.motion)
         tried = sum(len(columns) for columns in laws.values())
@@ -47,6 +50,7 @@ def other_law(fit: Fit, inflation: float) -> OtherLaw:
                 gain = probe.gain(replace(term, columns=columns, steps={}, kept=False))
                 freedom = max(columns.shape[1] - term.width, 0) * math.log(fit.problem.weighed_rows)
                 better = HALF * ((gain - own) / inflation - freedom) - math.log(tried)
+                better -= HALF * inexact * own / inflation
                 if better > found.log_evidence:
                     found = OtherLaw(index, better, of)
     return found

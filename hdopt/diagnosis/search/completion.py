@@ -13,6 +13,7 @@ do too, where they take up most of what is left: the drive had taken up the rest
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -22,6 +23,7 @@ from hdopt.diagnosis.inference.base_fit import beyond_tolerances, is_far
 from hdopt.diagnosis.inference.catalogue import is_outside
 from hdopt.diagnosis.inference.clean_base import long_waves
 from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.numerical import HALF, NORMAL_95, VARIANCE_OF_A_SQUARE
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import Candidate, from_new_drives, in_order, joint_fit, paid_for_freedom
 from hdopt.diagnosis.search.penalty import kind_of, leaves_nothing
@@ -49,7 +51,7 @@ def far_more_taken_up(state: SearchState, candidates: list[Candidate]) -> list[C
     """Of the `candidates` those that complete the first where it leaves far more than noise: terms that bend to nothing
     take up nearly all of that beside it. `state` is where the work stands.
     """
-    first, settings = candidates[0], state.settings
+    first = candidates[0]
     left = state.above_noise(first.fit)
     if not is_far_more_than_noise(left, state):
         return []
@@ -57,7 +59,7 @@ def far_more_taken_up(state: SearchState, candidates: list[Candidate]) -> list[C
     for candidate in candidates[1:]:
         beside = [term for term in candidate.fit.terms if term.effect not in first.effects]
         if set(first.effects) < set(candidate.effects) and all(may_complete(t, first.fit) for t in beside):
-            if state.above_noise(candidate.fit) <= settings.complete * left:
+            if takes_up(candidate.fit, left, state):
                 found.append(without_inexactness(state, first, candidate))
     return found
 
@@ -71,6 +73,14 @@ def is_far_more_than_noise(left: float, state: SearchState) -> bool:
     """Whether what is `left` above the noise, in noise variances, is a good part of the noise. `state` is where the
     work stands."""
     return left >= state.settings.begun * state.scale.rows
+
+
+def takes_up(more: Fit, left: float, state: SearchState) -> bool:
+    """Whether `more` leaves hardly anything of what was `left` above the noise, in noise variances: a small share of
+    it, or, of at most half of it, no more than the power of so many rows of noise varies by, in 95 of 100. `state` is
+    where the work stands."""
+    varies = NORMAL_95 * math.sqrt(VARIANCE_OF_A_SQUARE * state.scale.rows)
+    return state.above_noise(more) <= max(state.settings.complete * left, min(varies, HALF * left))
 
 
 def by_one_plain_effect(state: SearchState, first: Candidate) -> list[Candidate]:
@@ -87,7 +97,7 @@ def by_one_plain_effect(state: SearchState, first: Candidate) -> list[Candidate]
         return []
 
     def fills(more: Fit) -> bool:
-        return leaves_more and state.above_noise(more) <= settings.complete * left
+        return leaves_more and takes_up(more, left, state)
 
     made = with_one_more(state, fit, fills, sines_alone=not leaves_more)
     home = [more for more in made if brings_home(more, first)] if far else []
