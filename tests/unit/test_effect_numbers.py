@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 from test_effect_physics import RATE, RATIO, TURN, moving, spanned
 
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.diagnosis.stages import begin
 from hdopt.effects import EFFECTS
 from hdopt.effects._friction_law import LAWS, Law
 from hdopt.effects.base import Effect
@@ -23,6 +26,9 @@ from hdopt.effects.probe import best_terms, strongest_orders
 from hdopt.effects.resonance import Foot
 from hdopt.effects.term import Term
 from hdopt.errors import HdoptError
+from hdopt.kinematics.cartesian import CartesianModel
+from hdopt.study import load_study
+from tests.unit.test_diagnosis import bench
 
 GEAR = SimpleNamespace(pressure_angle=math.radians(30), ratio=RATIO)
 
@@ -359,6 +365,36 @@ def test_lobes_of_a_ring_act_by_the_tangent_there_and_back():
     assert coefficients == pytest.approx((0.0, 0.01 * math.tan(math.radians(30))), abs=1e-15)
     written = effect.keys(shape, coefficients, gear)
     assert written == pytest.approx({"lobes": 6, "radial_amplitude_um": 10.0, "phase_deg": 90.0})
+
+
+def test_lobes_and_their_overtone_there_and_back():
+    """As bolts that press in a narrow place make them. Would catch an overtone that loses its phase or its size, and
+    one that a study cannot write."""
+    effect, gear = EFFECTS["circular_spline_lobing"], SimpleNamespace(pressure_angle=math.radians(30), ratio=RATIO)
+    given = {"lobes": 8, "radial_amplitude_um": 10.0, "phase_deg": 90.0}
+    given |= {"radial_amplitude_2_um": 4.0, "phase_2_deg": -30.0}
+    shape, coefficients = effect.values(given, gear)
+    arc = 1e-3 * math.tan(math.radians(30))
+    expected = (0.0, 10 * arc, 4 * arc * math.cos(math.radians(30)), -4 * arc * 0.5)
+    assert coefficients == pytest.approx(expected, abs=1e-15)
+    assert effect.keys(shape, coefficients, gear) == pytest.approx(given)
+    assert effect.orders(shape, RATIO) == [8.0, 16.0]
+    assert effect.term(None, shape).met.harmonics == (8, 16)
+    assert effect.term(None, shape).odds == -10.0
+
+
+@pytest.mark.parametrize(("overtone", "waves"), [(0.0, (1,)), (0.05, (1, 2))])
+def test_the_overtone_of_lobes_is_found_where_it_is(overtone, waves):
+    """Eight lobes and a quarter as much at sixteen were named an input encoder of eight lines."""
+    records = bench(
+        load_study(drive="csf-25-80"),
+        lambda s: 0.2 * np.sin(8 * s["theta"] + 0.3) + overtone * np.sin(16 * s["theta"] + 1.1),
+        turns=20,
+        rate=60,
+    )
+    state = begin(records, CartesianModel.of(load_study(drive="csf-25-80").drive), 1, DEFAULT)
+    best = EFFECTS["circular_spline_lobing"].search(FitProbe(state.base))[0]
+    assert (best.shape["lobes"], best.shape["waves"]) == (8, waves)
 
 
 def test_warming_may_take_ten_records():
