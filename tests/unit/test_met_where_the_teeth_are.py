@@ -61,8 +61,11 @@ def sines(keys, pattern):
 def by_hand(name, keys, x, zone):
     """The effect's deviation (um of arc) at the angle `x` (rad) of the spline, from its keys and definition alone."""
     if name == "circular_spline_lobing":
-        arc = keys["radial_amplitude_um"] * math.tan(math.radians(12))
-        return arc * np.sin(keys["lobes"] * x + math.radians(keys["phase_deg"]))
+        radius = keys["radial_amplitude_um"] * np.sin(keys["lobes"] * x + math.radians(keys["phase_deg"]))
+        if "phase_2_deg" in keys:
+            overtone = np.sin(2 * keys["lobes"] * x + math.radians(keys["phase_2_deg"]))
+            radius = radius + keys["radial_amplitude_2_um"] * overtone
+        return math.tan(math.radians(12)) * radius
     if name == "local_tooth_defect":
         off = np.mod(x - math.radians(keys["angle_deg"]) + np.pi, 2 * np.pi) - np.pi
         return keys["height_um"] * np.exp(-0.5 * (off / math.radians(keys["width_deg"])) ** 2)
