@@ -107,7 +107,7 @@ class CircularSplineLobing(Effect):
 
     def keys(self, shape: Shape, coefficients: Sequence[float], gear: DriveGeometry) -> dict[str, object]:
         radial = [c / arc_of_a_micrometre(gear) for c in coefficients]
-        return {"lobes": int(shape["lobes"])} | SINES.written(shape.get("waves", ALONE), radial)
+        return {"lobes": int(shape["lobes"]), **SINES.written(shape.get("waves", ALONE), radial)}
 
     def parameters(self, term: Term, estimate: FitEstimate) -> dict[str, Parameter]:
         found = {"lobes": counted(term.shape["lobes"])}
