@@ -402,6 +402,9 @@ class SearchSettings:
         0.5, "1", "choice: power left above the noise over it from which a leading set is taken for a part of another"
     )
     complete: float = threshold(0.1, "1", "choice: share of that power which the other set may leave")
+    complete_in_noise: float = threshold(
+        0.5, "1", "choice: the same, where it is no more than the power of the noise varies by"
+    )
     complete_by_waves: float = threshold(0.5, "1", "choice: the same, where it is waves of the teeth that complete it")
     leaves_more: float = threshold(
         0.05, "1", "choice: power left above the noise over it from which one plain effect more is tried"

@@ -15,7 +15,7 @@ from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects.base import Effect, Keys, terms_at
 from hdopt.effects.conditions import Conditions
-from hdopt.effects.declared import UM, Quantity, Sines, needed
+from hdopt.effects.declared import UM, Quantity, Sines, needed, smallest_set
 from hdopt.effects.estimate import FitEstimate, Parameter, counted
 from hdopt.effects.met import Spline, Waves
 from hdopt.effects.probe import Probe, best_terms
@@ -101,7 +101,7 @@ class CircularSplineLobing(Effect):
         arc = arc_of_a_micrometre(gear)
         given = SINES.given(self.id, keys)
         SINES.some(self.id, given)
-        waves = WITH_OVERTONE if 2 in given else ALONE
+        waves = smallest_set((ALONE, WITH_OVERTONE), given)
         shape = {"lobes": int(needed(keys, "lobes")), "waves": waves}
         return shape, tuple(arc * c for c in SINES.coefficients(given, waves))
 

@@ -6,7 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from hdopt.diagnosis.inference import fit as fitting
 from hdopt.diagnosis.inference.catalogue import explanations
+from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.nonphysical_alternatives import AnyOrder, Mains
 from hdopt.diagnosis.search import high_order
 from hdopt.diagnosis.search.candidates import Candidate
@@ -157,6 +159,11 @@ def test_a_ripple_found_in_the_zones_adds_what_it_adds_there(monkeypatch):
         assert (selection.best.fit, ripple) == (fit, adds)
 
 
+def fit_of(problem, terms, coefficients):
+    """A fit of `terms` of which nothing else is asked."""
+    return Fit(problem, None, None, terms, coefficients, *[None] * 5)
+
+
 def test_a_mesh_among_the_averaged_rows_is_looked_for_in_the_zones(monkeypatch):
     """Where the rows hold the mesh it was seen among all effects, beside the motion: it is taken out of what was found,
     looked for from its lowest order on, and kept where the zones explain more than all that was found; else all stays.
@@ -172,9 +179,9 @@ def test_a_mesh_among_the_averaged_rows_is_looked_for_in_the_zones(monkeypatch):
     mesh = Term("tooth_mesh", {"sidebands": (0, -2, 2)}, columns=np.ones((3, 6)))
     other = Term("output_coupling", {"shaft": "output"}, columns=np.ones((3, 2)))
     problem = SimpleNamespace(explanations=explained, rows=SimpleNamespace(ratio=30.0))
-    fit = SimpleNamespace(problem=problem, errors=None, offsets=None, terms=(other, mesh), coefficients=("o", "m"))
+    fit = fit_of(problem, (mesh, other), ("m", "o"))
     found = Selection("base", (Candidate(fit, 9.0, 1.0),), 1.0)
-    monkeypatch.setattr(high_order, "evaluate", lambda problem, errors, offsets, terms, own: (terms, own))
+    monkeypatch.setattr(fitting, "evaluate", lambda problem, errors, offsets, terms, own: (terms, own))
     monkeypatch.setattr(high_order, "high_order_selection", selection)
     monkeypatch.setattr(high_order, "gather", lambda recordings: None)
     recorded = SimpleNamespace(rows=SimpleNamespace(error=np.array([-2.0, 2.0])))
@@ -197,12 +204,9 @@ def test_a_mesh_behind_a_better_set_is_taken_where_that_leaves_more_than_noise(m
     problem = SimpleNamespace(explanations=dict(EFFECTS), rows=SimpleNamespace(ratio=30.0))
     mesh = Term("tooth_mesh", {"sidebands": (0,)}, columns=np.ones((3, 2)))
     line = Term("encoder_interpolation", {"lines": 62, "shaft": "input", "cycles": (1,)}, columns=np.ones((3, 2)))
-    first, second = (
-        SimpleNamespace(problem=problem, errors=None, offsets=None, terms=(one,), coefficients=("own",))
-        for one in (line, mesh)
-    )
+    first, second = (fit_of(problem, (one,), ("own",)) for one in (line, mesh))
     found = Selection("base", (Candidate(first, 9.0, 1.0), Candidate(second, 8.0, 1.0)), 1.0)
-    monkeypatch.setattr(high_order, "evaluate", lambda problem, errors, offsets, terms, own: (terms, own))
+    monkeypatch.setattr(fitting, "evaluate", lambda problem, errors, offsets, terms, own: (terms, own))
     monkeypatch.setattr(high_order, "leaves_white_noise", lambda fit: white if fit is first else None)
     if white:
         assert high_order.mesh_taken_out(found) is None

@@ -44,13 +44,12 @@ def other_law(fit: Fit, inflation: float) -> OtherLaw:
         if not tried:
             continue
         probe = FitProbe(fit, keep=fit.all_but(index))
-        own = probe.gain(term)
+        own = (1 + inexact) * probe.gain(term)
         for of, each in laws.items():
             for columns in each:
                 gain = probe.gain(replace(term, columns=columns, steps={}, kept=False))
                 freedom = max(columns.shape[1] - term.width, 0) * math.log(fit.problem.weighed_rows)
                 better = HALF * ((gain - own) / inflation - freedom) - math.log(tried)
-                better -= HALF * inexact * own / inflation
                 if better > found.log_evidence:
                     found = OtherLaw(index, better, of)
     return found

@@ -23,7 +23,7 @@ from hdopt.diagnosis.inference.base_fit import beyond_tolerances, is_far
 from hdopt.diagnosis.inference.catalogue import is_outside
 from hdopt.diagnosis.inference.clean_base import long_waves
 from hdopt.diagnosis.inference.fit import Fit
-from hdopt.diagnosis.numerical import HALF, NORMAL_95, VARIANCE_OF_A_SQUARE
+from hdopt.diagnosis.numerical import NORMAL_95, VARIANCE_OF_A_SQUARE
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import Candidate, from_new_drives, in_order, joint_fit, paid_for_freedom
 from hdopt.diagnosis.search.penalty import kind_of, leaves_nothing
@@ -77,10 +77,11 @@ def is_far_more_than_noise(left: float, state: SearchState) -> bool:
 
 def takes_up(more: Fit, left: float, state: SearchState) -> bool:
     """Whether `more` leaves hardly anything of what was `left` above the noise, in noise variances: a small share of
-    it, or, of at most half of it, no more than the power of so many rows of noise varies by, in 95 of 100. `state` is
+    it, or, of a larger share, no more than the power of so many rows of noise varies by, in 95 of 100. `state` is
     where the work stands."""
+    settings = state.settings
     varies = NORMAL_95 * math.sqrt(VARIANCE_OF_A_SQUARE * state.scale.rows)
-    return state.above_noise(more) <= max(state.settings.complete * left, min(varies, HALF * left))
+    return state.above_noise(more) <= max(settings.complete * left, min(varies, settings.complete_in_noise * left))
 
 
 def by_one_plain_effect(state: SearchState, first: Candidate) -> list[Candidate]:

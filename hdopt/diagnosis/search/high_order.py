@@ -11,7 +11,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.diagnosis.inference import noise as noise_model
 from hdopt.diagnosis.inference.catalogue import explanations
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine, with_terms
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.nonphysical_alternatives import AnyOrder, Mains
 from hdopt.diagnosis.inference.nuisance import Nuisances
@@ -78,9 +78,7 @@ def mesh_taken_out(found: Selection) -> tuple[Selection, float] | None:
                 continue
             if candidate is not found.best and leaves_white_noise(found.best.fit):
                 return None
-            terms = [*fit.terms[:at], *fit.terms[at + 1 :]]
-            own = [*fit.coefficients[:at], *fit.coefficients[at + 1 :]]
-            without = evaluate(fit.problem, fit.errors, fit.offsets, terms, own)
+            without = with_terms(fit, fit.all_but(at))
             return found.with_best_fit(without), lowest_order([term], fit.problem.rows.ratio)
     return None
 
