@@ -127,4 +127,6 @@ def test_no_design_is_an_answer_not_an_error(tmp_path):
     done = find_step("search")(study, Context(tmp_path, 1))
     assert not done.answer
     assert "No design keeps all limits" in done.says[0]
+    (section,) = done.sections
+    assert not section.summary  # the page would say the same sentence twice
     assert not done.files

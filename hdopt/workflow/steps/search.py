@@ -49,5 +49,5 @@ def _no_design(study: Study, result: SearchResult) -> StepResult:
         f"No design keeps all limits. The nearest, {design_words(result.best)}, breaks: "
         f"{'; '.join(result.best.broken_limits)}. Ease a limit or widen a variable."
     )
-    section = Section("trade-chosen", "No wave generator keeps all limits", (Text(text),), text)
+    section = Section("trade-chosen", "No wave generator keeps all limits", (Text(text),))
     return StepResult((section,), result.to_dict(), says=(text,), answer=False)
