@@ -2,7 +2,9 @@
 
 It follows the recorded temperature, coefficient times (T - mean T), or, where none was recorded, the warming of one
 thermal mass: A (1 - exp(-t/tau)) (lumped capacitance; Incropera, "Fundamentals of Heat and Mass Transfer", ch. 5).
-Units: coefficient arcmin/K, amplitude arcmin, tau s. Prior: tau from 1/20 of the record to 5 records, 2 arcmin/K.
+Several recordings whose clocks each begin anew are those of a cold start each, or of one warming: then each begins as
+warm as it happens to be, and warms by an amplitude of its own. Units: coefficient arcmin/K, amplitude arcmin, tau s.
+Prior: tau from 1/20 of the record to 5 records, 2 arcmin/K.
 """
 
 from __future__ import annotations
@@ -21,6 +23,9 @@ from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.requirements import varying_temperature
 from hdopt.effects.term import Shape, Term
 from hdopt.errors import HdoptError
+
+OWN_STARTS = "own_starts"
+"""Of a shape: each recording warms by an amplitude of its own, from where it happens to be."""
 
 
 class ThermalDrift(Effect):
@@ -51,8 +56,10 @@ class ThermalDrift(Effect):
             found.append(self.term(samples, {}))
         if samples.time is not None:
             duration = float(np.ptp(elapsed(samples)))
-            shapes = [{"time_constant_s": f * duration} for f in np.geomspace(0.05, 5, 12)]
+            shapes: list[Shape] = [{"time_constant_s": f * duration} for f in np.geomspace(0.05, 5, 12)]
             found += best_terms(probe, terms_at(self, samples, shapes))
+            if not follow_each_other(samples):
+                found += best_terms(probe, terms_at(self, samples, [{**shape, OWN_STARTS: True} for shape in shapes]))
         return found
 
     def term(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
@@ -61,10 +68,12 @@ class ThermalDrift(Effect):
             return Term(self.id, {}, columns=(temperature - temperature.mean())[:, None], odds=1.0)
         duration = float(np.ptp(conditions.known_time))
         tau = min(max(shape["time_constant_s"], 0.01 * duration), 10 * duration)
+        since = elapsed(conditions)
+        apart = shape.get(OWN_STARTS, False)
         return Term(
             self.id,
-            {"time_constant_s": tau},
-            columns=warming(elapsed(conditions), tau),
+            {"time_constant_s": tau} | ({OWN_STARTS: True} if apart else {}),
+            columns=left_to_warm(since, tau, conditions) if apart else warming(since, tau),
             steps={"time_constant_s": 0.02 * tau},
             trials=8.0,
         )
@@ -105,15 +114,21 @@ class ThermalDrift(Effect):
     def parameters(self, term: Term, estimate: FitEstimate) -> dict[str, Parameter]:
         if "time_constant_s" not in term.shape:
             return {"coefficient_arcmin_per_k": estimate.parameter(0, "arcmin/K")}
-        return {"amplitude_arcmin": estimate.parameter(0, "arcmin"), "time_constant_s": estimate.parameter(1, "s")}
+        return {
+            "amplitude_arcmin": estimate.parameter(0, "arcmin"),
+            "time_constant_s": estimate.parameter(term.width, "s"),
+        }
 
     def sentence(self, shape: Shape, parameters: Mapping[str, Parameter], rms_arcmin: float) -> str:
         if "coefficient_arcmin_per_k" in parameters:
             return f"The error follows the temperature, {parameters['coefficient_arcmin_per_k'].value:.2g} arcmin/K."
-        return (
+        drifts = (
             f"The error drifts by {parameters['amplitude_arcmin'].value:.2g} arcmin with a time constant of "
-            f"{parameters['time_constant_s'].value:.3g} s, as of something warming up."
+            f"{parameters['time_constant_s'].value:.3g} s, as of something warming up"
         )
+        if shape.get(OWN_STARTS, False):
+            return f"{drifts}, in the first recording; each of the others begins as warm as it happens to be."
+        return f"{drifts}."
 
 
 def warming(time: Array, time_constant: float) -> Array:
@@ -121,12 +136,25 @@ def warming(time: Array, time_constant: float) -> Array:
     return np.asarray((1 - np.exp(-time / time_constant))[:, None])
 
 
+def left_to_warm(time: Array, time_constant: float, conditions: Conditions) -> Array:
+    """-exp(-t/tau) of `time` (n,) and `time_constant`, s, in each recording of the `conditions` (n rows, r recordings)
+    by itself: shape (n, r). The coefficient of each is by how much it still warms; what all warm to is their zero."""
+    own = conditions.record[:, None] == np.arange(conditions.records)
+    return np.asarray(-np.exp(-time / time_constant)[:, None] * own)
+
+
+def follow_each_other(conditions: Conditions) -> bool:
+    """Whether the clock of the `conditions` goes on from each recording to the next; so it does where there is one."""
+    time, record = conditions.known_time, conditions.record
+    starts = [time[record == r][0] for r in range(conditions.records)]
+    ends = [time[record == r][-1] for r in range(conditions.records)]
+    return all(end <= start for end, start in zip(ends[:-1], starts[1:], strict=True))
+
+
 def elapsed(conditions: Conditions) -> Array:
     """Time of the `conditions` (n,), s, since the start of the first recording where the recordings follow each other,
     else of each.
     """
     time, record = conditions.known_time, conditions.record
-    starts = [time[record == r][0] for r in range(conditions.records)]
-    ends = [time[record == r][-1] for r in range(conditions.records)]
-    follow = all(end <= start for end, start in zip(ends[:-1], starts[1:], strict=True))
-    return np.asarray(time - (starts[0] if follow else np.array(starts)[record]))
+    starts = np.array([time[record == r][0] for r in range(conditions.records)])
+    return np.asarray(time - (starts[0] if follow_each_other(conditions) else starts[record]))

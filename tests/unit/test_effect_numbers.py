@@ -12,6 +12,7 @@ import pytest
 from test_effect_physics import RATE, RATIO, TURN, moving, spanned
 
 from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.search.candidates import in_order, joint_fit, penalty_scale, weigh
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.stages import begin
 from hdopt.effects import EFFECTS
@@ -429,6 +430,35 @@ def test_warming_is_looked_for_from_a_twentieth_of_the_record_to_five(monkeypatc
     effect.search(SimpleNamespace(samples=c))
     found = [shape["time_constant_s"] for shape in asked]
     assert found == pytest.approx(15 * 100 ** (np.arange(12) / 11))
+
+
+@pytest.mark.parametrize(
+    ("begun", "sizes"), [((0, 0), (0.5,)), ((30, 281), (0.5 * math.exp(-0.3), 0.5 * math.exp(-2.81)))]
+)
+def test_one_warming_is_found_where_the_clock_begins_anew_in_each_recording(begun, sizes):
+    """Of 100 s, over two recordings of 151 s: both begun cold; or the first 30 s after the bench was switched on, the
+    second 281 s after. Would catch the second taken for cold (it was `unknown`), its amplitude not its own, and two
+    amplitudes where one serves."""
+    study = load_study(drive="csf-25-80")
+    records = bench(
+        study,
+        lambda s: 0.5 * (1 - np.exp(-(s["time"] + begun[s["index"]]) / 100)),
+        turns=24,
+        rate=60,
+        speeds=(2.0, 2.0),
+    )
+    start = begin(records, CartesianModel.of(study.drive), 1, DEFAULT).base
+    effect = EFFECTS["thermal_drift"]
+    scale = penalty_scale(start.problem)
+    best = in_order(weigh(joint_fit(start, [term]), start, scale) for term in effect.search(FitProbe(start)))[0].fit
+    assert [term.width for term in best.terms] == [len(sizes)]
+    estimate = best.estimates()[0]
+    told = [estimate.parameter(i, "arcmin") for i in range(len(sizes))]
+    told.append(effect.parameters(best.terms[0], estimate)["time_constant_s"])
+    for one, true in zip(told, [*sizes, 100.0], strict=True):
+        assert one.low < true < one.high and one.high - one.low < 0.4 * true + 0.05
+    said = effect.sentence(best.terms[0].shape, effect.parameters(best.terms[0], estimate), 0.1)
+    assert ("in the first recording" in said) is (len(sizes) > 1)
 
 
 @pytest.mark.parametrize(
