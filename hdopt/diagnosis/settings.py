@@ -609,6 +609,17 @@ class VerdictSettings:
         "choice: log evidence by which another law of speed or time must explain better: 0 to 1 over that of six "
         "delays and of 45 plays and frictions, 15 and 682 over that of a delay and a play which were drag",
     )
+    imitators_alike: float = threshold(
+        1e-3,
+        "1",
+        "choice: log evidence by which variants of an imitator may differ and be alike: no more than rounding",
+    )
+    least_left_by_means: float = threshold(
+        0.5,
+        "1",
+        "theorem: the highest order that rows hold, 0.45 of their number a turn, keeps 0.70 of its amplitude; where "
+        "rows of other recordings are wider no less is believed",
+    )
     other_law_inexact: float = threshold(
         1e-3,
         "1",

@@ -211,6 +211,12 @@ class Effect(Explanation):
         """Of these the ones that say where it lives; of an effect with none the strongest are measured."""
         return self.orders(shape, ratio)
 
+    def orders_of_columns(self, term: Term, ratio: float) -> list[float]:
+        """Orders (cycles an input turn) of its sines, one for each sine and cosine with which the columns of `term`
+        begin, on a drive of this `ratio`; none where they are no sines."""
+        orders = self.orders(term.shape, ratio)
+        return orders * (term.width // (2 * len(orders))) if orders else []
+
     def highest_order(self, shape: Shape, ratio: float) -> float:
         """The highest order that a sampling of it must resolve."""
         return max(self.orders(shape, ratio), default=0.0)

@@ -333,6 +333,13 @@ class BearingPass(Effect):
         orders = bearing_orders(shape["ball_to_pitch_ratio"], shape["balls"], ratio)
         return [float(orders[i]) for i in shape["lines"]]
 
+    def orders_of_columns(self, term: Term, ratio: float) -> list[float]:
+        """In the zones, the orders at which these meet the balls: the zones' own turn is in `orders`."""
+        if "zones" not in term.shape:
+            return super().orders_of_columns(term, ratio)
+        half = (1 + term.shape["ball_to_pitch_ratio"]) * (1 + 1 / ratio) / 2
+        return [h * half for h in zone_orders(term.shape)]
+
     def remark(self, shape: Shape, both_ways: bool) -> str | None:
         return f"{self.id} never repeats: it is met in the relative turn that its phases describe, others differ"
 

@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects.base import Effect, Keys, terms_at
@@ -48,6 +50,7 @@ class CircularSplineLobing(Effect):
     needs_base = True
     acts = "zones"
     radial = True
+    has_parts = True
     special_case_of = "cs_tooth_harmonics"
     separating = (
         "loosen the clamping bolts and tighten them again evenly, or turn the circular spline: lobes made by "
@@ -79,10 +82,16 @@ class CircularSplineLobing(Effect):
 
     def search(self, probe: Probe) -> Sequence[Term]:
         limit = 0.4 * probe.samples.rows_per_turn
-        shapes = [
-            {"lobes": n, "waves": waves} for n in LOBES for waves in (ALONE, WITH_OVERTONE) if n * waves[-1] < limit
-        ]
-        return best_terms(probe, terms_at(self, probe.samples, shapes), 2)
+        found: list[Term] = []
+        for waves, keep in ((ALONE, 2), (WITH_OVERTONE, 1)):
+            shapes = [{"lobes": n, "waves": waves} for n in LOBES if n * waves[-1] < limit]
+            found += best_terms(probe, terms_at(self, probe.samples, shapes), keep)
+        return found
+
+    def every_part_shows(self, term: Term, estimate: FitEstimate) -> bool:
+        """An overtone is at most as large as its wave: of n lobes a larger one is 2 n lobes."""
+        size = np.hypot(estimate.values[0 : term.width : 2], estimate.values[1 : term.width : 2])
+        return bool(size[0] >= size.max())
 
     def term(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
         n, waves = int(shape["lobes"]), shape.get("waves", ALONE)

@@ -114,10 +114,12 @@ class CircularSplineToothHarmonics(Effect):
         return len(members) > 1
 
     def every_part_shows(self, term: Term, estimate: FitEstimate) -> bool:
-        """A few harmonics that stand out are all there; of a short run without a gap some may be missing, and of a long
-        one, as of segments, the high ones are small.
+        """A few harmonics that stand out are all there, and more than one where one alone is another's; of a short run
+        without a gap some may be missing, and of a long one, as of segments, the high ones are small.
         """
         members = members_of(term.shape)
+        if not self.stands_alone(members):
+            return False
         size = np.hypot(estimate.values[0 : term.width : 2], estimate.values[1 : term.width : 2])
         shown = size > LEAST_OF_FEW * size.max()
         if not has_no_gap(members):

@@ -176,6 +176,10 @@ class TorsionalWindup(Effect):
     def orders(self, shape: Shape, ratio: float) -> list[float]:
         return [2.0] if _varies(shape) else []
 
+    def orders_of_columns(self, term: Term, ratio: float) -> list[float]:
+        """None: they follow the torque."""
+        return []
+
     def named_orders(self, shape: Shape, ratio: float) -> list[float]:
         return []
 

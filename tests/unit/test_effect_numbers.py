@@ -393,9 +393,30 @@ def test_the_overtone_of_lobes_is_found_where_it_is(overtone, waves):
         turns=20,
         rate=60,
     )
-    state = begin(records, CartesianModel.of(load_study(drive="csf-25-80").drive), 1, DEFAULT)
-    best = EFFECTS["circular_spline_lobing"].search(FitProbe(state.base))[0]
+    start = begin(records, CartesianModel.of(load_study(drive="csf-25-80").drive), 1, DEFAULT).base
+    scale, offered = penalty_scale(start.problem), EFFECTS["circular_spline_lobing"].search(FitProbe(start))
+    best = in_order(weigh(joint_fit(start, [term]), start, scale) for term in offered)[0].fit.terms[0]
     assert (best.shape["lobes"], best.shape["waves"]) == (8, waves)
+
+
+def test_an_overtone_does_not_take_the_place_of_its_wave():
+    """Eight lobes were said to be four, whose overtone they are: it took up a part of 2,000 of them at four, and no
+    eight alone were offered beside."""
+    effect, c = EFFECTS["circular_spline_lobing"], moving()
+    found = []
+    for size in (0.9, 1.0, 1.1):
+        term = effect.term(c, {"lobes": 4, "waves": (1, 2)})
+        found.append(effect.every_part_shows(term, FitEstimate(np.array([0.6, 0.8, 0, size]), np.eye(4))))
+    assert found == [True, True, False]
+    assert effect.every_part_shows(effect.term(c, {"lobes": 4}), FitEstimate(np.array([0.6, 0.8]), np.eye(2)))
+    gains = {(4, (1, 2)): 9e4, (8, (1, 2)): 8.9e4, (6, (1, 2)): 8.8e4, (8, (1,)): 8.5e4}
+    probe = SimpleNamespace(
+        samples=c,
+        residual=np.zeros(1000),
+        gains=lambda terms: [gains.get((t.shape["lobes"], t.shape["waves"]), 0.0) for t in terms],
+    )
+    offered = [(term.shape["lobes"], term.shape["waves"]) for term in effect.search(probe)]
+    assert offered[0] == (8, (1,)) and offered[2:] == [(4, (1, 2))]
 
 
 def test_warming_may_take_ten_records():

@@ -126,8 +126,11 @@ def confounded_with(
             apart = (1 - imitates) * power / 2 / inflation + _paid_for_bending(candidate, fit)
             compared.append((apart, imitates, smallest_angle_deg(own, basis), candidate))
         if compared:
-            apart, imitates, angle, imitator = min(compared, key=lambda one: (one[0], -one[1]))
-            odds = min(_odds_of(imitator, seen) - term.odds, 0.0)
+            # Of variants that imitate all of it rounding would choose: the likeliest to begin with is asked.
+            least = min(one[0] for one in compared) + fit.problem.settings.verdict.imitators_alike
+            equal = [one for one in compared if one[0] <= least]
+            weighed = [(min(_odds_of(one[-1], seen) - term.odds, 0.0), *one[:-1]) for one in equal]
+            odds, apart, imitates, angle = max(weighed, key=lambda one: (one[0], one[2]))
             separating = EFFECTS[term.effect].separating
             found.append(Confounding(term.effect, name, angle, imitates, apart, separating, odds))
     return sorted(found, key=lambda pair: -pair.imitates)

@@ -14,6 +14,7 @@ from hdopt.diagnosis.inference.catalogue import is_effect
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.other_forms import estimates_over_forms
 from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.inference.row_means import as_sampled
 from hdopt.diagnosis.inference.settled_shapes import estimates_by_profile
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.orientation import as_counted
@@ -104,10 +105,9 @@ def evidence_apart(evidence: Evidence) -> dict[str, float]:
 
 def describe(candidate: Candidate, evidence: Evidence, high: bool = False) -> list[NamedEffect]:
     """The effects of a `candidate`, as they stand in the `evidence`; `high` for one found on the rows as recorded."""
-    fit = candidate.fit
+    fit, rows = candidate.fit, candidate.fit.problem.rows
     # A root of a jagged profile is the edge of a jag: with the input locked, places are compared instead.
-    locked = fit.problem.rows.locked
-    estimates = estimates_by_profile(fit, evidence.inflation) if locked else estimates_over_forms(fit)
+    estimates = estimates_by_profile(fit, evidence.inflation) if rows.locked else estimates_over_forms(fit)
     confidence = {} if high else confidences(evidence)
     apart = {} if high else evidence_apart(evidence)
     base_power = evidence.base_held_out.variance
@@ -118,7 +118,9 @@ def describe(candidate: Candidate, evidence: Evidence, high: bool = False) -> li
         effect = EFFECTS[term.effect]
         contribution = fit.contribution(index)
         rms = float(np.std(contribution))
-        parameters = effect.as_seen(effect.parameters(term, estimate), term, fit.problem.rows, contribution)
+        least = evidence.settings.verdict.least_left_by_means
+        sampled = as_sampled(estimate, rows, effect.orders_of_columns(term, rows.ratio), least)
+        parameters = effect.as_seen(effect.parameters(term, sampled), term, rows, contribution)
         if evidence.orientation.turned:
             parameters = as_counted(parameters, term)
         found.append(
