@@ -325,6 +325,11 @@ class Effect(Explanation):
         term adds there, `contribution` (n,) arcmin. The same for most."""
         return parameters
 
+    def may_be_part_of(self, parameters: Mapping[str, Parameter]) -> tuple[str, ...]:
+        """Ids of effects that, beside it, would explain as much where it has such `parameters`: any of them may be what
+        a part of it was taken for. None for most."""
+        return ()
+
     def categories(self, shape: Shape) -> dict[str, str]:
         """The categories of a fitted shape by their declared names, such as the shaft of an encoder."""
         return {d.key: str(shape[d.key]) for d in self.declared if isinstance(d, Category) and d.key in shape}

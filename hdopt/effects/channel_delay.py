@@ -32,7 +32,8 @@ class ChannelDelay(Effect):
     place = 160
     domain = "speed"
     separating = (
-        "repeat at two more speeds in both directions: a delay's offset grows with speed, play and friction stay"
+        "repeat at two more speeds in both directions: a delay's offset grows with speed, play and friction "
+        "stay; drag on the output goes when the load is taken off"
     )
     bench_part = "the acquisition of both channels"
     needs: ClassVar[Mapping[str, str]] = {"speed": "speed_rpm"}

@@ -59,3 +59,8 @@ class EncoderOutputEccentricity(ShaftSine):
         return (
             f"The output encoder is off-centre: {parameters['amplitude_arcmin'].value:.2g} arcmin once an output turn."
         )
+
+    def may_be_part_of(self, parameters: Mapping[str, Parameter]) -> tuple[str, ...]:
+        """A coupling, where a wheel would be more oval than it is off-centre."""
+        oval = parameters.get("amplitude_output_2_arcmin")
+        return ("output_coupling",) if oval is not None and oval.low > parameters["amplitude_arcmin"].high else ()

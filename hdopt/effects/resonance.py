@@ -40,6 +40,8 @@ MOST_DAMPING = 0.3
 """Of critical: above it nothing swings."""
 MOST_GAIN = 1.3
 """The whole inertia, and what a gain is off by."""
+SURE = 2.0
+"""Intervals by which a part of the damping must be neither none nor all of it."""
 EACH = np.eye(2)
 """The two columns, alone."""
 LEAST_SPEED_RANGE = 1.15
@@ -140,6 +142,12 @@ class Resonance(Effect):
         """
         drag = estimate.parameter(1, "1")
         return drag.low <= MOST_GAIN and drag.high >= 0 and self.every_part_shows(term, estimate)
+
+    def may_be_part_of(self, parameters: Mapping[str, Parameter]) -> tuple[str, ...]:
+        """A delay, where the damping would act on the output in part: what drags it lags by 2 zeta b/w as well."""
+        share = parameters["output_share_of_damping"]
+        low, high = (share.value + SURE * (end - share.value) for end in (share.low, share.high))
+        return ("channel_delay",) if low > 0 and high < 1 else ()
 
     def beyond_search(self, probe: Probe) -> Sequence[Term]:
         """Stiff ones, that swing too fast to be seen and only drag, as a delay does."""

@@ -66,7 +66,8 @@ def gather(recordings: Sequence[Recording], neighbours: int = 1) -> Rows:
         columns[name] = np.concatenate([part[name] for part in parts]) if complete else None
     record = np.repeat(np.arange(len(parts)), [len(part["theta"]) for part in parts])
     piece = _renumber(record, columns["piece"])
-    block = _turn_blocks(record, columns.pop("pass_index"), columns["theta"], columns["piece"])
+    passes = _renumber(record, columns.pop("pass_index"), columns["piece"])
+    block = _turn_blocks(passes, columns["direction"], columns["theta"])
     columns["piece"] = piece
     locked = all(recording.input_locked for recording in recordings)
     return Rows(
@@ -190,10 +191,15 @@ def _renumber(*keys: Index) -> Index:
     return np.cumsum(change)
 
 
-def _turn_blocks(record: Index, pass_index: Index, theta: Array, segment: Index) -> Index:
-    """Whole input turns; a rest shorter than a third of a turn joins the block before it (or after it, at a start)."""
-    turn = np.floor(theta / TURN).astype(np.int64)
-    block = _renumber(record, pass_index, turn, segment)
+def _turn_blocks(passes: Index, direction: Array, theta: Array) -> Index:
+    """Whole input turns; a rest shorter than a third of a turn joins the block before it (or after it, at a start).
+
+    A turn begins once: where the input stands at an end of one, noise goes to and fro over it in every other row.
+    """
+    turn = np.empty(len(theta), np.int64)
+    for one in np.split(np.arange(len(theta)), np.flatnonzero(np.diff(passes)) + 1):
+        turn[one] = np.floor(np.maximum.accumulate(direction[one] * theta[one]) / TURN)
+    block = _renumber(passes, turn)
     size = np.bincount(block)
     usual = np.median(size)
     small = size < usual / 3

@@ -280,6 +280,24 @@ def test_the_rest_of_a_turn_belongs_to_the_turn_before():
         assert rows.block[0] == 0 and (np.diff(rows.block) >= 0).all()
 
 
+@pytest.mark.parametrize("end", ["start", "turning point"])
+def test_a_turn_begins_once_though_noise_goes_over_it(end):
+    """The input stands at a multiple of a turn, as recordings begin: the encoder's noise goes to and fro over it. Each
+    row was a turn of its own, single rows were hidden as whole turns, and what fades after a start was fitted to none
+    of it: friction beside a windup was `unknown`."""
+    rate, standing = 100, 300
+    ramp = np.arange(1, 10 * rate + 1) * TURN / rate
+    still = np.random.default_rng(3).normal(0, 1e-5, standing)
+    if end == "start":
+        theta, ends = np.r_[still, ramp], 10
+    else:
+        theta, ends = np.r_[ramp + 1.0 - 10 * TURN, 1.0 + still, ramp[::-1] + 1.0 - 10 * TURN] - 1.0, 20
+    rows = gather([recording(np.zeros(len(theta)), theta)])
+    sizes = np.bincount(rows.block)
+    assert abs(len(sizes) - ends) <= 1
+    assert np.sort(sizes)[:-2].min() >= rate - 2 and sizes.max() <= rate + standing + 1
+
+
 def test_the_coarsest_encoder_is_that_of_all_recordings():
     steps = [recording(np.zeros(1440), there_and_back(2), quantum_arcmin=q, output_step_arcmin=q) for q in (0.3, 0.1)]
     assert (gather(steps).quantum, gather(steps[::-1]).quantum) == (0.3, 0.3)

@@ -581,3 +581,20 @@ def test_facts_are_drawn_from_what_measures_them(monkeypatch):
         monkeypatch.setattr(facts_module, "gained_without_physics", lambda best, share=by_gain: share)
         drawn = find(found).facts
         assert (drawn.outside_share, drawn.contact, drawn.described_better) == (0.3, pytest.approx(0.6), 7.0)
+
+
+def test_what_a_part_may_be_is_another_explanation(monkeypatch):
+    """Beside those that are candidates, placebos and imitators. Would catch one of the four that is not listed."""
+    no = dict.fromkeys(("turns_suffice", "momentary", "clearly_unexplained", "too_little", "scale_is_as_good"), False)
+    no |= dict.fromkeys(("is_a_walk", "above_resolution", "beaten_by_generic", "found_again"), False)
+    no |= dict.fromkeys(("own_gain", "power_together", "unseen_gain", "unseen_rms", "left_over_passes"), 0.0)
+    no |= {"unsteady": None, "far_errors": "", "left_over_floor": 0.0, "beside_told": (None, 0.0), "hum_as_good": None}
+    no |= {"as_right_as_such_names": (), "effects_said": (), "shared_with_imitators": (), "confounded_pairs": ()}
+    no |= {"varying_contact": [], "ahead_without_physics": 0.0, "outside_share": 0.0, "gained_without_physics": 0.0}
+    lists = ("rivals", "placebo_as_good", "imitating_sets", "sets_with_a_part")
+    found = evidence(candidate({"hysteresis": 1.0}), noise_floor=1.0, remainder=SimpleNamespace(t=0.0))
+    for name, value in {**no, **{one: ((one,),) for one in lists}}.items():
+        monkeypatch.setattr(facts_module, name, lambda *about, value=value, **more: value)
+    monkeypatch.setattr(facts_module.Facts, "named", property(lambda facts: True))
+    found.settings = replace(found.settings, verdict=replace(found.settings.verdict, most_rivals=9))
+    assert set(find(found).facts.rivals) == {(one,) for one in lists}

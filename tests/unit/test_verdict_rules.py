@@ -23,7 +23,7 @@ from hdopt.diagnosis.verdict.draw import (
 )
 from hdopt.diagnosis.verdict.facts import Facts, resolution
 from hdopt.diagnosis.verdict.named_effect import NamedEffect
-from hdopt.diagnosis.verdict.rivals import imitating_sets, placebo_as_good, shared_with_imitators
+from hdopt.diagnosis.verdict.rivals import imitating_sets, placebo_as_good, sets_with_a_part, shared_with_imitators
 from hdopt.diagnosis.verdict.rules import RULES, rule_for
 from hdopt.effects.estimate import Parameter
 from hdopt.recordings.read import recording_from_table
@@ -164,6 +164,41 @@ def test_a_tie_is_no_certainty(changes, weighed, confidence):
     said = [effect("lost_motion"), effect("thermal_drift")]
     shared = shared_with_imitators(said, [pair(**changes)], weighed, DEFAULT.verdict)
     assert [one.confidence for one in shared] == pytest.approx([confidence, 0.97])
+
+
+def sized(value, half):
+    return Parameter(value, value - half, value + half, "1")
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "others"),
+    [
+        ("encoder_output_eccentricity", {"amplitude_arcmin": sized(0.2, 0.01)}, ()),
+        (
+            "encoder_output_eccentricity",
+            {"amplitude_arcmin": sized(0.2, 0.01), "amplitude_output_2_arcmin": sized(0.215, 0.01)},
+            (),
+        ),
+        (
+            "encoder_output_eccentricity",
+            {"amplitude_arcmin": sized(0.2, 0.01), "amplitude_output_2_arcmin": sized(0.225, 0.01)},
+            (("encoder_output_eccentricity", "output_coupling"),),
+        ),
+        ("resonance", {"output_share_of_damping": sized(0.5, 0.24)}, (("resonance", "channel_delay"),)),
+        ("resonance", {"output_share_of_damping": sized(0.5, 0.26)}, ()),
+        ("resonance", {"output_share_of_damping": sized(0.1, 0.06)}, ()),
+        ("resonance", {"output_share_of_damping": sized(0.9, 0.06)}, ()),
+        ("resonance", {"output_share_of_damping": sized(0.1, 0.04)}, (("resonance", "channel_delay"),)),
+        ("lost_motion", {}, ()),
+    ],
+)
+def test_a_part_of_one_effect_may_be_another(name, parameters, others):
+    """A wheel more oval than it is off-centre may be an eccentric one beside a bent coupling, and a damping that acts
+    in part on the output a delay: both were named as one effect at 0.97."""
+    said = [replace(effect(name), parameters=parameters)]
+    assert sets_with_a_part(said) == others
+    beside = [*said, effect("channel_delay"), effect("output_coupling")]
+    assert sets_with_a_part(beside) == ()
 
 
 def held(turns, variance):

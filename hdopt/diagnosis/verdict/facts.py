@@ -42,6 +42,7 @@ from hdopt.diagnosis.verdict.rivals import (
     placebo_as_good,
     rivals,
     scale_is_as_good,
+    sets_with_a_part,
     shared_with_imitators,
 )
 
@@ -227,7 +228,7 @@ def find(evidence: Evidence) -> Findings:
     if facts.named:
         as_good = (*as_good, *placebo_as_good(evidence, pairs))
     if facts.said:
-        as_good = (*as_good, *imitating_sets(pairs, [one.id for one in effects], settings))
+        as_good = (*as_good, *imitating_sets(pairs, [one.id for one in effects], settings), *sets_with_a_part(effects))
     as_good = tuple(dict.fromkeys(as_good))[: settings.most_rivals]
     again = found_again(evidence, effects)
     return Findings(evidence, replace(facts, rivals=as_good, found_again=again), high, pairs, effects, more, hum)

@@ -135,6 +135,14 @@ def imitating_sets(pairs: Sequence[Confounding], ids: Sequence[str], settings: V
     return tuple(with_imitator(pair, ids) for pair in pairs if is_tie(pair, settings) and pair.other not in ids)
 
 
+def sets_with_a_part(effects: Sequence[NamedEffect]) -> Sets:
+    """The sets that explain as well because a part of one of the `effects` said may be another, that is not among them,
+    by its numbers."""
+    ids = tuple(one.id for one in effects)
+    others = (other for one in effects for other in EFFECTS[one.id].may_be_part_of(one.parameters))
+    return tuple((*ids, other) for other in others if other not in ids)
+
+
 def is_tie(pair: Confounding, settings: VerdictSettings) -> bool:
     """Whether the recording tells nothing apart in a confounded `pair`, by the `settings`."""
     return pair.imitates >= settings.imitated and pair.evidence_apart < settings.tie
