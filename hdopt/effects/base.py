@@ -168,8 +168,6 @@ class Effect(Explanation):
     """Numbers of an operating condition that it needs, with their study keys."""
     needs_said: ClassVar[str] = ""
     """The same for the docs, where it depends on the shape."""
-    lasting: ClassVar[int | None] = None
-    """How many of its columns last, where others fade after the start of a recording; None for all."""
     shifts_one_way: ClassVar[bool] = False
     """Whether it only shifts a motion in one direction."""
 
@@ -202,6 +200,10 @@ class Effect(Explanation):
     def predict(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
         """The same physics where it is simulated: without the limits of a record, and settled where it has a memory."""
         return self.term(conditions, shape, motion)
+
+    def lasting(self, shape: Shape) -> int | None:
+        """How many of its columns last, where others fade after the start of a recording; None for all."""
+        return None
 
     def orders(self, shape: Shape, ratio: float) -> list[float]:
         """Orders (cycles an input turn) that it adds to the spectrum, where it is made of sines."""

@@ -39,7 +39,6 @@ class Hysteresis(Effect):
     id = "hysteresis"
     place = 50
     domain = "reversal"
-    lasting = 1
     has_parts = True
     shifts_one_way = True
     separating = (
@@ -106,6 +105,9 @@ class Hysteresis(Effect):
             steps={"transition_deg": 0.02 * transition},
             trials=14.0 * len(LAWS),
         )
+
+    def lasting(self, shape: Shape) -> int | None:
+        return 1
 
     def every_part_shows(self, term: Term, estimate: FitEstimate) -> bool:
         """Whether it crosses over within the longest length: what is drawn to that end relaxes, in time or far

@@ -4,8 +4,8 @@ Jia 2021, Eqs. (33)-(35): the output lags by the play of the gear flanks, 2 pi (
 cross-slide's two slots, the sum of e_b/(N r_i), whose lever arms vary over the input turn. While the play is crossed
 the output stands still, so the error changes by the full step over as much input travel as makes the same output
 angle. With the input locked the play is crossed where the torque that the flanks feel changes its sign: at the recorded
-torque's zero, or beyond it by the friction that holds the output. Units: lost_motion arcmin, full step between the two
-directions. Prior: 0 to 10 arcmin.
+torque's zero, or beyond it by the friction that holds the output. A recording may begin within the play, and crosses
+what is left of it first. Units: lost_motion arcmin, full step between the two directions. Prior: 0 to 10 arcmin.
 """
 
 from __future__ import annotations
@@ -29,6 +29,10 @@ ORDERS = (1, 2, 4)
 """Waves a turn by which the play may vary: the lever arms of a cross-slide's slots, and the driving zone."""
 FRICTION_SHARES = (0.0, 0.05, 0.1, 0.15, 0.25, 0.4)
 """Friction torques that a search tries with a locked input, as shares of the torque reached."""
+START = "start"
+"""Of a shape: recordings begin within the play, each with a part of its own to cross."""
+MOST_LEFT = 1.2
+"""Largest part of the play that may be left to cross, and as far below nothing, as a first step of a fit has it."""
 LEAST_CROSSING, MOST_CROSSING = 0.05, 60.0
 """Shortest and longest crossing of a search, arcmin of output."""
 
@@ -72,9 +76,23 @@ class LostMotion(Effect):
         # The crossing is as long as the play itself, which a first estimate gives.
         _, size = probe.solve(self.term(samples, {"ramp_arcmin": 0.5}))
         ramp = min(max(abs(float(size[0])), LEAST_CROSSING), MOST_CROSSING)
-        plain = self.term(samples, {"ramp_arcmin": ramp})
+        plain = [self.term(samples, {"ramp_arcmin": ramp})]
         varying = [self.term(samples, {"ramp_arcmin": ramp, "order": k}) for k in ORDERS]
-        return [plain, *best_terms(probe, varying)]
+        variants = ([*terms, *self._begun(probe, terms)] for terms in (plain, varying))
+        return [best for terms in variants for best in best_terms(probe, terms)]
+
+    def _begun(self, probe: Probe, terms: Sequence[Term]) -> list[Term]:
+        """The `terms` with recordings that begin within the play: those in which by `probe` each has between nothing
+        and all of it to cross first; none where no row shows that."""
+        found: list[Term] = []
+        if not _left_to_cross(probe.samples, terms[0].shape["ramp_arcmin"]).any():
+            return found
+        for term in (self.term(probe.samples, {**one.shape, START: True}) for one in terms):
+            solved = probe.solve(term)[1]
+            left = -solved[self.lasting(term.shape) :] / solved[0]
+            if np.all((1 - MOST_LEFT <= left) & (left <= MOST_LEFT)):
+                found.append(term)
+        return found
 
     def term(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
         if conditions.locked:
@@ -87,7 +105,17 @@ class LostMotion(Effect):
         if "order" in shape:
             angle = shape["order"] * conditions.theta
             parts += [step * np.sin(angle), step * np.cos(angle)]
+        if START in shape:
+            left = conditions.direction * _left_to_cross(conditions, shape["ramp_arcmin"])
+            parts += [left * (conditions.record == record) for record in range(conditions.records)]
         return Term(self.id, dict(shape), columns=np.column_stack(parts), trials=3.0 if "order" in shape else 1.0)
+
+    def lasting(self, shape: Shape) -> int:
+        return 3 if "order" in shape else 1
+
+    def predict(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:
+        """The term of a drive that has reversed before."""
+        return self.term(conditions, {name: value for name, value in shape.items() if name != START})
 
     def other_laws(self, conditions: Conditions, term: Term, motion: Array) -> Mapping[str, Sequence[Array]]:
         return laws_of_offset(conditions, term, motion)
@@ -128,3 +156,10 @@ class LostMotion(Effect):
     def sentence(self, shape: Shape, parameters: Mapping[str, Parameter], rms_arcmin: float) -> str:
         varies = " and varies over the input turn" if "variation_arcmin" in parameters else ""
         return f"Play: at each reversal the output lags by {parameters['lost_motion_arcmin'].value:.2g} arcmin{varies}."
+
+
+def _left_to_cross(conditions: Conditions, ramp: float) -> Array:
+    """Part of the play, crossed over `ramp` arcmin of output, that is left in each row of the `conditions`, (n,),
+    before the first reversal of a recording that begins at its far side; 0 in all others."""
+    left = 1 - conditions.travel * 60 / max(ramp, 1e-3)
+    return np.asarray(np.where(conditions.first, np.maximum(left, 0.0), 0.0))

@@ -25,7 +25,7 @@ class EffectValues:
         """The effect of a fitted `term` at its `coefficients` (p,), without the columns that only describe how a
         recording began.
         """
-        kept = coefficients[: EFFECTS[term.effect].lasting]
+        kept = coefficients[: EFFECTS[term.effect].lasting(term.shape)]
         return cls(term.effect, dict(term.shape), tuple(map(float, kept)))
 
     @property

@@ -43,6 +43,51 @@ def test_play_varies_with_the_input():
     np.testing.assert_allclose(columns[:, 2], plain * np.cos(2 * c.theta), atol=1e-12)
 
 
+def follower(path, size, left):
+    """The error that a play of `size` makes along `path`, both arcmin: the output stands until the play is crossed, of
+    which a part (`left`) is left at the start of a way forward."""
+    output, error = path[0] - size / 2 + left * size, np.empty(len(path))
+    for i, place in enumerate(path):
+        output = min(max(output, place - size / 2), place + size / 2)
+        error[i] = place - output
+    return error
+
+
+def test_a_recording_may_begin_within_the_play():
+    """Two recordings that stand, and then run forward and back, a third and all of the play left to cross first, and
+    one that has crossed it: as a follower goes. What is found is the play, and what was left. Would catch a start of
+    all recordings alike, and one that lasts."""
+    size, ramp = 0.3, 0.3
+    parts = [np.r_[np.zeros(200), np.linspace(0, 40, 400), np.linspace(40, 0, 400)] for _ in range(3)]
+    error = np.concatenate([follower(path, size, left) for path, left in zip(parts, (1 / 3, 1.0, 0.0), strict=True)])
+    path, n = np.concatenate(parts), len(parts[0])
+    back = np.tile(np.arange(n) >= 600, 3)
+    travel = np.where(back, 40 - path, path) / 60
+    c = replace(moving((1,)), theta=path, output=path, direction=np.where(back, -1.0, 1.0), travel=travel, first=~back)
+    c = replace(c, record=np.repeat(np.arange(3), n), piece=np.repeat(np.arange(3), n))
+    effect = EFFECTS["lost_motion"]
+    shape = {"ramp_arcmin": ramp, "start": True}
+    columns = effect.term(c, shape).columns
+    found = np.linalg.lstsq(columns, error, rcond=None)[0]
+    assert found == pytest.approx([0.3, -0.1, -0.3, 0.0], abs=0.002)
+    assert effect.lasting(shape) == 1 and effect.lasting({**shape, "order": 2}) == 3
+    assert effect.predict(c, shape).columns.shape == (len(c), 1)
+
+    probe = SimpleNamespace(samples=c, residual=error)
+
+    def solve(term):
+        coefficients = np.linalg.lstsq(term.columns, probe.residual, rcond=None)[0]
+        left = probe.residual - term.columns @ coefficients
+        return float(probe.residual @ probe.residual - left @ left) / 1e-4, coefficients
+
+    probe.solve, probe.gains = solve, lambda terms: [solve(term)[0] for term in terms]
+    assert ["start" in term.shape for term in effect.search(probe)] == [True, True]
+    # What stands beyond either side of the play is no start within it.
+    for more in (-0.4, 0.2):
+        probe.residual = error + more * (np.arange(len(c)) < 200)
+        assert ["start" in term.shape for term in effect.search(probe)] == [False, False]
+
+
 def test_play_and_half_a_loop_are_sizes():
     """Whichever way the error counts: a step of -0.4 arcmin is play of 0.4, as sure as it is."""
     rows = moving()
