@@ -14,6 +14,8 @@ ENDS = 0.05
 """Share of the rows at either end of the speeds, and the least part of the largest speed, which a reversal passes."""
 POWERS = (-0.5, 0.5)
 """By a root of the speed, and by one over it."""
+GROWING = (1.0, 2.0)
+"""With the speed, and with its square."""
 FADING = (0.25, 0.5)
 """Parts of the largest speed within which boundary friction fades into that of a film (Stribeck)."""
 
@@ -24,6 +26,17 @@ def columns_by_speed(conditions: Conditions, term: Term) -> list[Array]:
     """
     columns = term.columns
     return [] if columns is None else [columns * weight[:, None] for weight in weights_by_speed(conditions)]
+
+
+def waves_by_speed(conditions: Conditions, columns: Array) -> list[Array]:
+    """The `columns` (n, p), waves of parts that turn, which are as large at every speed, where they would fade or grow
+    with it, (n, p) each: ripple of a motor or of its drive. None where the `conditions` know no speed that varies.
+    """
+    weights = weights_by_speed(conditions)
+    if weights:
+        part = np.abs(conditions.known_speed) / np.max(np.abs(conditions.known_speed))
+        weights += [part**power for power in GROWING]
+    return [columns * weight[:, None] for weight in weights]
 
 
 def weights_by_speed(conditions: Conditions) -> list[Array]:

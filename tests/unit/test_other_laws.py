@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hdopt.diagnosis.checks.other_laws import OtherLaw, other_law
+from hdopt.diagnosis.checks.other_laws import OtherLaw, laws_of, other_law
 from hdopt.diagnosis.inference.fit import evaluate
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.residual_gains import FitProbe
@@ -24,6 +24,7 @@ from hdopt.effects._friction_law import Law
 from hdopt.effects._speed_laws import weights_by_speed
 from hdopt.effects._time_laws import columns_growing, part_gone_by, weights_by_time
 from hdopt.effects.declared import Shaft
+from hdopt.effects.resonance import Foot
 from hdopt.effects.term import Term
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.kinematics.waveform import kinematic_error_arcmin
@@ -103,6 +104,51 @@ def test_play_and_friction_are_alike_at_all_speeds(effect, shape):
         assert other_law(shifted(effect, shape, law), 1.0).log_evidence > 2 * DEFAULT.verdict.other_law
     assert other_law(shifted(effect, shape, np.ones_like), 1.0).log_evidence < 1.0
     assert other_law(shifted(effect, shape, np.sqrt, speeds=(1.0, 1.1)), 1.0) == OtherLaw()
+
+
+WAVES = (
+    ("encoder_interpolation", {"lines": 24, "shaft": Shaft.INPUT, "cycles": (1,)}),
+    ("circular_spline_lobing", {"lobes": 12}),
+    ("cs_tooth_harmonics", {"members": (11, 12)}),
+)
+
+
+def rippled(effect, shape, law, beside=(), speeds=(0.5, 1.0)):
+    """The fit of `effect` at `shape`, and of those `beside`, to records with waves of its orders, which both zones meet
+    alike, of 0.1 arcmin by a `law` of the speed."""
+    study = load_study(drive="csf-25-80")
+    orders = EFFECTS[effect].orders(shape, 80.0)
+    records = bench(
+        study,
+        lambda motion: 0.1 * law(np.abs(motion["speed"])) * sum(np.sin(k * motion["theta"]) for k in orders),
+        turns=20,
+        rate=120,
+        speeds=speeds,
+    )
+    start = begin(records, CartesianModel.of(study.drive), 1, DEFAULT).base
+    rows = start.problem.rows
+    return joint_fit(start, [EFFECTS[name].term(rows, at, start.motion) for name, at in ((effect, shape), *beside)])
+
+
+@pytest.mark.parametrize(("effect", "shape"), WAVES)
+def test_waves_of_what_turns_are_as_large_at_every_speed(effect, shape):
+    """A motor's ripple that fades to a half or grows to twice with the speed is another law; what is alike at both
+    speeds is not, and of one speed none is asked. Faults caught: waves in the zones not asked; cogging named 39 waves
+    of the teeth."""
+    for law in (lambda v: 0.5 / v, lambda v: v, lambda v: v**2):
+        found = other_law(rippled(effect, shape, law), 1.0)
+        assert found.log_evidence > 2 * DEFAULT.verdict.other_law
+        assert (found.index, found.of) == (0, "speed")
+    assert other_law(rippled(effect, shape, np.ones_like), 1.0) == OtherLaw()
+    assert other_law(rippled(effect, shape, np.ones_like, speeds=(1.0, 1.1)), 1.0) == OtherLaw()
+
+
+def test_waves_behind_a_resonance_follow_the_speed():
+    """Which swings them up: no law of the speed is asked of them then."""
+    swinging = ("resonance", {"frequency_hz": 3.0, "damping_ratio": 0.05, "foot": Foot.ERROR})
+    alone, beside = (rippled(*WAVES[1], lambda v: v, more) for more in ((), (swinging,)))
+    assert len(laws_of(alone, alone.terms[0])["speed"]) == 6
+    assert "speed" not in laws_of(beside, beside.terms[0])
 
 
 def there_and_back(effect, shape, hidden, passes=4):
