@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from hdopt.diagnosis.checks.assessment import Evidence, assess
 from hdopt.diagnosis.inference.encoder_steps import without_output_steps
+from hdopt.diagnosis.inference.input_steps import without_input_steps
 from hdopt.diagnosis.nested import Part, diagnosis_of_a_part
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
 from hdopt.diagnosis.stages import STAGES, STAGES_OF_A_PART, begin, smooth_model
@@ -24,7 +25,7 @@ def gather_evidence(
 ) -> Evidence:
     """Run all stages on `recordings` with the `base` model (None for a gear without one); random drives are drawn
     with `seed`, and `nuisance` names what is free beside the model (`inference.nuisance`). `settings` are the
-    thresholds. Steps of a coarse output encoder are taken out first. All else is done once more on a part of the turns,
+    thresholds. Steps of coarse encoders are taken out first. All else is done once more on a part of the turns,
     and looked at on the others; what was found there is tried on all of them, and what was found on all of them there.
     """
 
@@ -39,7 +40,9 @@ def gather_evidence(
         return state
 
     recordings = without_output_steps(
-        recordings, lambda some: smooth_model(some, base, seed, settings, nuisance), settings.encoder_steps
+        without_input_steps(recordings, settings.encoder_steps),
+        lambda some: smooth_model(some, base, seed, settings, nuisance),
+        settings.encoder_steps,
     )
     # First, so that what it worked with is gone before the diagnosis itself is in memory.
     part = diagnosis_of_a_part(recordings, lambda some: run(some, STAGES_OF_A_PART), seed, settings)

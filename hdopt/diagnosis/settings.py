@@ -510,7 +510,7 @@ class StepSettings:
 
 @dataclass(frozen=True)
 class EncoderStepSettings:
-    """Steps of a coarse output encoder."""
+    """Steps of a coarse encoder of the output, and of one of the input."""
 
     share_of_scatter: float = threshold(
         0.75, "1", "choice: share of what a smooth model leaves that the steps must be, q/sqrt(12), to be taken out"
@@ -518,6 +518,19 @@ class EncoderStepSettings:
     rounds: int = threshold(8, "1", "choice: effort; the model is fitted anew to what was freed of steps")
     worth_a_round: float = threshold(0.97, "1", "choice: scatter over the last round's up to which it goes on")
     told: float = threshold(1.5, "steps", "choice: height up to which a jump may be the encoder's")
+    smooth_over: tuple[int, ...] = threshold(
+        (25, 51, 101), "samples", "choice: over which a motion may be smooth; what folds to slower orders stays"
+    )
+    smooth_degree: int = threshold(3, "1", "choice: a speed that bends, as in a ramp")
+    farthest_off: float = threshold(
+        0.75, "steps", "choice: half a step, and half of that for the sensor's noise and the smoothing"
+    )
+    off_by: float = threshold(
+        0.1,
+        "1",
+        "choice: of the 1 by which the error holds what an input encoder's steps add: 0.98 to 1.00 in five recordings",
+    )
+    known_to: float = threshold(0.03, "1", "choice: standard deviation of the same: 1 and 0.9 lie three of it apart")
 
 
 @dataclass(frozen=True)

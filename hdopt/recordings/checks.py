@@ -96,6 +96,7 @@ def checked_recording(channels: Mapping[str, Array], ratio: float, name: str) ->
         segment=segment,
         quantum_arcmin=quantum,
         output_step_arcmin=steps["output"],
+        input_step_arcmin=steps["input"],
         warnings=tuple(checks.warnings),
         understood=tuple(checks.said),
         output_reversed=reversed_output,

@@ -27,15 +27,20 @@ def encoder_step(angle: Array, time: Array | None = None) -> float:
     """Step of the even grid on which the values of `angle` (n,) lie, in their unit; 0 where there is none.
 
     Levels may be left out, as where the output moves by several steps from sample to sample. The step is the smallest
-    distance between levels, or a whole part of it, made precise over ever more of them. `time` (n,) s, where it is
+    distance between levels, or a whole part of it, or what two distances differ by, made precise over ever more of
+    them. `time` (n,) s, where it is
     known, tells where rows were lost: samples taken at even angles are then still seen to be even.
     """
     levels = np.unique(angle)
     apart = np.diff(levels)
     if len(levels) < FEWEST_LEVELS:
         return 0.0
-    least = float(apart[apart > NEIGHBOURS * np.median(apart)].min())
-    step = next((step for part in PARTS if (step := _refined(levels, least / part)) > 0), 0.0)
+    apart = apart[apart > NEIGHBOURS * np.median(apart)]
+    tried = [float(apart.min()) / part for part in PARTS]
+    # Of moves by eight or nine steps no small part of either is one step, but what they differ by is.
+    differ = np.diff(np.unique(apart))
+    tried += [float(one) for one in differ[differ > NEIGHBOURS * apart.min()][:1]]
+    step = next((step for one in tried if (step := _refined(levels, one)) > 0), 0.0)
     return step if step > 0 and not _is_sampled_evenly(angle, step, time) else 0.0
 
 

@@ -32,7 +32,8 @@ class Recording:
 
     `input_angle` rad, unwrapped; `error_arcmin` KE at the output; `time` s, `torque` Nm at the output, `temperature`
     deg C or None; `segment` counts up at each gap. `quantum_arcmin` is the step of the coarser encoder at the output, 0
-    where none shows; `output_step_arcmin` that of the output's alone. `warnings` say what was repaired, `understood`
+    where none shows; `output_step_arcmin` that of the output's alone, `input_step_arcmin` that of the input's, at the
+    output. `warnings` say what was repaired, `understood`
     how the file was read, a plain sentence each. `sensor_arcmin` is the encoders' standard uncertainty at the output, 0
     where nobody stated it; `output_reversed` says that the output was counted against the input. `scatter_arcmin` is
     what of the error tells nothing of where the output stood, or None: whole steps of a coarse encoder, a few samples
@@ -49,6 +50,7 @@ class Recording:
     segment: Index | None = None
     quantum_arcmin: float = 0.0
     output_step_arcmin: float = 0.0
+    input_step_arcmin: float = 0.0
     warnings: tuple[str, ...] = field(default=())
     understood: tuple[str, ...] = field(default=())
     sensor_arcmin: float = 0.0

@@ -185,3 +185,12 @@ def test_a_sound_drive_on_a_coarse_encoder_is_adequate(reading):
     drawn = simulate(Spec("coarse", 2, reading=reading, size="small", gear="csf-25-80"))
     answer = diagnose([recording_from_table(table, RATIO) for table in drawn.tables], drive)
     assert (answer.verdict, answer.effects) == ("adequate", ())
+
+
+def test_moves_by_eight_or_nine_steps_tell_one():
+    """480 samples a turn of 4,096 counts: no two of the angles lie nearer than eight steps. Would catch a step that is
+    a whole part of the smallest move alone."""
+    step = 360 / 4096
+    angle = step * np.round(np.arange(20 * 480) * 360 / 480 / step)
+    moved = angle[np.r_[0:4000, 4007:9600]]
+    assert encoder_step(moved) == pytest.approx(step, rel=1e-9)
