@@ -36,6 +36,9 @@ CYCLES: tuple[tuple[int, ...], ...] = ((1,), (1, 2), (2,), (1, 2, 3, 4))
 """Cycles a line of each variant; distorted signals (no pure sines) add the third and fourth."""
 SEARCHED = ((1,), (1, 2), (1, 2, 3, 4))
 """Two cycles a line without the first cannot be told from one cycle of twice as many lines."""
+LEAST_OUTPUT_TURNS = 0.1
+"""Part of an output turn from which its lines are counted: by their phase, which follows the output and so the drive's
+own error, and well above the noise far finer than neighbours in a spectrum are told apart."""
 MESH_CYCLES = (1, 2)
 """Cycles a line by which lines at the tooth mesh could stand for it."""
 SHOWS = 0.01
@@ -147,7 +150,7 @@ class EncoderInterpolation(Effect):
         lowest = max(probe.order_range[0], LOWEST_PAIR if output else LOWEST_ORDER)
         lines = np.arange(np.ceil(lowest * per), np.floor(highest * per) + 1)
         if output:
-            if samples.span_turns < 0.5 * samples.ratio:
+            if samples.span_turns < LEAST_OUTPUT_TURNS * samples.ratio:
                 return []
             lines = lines[~beside_the_mesh(lines / per, samples.ratio)]
         lines = lines[~are_of_the_mesh(lines / per, samples.ratio)]
@@ -155,7 +158,7 @@ class EncoderInterpolation(Effect):
             return []
         return [
             self.term(samples, {"lines": int(line), "shaft": shaft, "cycles": cycles}, trials=float(len(lines)))
-            for line in sorted(_strongest_lines(probe, lines, per, highest, output))
+            for line in _with_neighbours(_strongest_lines(probe, lines, per, highest, output), lines, per, samples)
             for cycles in SEARCHED
             if cycles[-1] * line <= finest * per and (line >= LOWEST_ORDER * per or cycles[:2] == (1, 2))
         ]
@@ -212,6 +215,14 @@ class EncoderInterpolation(Effect):
             f"The {shape['shaft']} encoder interpolates unevenly between its {lines} lines{instead}: "
             f"{parameters['amplitude_arcmin'].value:.2g} arcmin at the output."
         )
+
+
+def _with_neighbours(strongest: set[float], lines: Array, per: float, samples: Conditions) -> list[float]:
+    """The `strongest` numbers of `lines`, `per` input turn each, and those beside them as far as a spectrum of the
+    `samples` does not tell them apart; in rising order."""
+    reach = int(0.5 * per / samples.span_turns)
+    beside = {line + d for line in strongest for d in range(-reach, reach + 1)}
+    return sorted(beside & set(lines.tolist()))
 
 
 def _strongest_lines(probe: Probe, lines: Array, per: float, highest: float, output: bool) -> set[float]:

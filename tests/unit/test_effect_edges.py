@@ -15,6 +15,9 @@ from test_windup_curves import fit_of
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.settings import DEFAULT
+from hdopt.diagnosis.stages import begin
+from hdopt.drive.geometry import ARCMIN
 from hdopt.effects import EFFECTS, cs_tooth_harmonics
 from hdopt.effects import hysteresis as friction
 from hdopt.effects._friction_torque import friction_columns
@@ -28,8 +31,12 @@ from hdopt.effects.local_tooth_defect import WIDEST_DEG, WIDEST_OUTPUT_DEG, Seat
 from hdopt.effects.requirements import requirement
 from hdopt.effects.term import Term
 from hdopt.errors import HdoptError, MissingValue
+from hdopt.kinematics.cartesian import CartesianModel
+from hdopt.kinematics.waveform import kinematic_error_arcmin
 from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.rows import gather
+from hdopt.study import load_study
+from tests.unit.test_diagnosis import bench
 
 EACH = pytest.mark.parametrize("effect", EFFECTS.values(), ids=EFFECTS)
 RECORD = moving((14, 14, 14))
@@ -453,3 +460,40 @@ def test_a_run_of_waves_begins_with_the_second(members, run):
     """Fault caught: a run that ends with the rows taken for a few waves that stand out alone, which must all be as
     large as its largest."""
     assert cs_tooth_harmonics.has_no_gap(members) == run
+
+
+def lines_found(order, of_output, turns=25, size=0.06):
+    """The best lines that the search offers for a wave of `order` of the input, or of N times the output's angle, in a
+    recording of so many turns there and back, and by how much (log evidence) a sine of any order of the input explains
+    more."""
+    study = load_study(drive="csf-25-80")
+
+    def wave(state):
+        behind = kinematic_error_arcmin(study.drive, study.errors, state["theta"]) if of_output else 0.0
+        return size * np.sin(order * (state["theta"] - 80 * behind * ARCMIN))
+
+    records = bench(study, wave, turns=turns, rate=100)
+    fit = begin(records, CartesianModel.of(study.drive), 1, DEFAULT).base
+    probe = FitProbe(fit)
+    best = max(EFFECTS["encoder_interpolation"].search(probe), key=probe.gain)
+    other = max(fit.problem.explanations["_sine_in_angle"].search(probe), key=probe.gain)
+    return best.shape, (probe.gain(other) - probe.gain(best)) / 2
+
+
+@pytest.mark.parametrize("lines", [1799, 1800, 1801])
+def test_lines_of_the_output_are_counted_in_a_third_of_its_turn(lines):
+    """Neighbours lie three to a line of the spectrum, and their phases tell them. Would catch the strongest of the
+    spectrum taken for them, and lines that are looked for from half a turn on alone: `unknown`, four of four."""
+    shape, apart = lines_found(lines / 80, of_output=True)
+    assert (shape["lines"], shape["shaft"]) == (lines, Shaft.OUTPUT)
+    assert apart < 0
+
+
+@pytest.mark.parametrize("order", [22.4937, 31.3071])
+def test_orders_between_the_lines_are_no_lines(order):
+    """As of a belt or a pulley, in the same third of an output turn: half a line away a sine explains more."""
+    assert lines_found(order, of_output=False)[1] > 30
+
+
+def test_lines_of_the_output_are_not_counted_in_less_than_a_tenth_of_its_turn():
+    assert lines_found(22.5, of_output=True, turns=7)[0]["shaft"] == Shaft.INPUT
