@@ -24,7 +24,7 @@ from hdopt.effects._friction_torque import friction_columns
 from hdopt.effects._zone_harmonics import strongest_few
 from hdopt.effects.cs_tooth_harmonics import CircularSplineToothHarmonics
 from hdopt.effects.declared import REQUIRED, Numbers, Quantity, Shaft, Sines
-from hdopt.effects.encoder_interpolation import are_of_the_mesh, beside_the_mesh
+from hdopt.effects.encoder_interpolation import _with_neighbours, are_of_the_mesh, beside_the_mesh
 from hdopt.effects.estimate import FitEstimate
 from hdopt.effects.grid_search import Axis
 from hdopt.effects.local_tooth_defect import WIDEST_DEG, WIDEST_OUTPUT_DEG, Seat
@@ -487,6 +487,13 @@ def test_lines_of_the_output_are_counted_in_a_third_of_its_turn(lines):
     shape, apart = lines_found(lines / 80, of_output=True)
     assert (shape["lines"], shape["shaft"]) == (lines, Shaft.OUTPUT)
     assert apart < 0
+
+
+@pytest.mark.parametrize(("turns", "reach"), [(25, 1), (8, 5), (40, 1), (41, 0), (400, 0)])
+def test_lines_are_tried_with_neighbours_that_a_spectrum_does_not_tell_apart(turns, reach):
+    lines, samples = np.arange(16.0, 2000.0), SimpleNamespace(span_turns=turns)
+    found = _with_neighbours({16.0, 900.0}, lines, 80.0, samples)
+    assert found == [*(16.0 + np.arange(reach + 1)), *(900.0 + np.arange(-reach, reach + 1))]
 
 
 @pytest.mark.parametrize("order", [22.4937, 31.3071])
