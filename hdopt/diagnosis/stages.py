@@ -31,7 +31,7 @@ from hdopt.diagnosis.search.candidates import Candidate, paid_for_freedom, penal
 from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.high_order import find_ripple, strong_ripple, subtract, subtracted_terms
 from hdopt.diagnosis.search.search_state import SearchPlan
-from hdopt.diagnosis.search.subset_search import Selection, first_look, leading_evidence, select, select_from
+from hdopt.diagnosis.search.subset_search import Selection, first_look, most_explained, select, select_from
 from hdopt.diagnosis.settings import DiagnosisSettings
 from hdopt.diagnosis.state import State
 from hdopt.kinematics.cartesian import CartesianModel
@@ -261,10 +261,10 @@ def with_first_look(way: State) -> State:
 
 
 def gap_at_first_look(ways: Sequence[State]) -> float:
-    """By how much log evidence the first of two `ways` explains more than the second, its base and the leader of a
-    first look at the effects together.
+    """By how much log evidence the first of two `ways` explains more than the second, its base and the best of a first
+    look at the effects together.
     """
-    first, second = (leading_evidence(way.looked) - unexplained(way) for way in ways if way.looked is not None)
+    first, second = (most_explained(way.looked) - unexplained(way) for way in ways if way.looked is not None)
     return first - second
 
 

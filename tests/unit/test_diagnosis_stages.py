@@ -280,7 +280,7 @@ def test_on_a_part_of_the_turns_an_open_orientation_is_not_searched_for(in_noise
     monkeypatch.setattr(stages, "preference", lambda as_counted, turned: 0.0)
     monkeypatch.setattr(stages, "unexplained", lambda way: 0.0)
     monkeypatch.setattr(stages, "first_look", looked_at_nothing)
-    monkeypatch.setattr(stages, "leading_evidence", lambda look: next(looks))
+    monkeypatch.setattr(stages, "most_explained", lambda look: next(looks))
     monkeypatch.setattr(stages, "select_from", None)
     assert choose_orientation_at_first_look(in_noise).orientation.input == counted
     with pytest.raises(TypeError, match="not callable"):
@@ -323,7 +323,7 @@ def test_a_clear_first_look_saves_the_search_both_ways(in_noise, monkeypatch, ah
     looks = iter([ahead, 0.0])
     monkeypatch.setattr(stages, "preference", lambda as_counted, turned: 0.0)
     monkeypatch.setattr(stages, "first_look", looked_at_nothing)
-    monkeypatch.setattr(stages, "leading_evidence", lambda look: next(looks))
+    monkeypatch.setattr(stages, "most_explained", lambda look: next(looks))
     monkeypatch.setattr(stages, "select", None)
     monkeypatch.setattr(stages, "select_from", None)
     after = choose_orientation(in_noise)
@@ -338,7 +338,7 @@ def test_what_was_searched_for_the_orientation_is_not_searched_again(in_noise, m
     monkeypatch.setattr(stages, "preference", lambda as_counted, turned: 0.0)
     monkeypatch.setattr(stages, "unexplained", lambda way: 0.0)
     monkeypatch.setattr(stages, "first_look", looked_at_nothing)
-    monkeypatch.setattr(stages, "leading_evidence", lambda look: 1.0)
+    monkeypatch.setattr(stages, "most_explained", lambda look: 1.0)
     monkeypatch.setattr(stages, "select", None)
     searches = []
 

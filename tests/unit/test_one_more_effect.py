@@ -88,3 +88,39 @@ def test_of_a_set_fitted_anew_and_one_tried_before_the_better_stands(monkeypatch
             fit.objective = 1.0 if name == least else 2.0
         found = with_one_more(state, BEGUN, lambda fit: False, sines_alone=False)
         assert [one is fits[least] for one in found] == [True]
+
+
+@pytest.mark.parametrize(
+    ("effects", "kept"),
+    [
+        (("channel_delay", "_skew"), ("channel_delay",)),
+        (("_scale", "channel_delay", "lost_motion", "_zero"), ("channel_delay", "lost_motion")),
+        (("channel_delay",), None),
+        (("_skew",), None),
+        (("channel_delay", "_varying_contact"), None),
+    ],
+)
+def test_what_is_told_is_put_aside(monkeypatch, effects, kept):
+    """A clock that runs apart had taken up a part of the friction beside a delay, so that the two, without a skew, did
+    not complete the delay with one: four of four were `unknown`. A contact that varies is the drive's own, and stays.
+    """
+    monkeypatch.setattr(completion, "with_only", lambda fit, keep: tuple(fit.terms[i].effect for i in keep))
+    assert completion.without_told(fit_of(*effects)) == ([] if kept is None else [kept])
+
+
+def test_a_set_is_completed_without_what_is_told_too(monkeypatch):
+    """Fault caught: sets that complete the first with its skew alone."""
+    asked = []
+    first = SimpleNamespace(fit=fit_of("channel_delay", "_skew"), effects=("channel_delay", "_skew"), outside=False)
+    monkeypatch.setattr(completion, "with_only", lambda fit, keep: fit_of(*(fit.terms[i].effect for i in keep)))
+    monkeypatch.setattr(completion, "with_one_more", lambda state, fit, *_: asked.append(names_of(fit)) or [])
+    monkeypatch.setattr(completion, "is_outside_tolerances", lambda fit: False)
+    state = SimpleNamespace(
+        settings=DEFAULT.search,
+        above_noise=lambda fit: 1e6,
+        scale=SimpleNamespace(rows=1000, settings=DEFAULT.penalty),
+        top_gain=1.0,
+        inflation=1.0,
+    )
+    assert completion.by_one_plain_effect(state, first) == []
+    assert asked == [names_of(first.fit), names_of(fit_of("channel_delay"))]

@@ -140,7 +140,7 @@ def test_what_is_left_counts_in_noise_variances_half(monkeypatch):
     assert stages.unexplained(state_of(Told("", 12.0, Problem(noise_of(0.5))), inflation=3.0)) == pytest.approx(8.0)
     monkeypatch.setattr(stages, "plan_of", lambda way: way.base.name)
     monkeypatch.setattr(stages, "first_look", lambda base, inflation, rng, plan: plan)
-    monkeypatch.setattr(stages, "leading_evidence", {"one": 10.0, "two": 4.0}.get)
+    monkeypatch.setattr(stages, "most_explained", {"one": 10.0, "two": 4.0}.get)
     both = [stages.with_first_look(state_of(Told(*told))) for told in (("one", 6.0), ("two", 10.0))]
     assert stages.gap_at_first_look(both) == pytest.approx((10 - 3) - (4 - 5))
 

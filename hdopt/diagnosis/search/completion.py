@@ -20,12 +20,19 @@ from dataclasses import replace
 from hdopt.diagnosis.checks.other_laws import other_law
 from hdopt.diagnosis.inference.base_excitation import is_driven
 from hdopt.diagnosis.inference.base_fit import beyond_tolerances, is_far
-from hdopt.diagnosis.inference.catalogue import is_outside
+from hdopt.diagnosis.inference.catalogue import EXACT_TOLD, is_outside
 from hdopt.diagnosis.inference.clean_base import long_waves
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.numerical import NORMAL_95, VARIANCE_OF_A_SQUARE
 from hdopt.diagnosis.search.acceptance import is_acceptable
-from hdopt.diagnosis.search.candidates import Candidate, from_new_drives, in_order, joint_fit, paid_for_freedom
+from hdopt.diagnosis.search.candidates import (
+    Candidate,
+    from_new_drives,
+    in_order,
+    joint_fit,
+    paid_for_freedom,
+    with_only,
+)
 from hdopt.diagnosis.search.penalty import kind_of, leaves_nothing
 from hdopt.diagnosis.search.search_state import Names, SearchState, names_of
 from hdopt.diagnosis.search.several_for_one import has_bending
@@ -100,7 +107,7 @@ def by_one_plain_effect(state: SearchState, first: Candidate) -> list[Candidate]
     def fills(more: Fit) -> bool:
         return leaves_more and takes_up(more, left, state)
 
-    made = with_one_more(state, fit, fills, sines_alone=not leaves_more)
+    made = [more for one in (fit, *without_told(fit)) for more in with_one_more(state, one, fills, not leaves_more)]
     home = [more for more in made if brings_home(more, first)] if far else []
     if len(home) > 1 and not is_far(fit).any():
         home = []  # Several would do: none of them is told by that.
@@ -115,6 +122,13 @@ def by_one_plain_effect(state: SearchState, first: Candidate) -> list[Candidate]
         if completes and may_come_first(one, first, state):
             found.append(one)
     return found
+
+
+def without_told(fit: Fit) -> list[Fit]:
+    """`fit` without what is only told of the instruments, refitted; none where there is no such term, or nothing else:
+    a clock or a ratio that is off takes up a part of the very effect that is missing."""
+    physics = [i for i, term in enumerate(fit.terms) if term.effect not in EXACT_TOLD]
+    return [with_only(fit, physics)] if 0 < len(physics) < len(fit.terms) else []
 
 
 def by_waves(state: SearchState, first: Candidate) -> list[Candidate]:

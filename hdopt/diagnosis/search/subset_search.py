@@ -25,6 +25,7 @@ from hdopt.diagnosis.search.candidates import (
     from_new_drives,
     in_order,
     joint_fit,
+    paid_for_freedom,
     search_terms,
     with_only,
     without_each,
@@ -117,10 +118,13 @@ def first_look(base: Fit, inflation: float, rng: np.random.Generator, plan: Sear
     return explore_base(SearchState(base, plan, inflation, rng))
 
 
-def leading_evidence(state: SearchState) -> float:
-    """The log Bayes factor of the leader of `state`, 0 where none leads."""
-    leader = state.leader
-    return 0.0 if leader is None else leader.log_bayes_factor
+def most_explained(state: SearchState) -> float:
+    """The most that any set of `state` explains beyond the base, as log evidence that pays for freedom and search
+    alone; 0 where none does. Not the leader's: it pays a share of all that it explains for each inexact shape, and
+    leads with fewer where one more would be needed.
+    """
+    explained = (paid_for_freedom(state.weigh(fit), state.scale) for fit in state.fits.values())
+    return max((0.0, *explained))
 
 
 def refit_known(state: SearchState) -> SearchState:
