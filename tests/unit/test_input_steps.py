@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+import scipy.signal
 
 from hdopt.diagnosis import diagnose, pipeline
-from hdopt.diagnosis.inference.input_steps import beyond_smooth, regression, without_input_steps
+from hdopt.diagnosis.inference.input_steps import beyond_smooth, regression, smoothed, without_input_steps
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.drive.geometry import ARCMIN
 from hdopt.kinematics.waveform import kinematic_error_arcmin
@@ -103,6 +104,13 @@ def test_about_a_reversal_steps_stay():
     middle = len(angle) // 2
     assert not beyond[middle - 5 : middle + 5].any()
     assert np.std(beyond[100:1000]) == pytest.approx(1 / 12**0.5, rel=0.1)
+
+
+@pytest.mark.parametrize("window", [7, 25, 101])
+def test_smoothing_is_that_of_the_library(window):
+    values = np.random.default_rng(2).normal(0, 1, 300) + np.linspace(0, 40, 300)
+    expected = scipy.signal.savgol_filter(values, window, 3)
+    np.testing.assert_allclose(smoothed(values, window, 3), expected, atol=1e-9)
 
 
 def test_regression_by_hand():

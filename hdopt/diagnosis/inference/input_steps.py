@@ -15,8 +15,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import minimum_filter1d
-from scipy.signal import savgol_filter
+from scipy.ndimage import convolve1d, minimum_filter1d
 
 from hdopt.arrays import Array
 from hdopt.diagnosis.numerical import TINY
@@ -68,10 +67,10 @@ def beyond_smooth(angle: Array, error: Array, settings: EncoderStepSettings) -> 
     for window in settings.smooth_over:
         if len(angle) < window:
             break
-        off = angle - savgol_filter(angle, window, settings.smooth_degree)
+        off = angle - smoothed(angle, window, settings.smooth_degree)
         smooth = minimum_filter1d((np.abs(off) < settings.farthest_off).astype(np.int8), window) > 0
         beyond = np.where(smooth, off, beyond)
-        of_error = np.where(smooth, error - savgol_filter(error, window, settings.smooth_degree), of_error)
+        of_error = np.where(smooth, error - smoothed(error, window, settings.smooth_degree), of_error)
     return beyond, of_error
 
 
@@ -83,3 +82,16 @@ def regression(error: Array, added: Array) -> tuple[float, float]:
         return 0.0, math.inf
     share = float(added @ error) / power
     return share, float(np.std((error - share * added)[added != 0])) / math.sqrt(power)
+
+
+def smoothed(values: Array, window: int, degree: int) -> Array:
+    """`values` (n,), n >= `window`, each by the polynomial of a `degree` fitted to the `window` samples about it, an
+    odd number; by the first and the last such at the ends. As `scipy.signal.savgol_filter`, which loads all of
+    `scipy.stats` for a second.
+    """
+    powers = np.vander(np.linspace(-1.0, 1.0, window), degree + 1)
+    fitted = powers @ np.linalg.pinv(powers)
+    half = window // 2
+    found = convolve1d(values, fitted[half])
+    found[:half], found[-half:] = fitted[:half] @ values[:window], fitted[-half:] @ values[-window:]
+    return np.asarray(found)
