@@ -14,12 +14,13 @@ def zone_harmonics(phase: Array, harmonics: Sequence[int]) -> Array:
     """sin and cos of each harmonic as met in zone 1 (`phase`) and in zone 2, half a turn on: shape (2, n, 2 k).
 
     sin(h (x + pi)) = (-1)^h sin(h x): even harmonics are alike in both zones, odd ones opposite (Jia 2021,
-    Eqs. (31a), (31b), carried to h > 1).
+    Eqs. (31a), (31b), carried to h > 1). Every column lies in one piece, as filters and products read it.
     """
-    zones = np.empty((2, len(phase), 2 * len(harmonics)))
-    zones[0] = sine_columns(phase, harmonics)
-    np.multiply(zones[0], np.repeat([(-1.0) ** h for h in harmonics], 2), out=zones[1])
-    return zones
+    first = sine_columns(phase, harmonics).T
+    rows = np.empty((2, *first.shape))
+    rows[0] = first
+    np.multiply(first, np.repeat([(-1.0) ** h for h in harmonics], 2)[:, None], out=rows[1])
+    return rows.transpose(0, 2, 1)
 
 
 LEAST_PART = 0.002
