@@ -32,6 +32,9 @@ FEWEST_IN_A_RUN = 3
 """Multiples, none of them low, for which it pays to begin with another sine."""
 LANES = 32
 """Angles worked on at a time, each in a lane of the processor's vectors: none waits for the others' sums."""
+PIECE = 512
+"""Angles worked on at a time where columns are written: each of them lies in pages of its own, and all of these at once
+in no cache of addresses."""
 
 
 def _run_of(multiples: Array, most: int) -> range | None:
@@ -63,20 +66,28 @@ def _whole_sines(phase: Array, place: Index, before: int, count: int) -> Array:
     """
     rows = len(phase)
     columns = np.empty((2 * count, rows))
-    sine, cosine, s, c = np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES)
-    for start in range(0, rows, LANES):
-        here = min(LANES, rows - start)
+    sine, cosine, s, c = np.empty(PIECE), np.empty(PIECE), np.empty(PIECE), np.empty(PIECE)
+    for start in range(0, rows, PIECE):
+        here = min(PIECE, rows - start)
         for i in range(here):
             sine[i], cosine[i] = sine_cosine(phase[start + i])
         _begin(phase, start, here, before, s, c)
         for at in place:
-            for i in range(LANES):
-                s[i], c[i] = s[i] * cosine[i] + c[i] * sine[i], c[i] * cosine[i] - s[i] * sine[i]
             if at >= 0:
+                own, beside = columns[2 * at, start : start + here], columns[2 * at + 1, start : start + here]
                 for i in range(here):
-                    columns[2 * at, start + i] = s[i]
-                    columns[2 * at + 1, start + i] = c[i]
+                    s[i], c[i] = _one_further(s[i], c[i], sine[i], cosine[i])
+                    own[i], beside[i] = s[i], c[i]
+            else:
+                for i in range(here):
+                    s[i], c[i] = _one_further(s[i], c[i], sine[i], cosine[i])
     return columns
+
+
+@late(calls=0)
+def _one_further(s: float, c: float, sine: float, cosine: float) -> tuple[float, float]:
+    """Sine and cosine of the next multiple, where `s` and `c` are those of one, `sine` and `cosine` of the angle."""
+    return s * cosine + c * sine, c * cosine - s * sine
 
 
 @late(calls=0)

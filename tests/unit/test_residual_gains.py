@@ -15,7 +15,11 @@ N, SIGMA = 60, 0.2
 def probe_of(design, precision, residual, weights=None):
     """A probe on a fit without terms, whose rows weigh as `weights` say."""
     weights = np.ones(N) if weights is None else weights
-    noise = SimpleNamespace(sigma=SIGMA, whiten=lambda rows: (weights * np.asarray(rows).T).T)
+    noise = SimpleNamespace(
+        sigma=SIGMA,
+        whiten=lambda rows: (weights * np.asarray(rows).T).T,
+        whitened=lambda blocks: weights[:, None] * np.column_stack(blocks),
+    )
     problem = SimpleNamespace(settings=DEFAULT, rows=SimpleNamespace(highest_order=9.0), noise=noise)
     fit = SimpleNamespace(terms=(), problem=problem, motion=None, residual=residual)
     fit.white_design = lambda keep: fit.problem.noise.whiten(design)
@@ -78,6 +82,28 @@ def test_the_gain_of_each_of_many_terms_is_the_drop_that_it_alone_brings(widths)
     drops = [(left() - left(term.columns)) / SIGMA**2 for term in terms]
     assert probe.gains(terms) == pytest.approx(drops, rel=1e-4)
     assert probe.gains(terms) == pytest.approx([probe.gain(term) for term in terms], rel=1e-12)
+
+
+@pytest.mark.parametrize("kept", [(True, True, True), (True, False, True)])
+def test_what_is_remembered_of_terms_is_theirs_and_that_of_their_fit(kept):
+    """Asked again, with other signs, beside another fit and in another order. Faults caught: a residual, or what a fit
+    absorbs, that is remembered too; products of the terms that were asked first."""
+    rng = np.random.default_rng(5)
+    design, residual = rng.normal(size=(N, 4)), rng.normal(size=N)
+    columns = [rng.normal(size=(N, width)) + design[:, :1] for width in (2, 1, 3)]
+    terms = [Term("output_coupling", {}, columns=one, kept=keep) for one, keep in zip(columns, kept, strict=True)]
+    first = probe_of(design, np.zeros(4), residual)
+    other = probe_of(design[:, :2], np.zeros(2), residual)
+    other.fit.problem.whitened = first.fit.problem.whitened
+    signs = rng.choice([-1.0, 1.0], N)
+    for probe in (first, first.flipped(signs), first.on(signs * residual**2), other):
+        anew = probe.on(probe.residual)
+        anew.white_residual = probe.white_residual
+        anew.looked_at = {}
+        fresh = [Term("output_coupling", {}, columns=one) for one in columns]
+        for order in ([0, 1, 2], [2, 0], [1]):
+            gains = probe.gains([terms[i] for i in order])
+            assert gains == pytest.approx(anew.gains([fresh[i] for i in order]), rel=1e-9)
 
 
 def test_no_terms_gain_nothing():

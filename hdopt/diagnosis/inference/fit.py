@@ -28,6 +28,7 @@ from hdopt.diagnosis.inference.newey_west import newey_west, reach_95
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.normal_equations import GroupedColumns, bordered, solved, sums_of_groups
 from hdopt.diagnosis.inference.read_angle import read_ahead, reads_input, where_it_stood
+from hdopt.diagnosis.inference.whitened_terms import WhitenedTerms
 from hdopt.diagnosis.numerical import NORMAL_95, TINY
 from hdopt.diagnosis.settings import DEFAULT, DiagnosisSettings
 from hdopt.drive.geometry import ARCMIN
@@ -55,8 +56,8 @@ class FitProblem:
     settings: DiagnosisSettings = DEFAULT
 
     @cached_property
-    def whitened(self) -> dict[int, tuple[Term, Array, Array]]:
-        """Whitened columns and their inner products of the terms that the rows remember, by identity."""
+    def whitened(self) -> dict[tuple[int, ...], WhitenedTerms]:
+        """Whitened columns and their inner products of terms that the rows remember, by their identities."""
         return {}
 
     @property
@@ -325,7 +326,8 @@ def term_columns(term: Term, fit: Fit) -> Array:
     splines, in `fit`."""
     base, zone = fit.problem.base, fit.zone
     if base is not None and term.met is not None:
-        met: Array = base.arcmin_per_mm * term.met.columns(fit.met_angle[term.met.spline], zone)
+        met: Array = term.met.columns(fit.met_angle[term.met.spline], zone)
+        met *= base.arcmin_per_mm
         return met
     if base is not None and term.zones is not None:
         columns: Array = base.arcmin_per_mm * np.where((zone == 0)[:, None], term.zones[0], term.zones[1])

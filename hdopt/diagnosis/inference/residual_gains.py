@@ -15,6 +15,7 @@ from hdopt.diagnosis.inference.base_excitation import excites, is_driven
 from hdopt.diagnosis.inference.fit import Fit, side_by_side
 from hdopt.diagnosis.inference.normal_equations import orthonormal, solved
 from hdopt.diagnosis.inference.read_angle import reads_input
+from hdopt.diagnosis.inference.whitened_terms import WhitenedTerms
 from hdopt.diagnosis.numerical import RIDGE, TINY
 from hdopt.effects.term import Term
 from hdopt.recordings.read import TURN
@@ -47,6 +48,7 @@ class FitProbe:
         basis = orthonormal(augmented / np.where(scale > 0, scale, 1))
         self.basis = np.asfortranarray(basis[: len(white)])
         self.white_residual = self.project(self.noise.whiten(self.residual))
+        self.looked_at: dict[tuple[int, ...], tuple[WhitenedTerms, list[Array]]] = {}
 
     def flipped(self, signs: Array) -> FitProbe:
         """The same with what is left times `signs` (n,), one of each row: noise that is as likely as what was seen,
@@ -65,7 +67,7 @@ class FitProbe:
         return other
 
     def _anew(self) -> FitProbe:
-        """A copy without the spectra of its residual."""
+        """A copy without the spectra of its residual, which knows what this one has looked at."""
         other = copy.copy(self)
         for name in ("_by_input", "_by_output"):
             other.__dict__.pop(name, None)
@@ -88,17 +90,21 @@ class FitProbe:
         """The columns of `terms` beside each other, whitened and projected."""
         return self.project(side_by_side([self.white_columns(term) for term in terms]))
 
-    def _whitened(self, term: Term) -> tuple[Array, Array]:
-        """The term's whitened columns and their inner products."""
-        known = self.fit.problem.whitened
-        alone = term.kept and not (term.in_zones or reads_input(term)) and not (self.swings and excites(term))
-        if alone and id(term) in known:
-            return known[id(term)][1:]
-        white = self.white_columns(term)
-        gram = white.T @ white
+    def _whitened(self, terms: Sequence[Term]) -> WhitenedTerms:
+        """The columns of `terms`, whitened; those that hang on nothing but the rows are remembered with them."""
+        known, key = self.fit.problem.whitened, tuple(map(id, terms))
+        alone = all(self._hangs_on_rows_alone(term) for term in terms)
+        if alone and key in known:
+            return known[key]
+        columns = self.noise.whitened([self.fit.columns_of(term, self.keep) for term in terms])
+        white = WhitenedTerms.of(terms, columns)
         if alone:
-            known[id(term)] = (term, white, gram)
-        return white, gram
+            known[key] = white
+        return white
+
+    def _hangs_on_rows_alone(self, term: Term) -> bool:
+        """Whether the columns of `term`, which the rows remember, are the same beside every fit."""
+        return term.kept and not (term.in_zones or reads_input(term)) and not (self.swings and excites(term))
 
     def table(self, term: Term) -> tuple[Array, Array]:
         """Inner products of the term's columns, with the fit projected out, with each other and with the residual."""
@@ -109,12 +115,21 @@ class FitProbe:
         """Of each term's columns with each other, the part of it that the fit absorbs, and with the residual: all
         `terms` in one product with what is fitted.
         """
-        whitened = [self._whitened(term) for term in terms]
-        columns = np.concatenate([white.T for white, _ in whitened])
-        absorbed, moments = self.basis.T @ columns.T, columns @ self.white_residual
-        ends = np.cumsum([len(gram) for _, gram in whitened])[:-1]
-        parts = zip(whitened, np.split(absorbed, ends, axis=1), np.split(moments, ends), strict=True)
-        return ((gram, part.T @ part, moment) for (_, gram), part, moment in parts)
+        white, absorbed = self._absorbed(terms)
+        return zip(white.grams, absorbed, white.parts(white.columns.T @ self.white_residual), strict=True)
+
+    def _absorbed(self, terms: Sequence[Term]) -> tuple[WhitenedTerms, list[Array]]:
+        """The whitened columns of `terms` and, of each, the part of its inner products that the fit absorbs: remembered
+        for other residuals of the same fit where the rows remember the terms.
+        """
+        key = tuple(map(id, terms))
+        if key in self.looked_at:
+            return self.looked_at[key]
+        white = self._whitened(terms)
+        found = white, [part @ part.T for part in white.parts((self.basis.T @ white.columns).T)]
+        if all(term.kept for term in terms):
+            self.looked_at[key] = found
+        return found
 
     def solve(self, term: Term) -> tuple[float, Array]:
         """Drop of the weighted sum of squares, in noise variances, and the coefficients that bring it."""
@@ -138,6 +153,8 @@ class FitProbe:
         """`gain` of each of `terms` by itself. What is fitted already is gone through once for as many columns as it
         has itself, not once for each term.
         """
+        if terms and all(term.kept for term in terms):
+            return [self._solved(*products)[0] for products in self._products(terms)]
         most, found, at = self.basis.shape[1], [], 0
         while at < len(terms):
             end, width = at + 1, terms[at].width
