@@ -25,13 +25,15 @@ from hdopt.effects.estimate import FitEstimate, Parameter, counted
 from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Shape, Term
-from hdopt.effects.tooth_mesh import mesh_order
+from hdopt.effects.tooth_mesh import ToothMesh, mesh_order
 
 LOWEST_ORDER = 8.0
 LOWEST_PAIR = 3.0
 """Lowest order of an output encoder's lines where both L and 2 L show: one line alone could be anything."""
 MODULATION_PER_OUTPUT_TURN, SIDEBAND_REACH = 3.5, 12.0
 """Orders that the teeth own: within so many 1/N of a whole sideband, up to so far from the mesh order."""
+MESH_MULTIPLES = (1, 2, 3)
+"""Cycles a tooth about which a mesh may have lines."""
 CYCLES: tuple[tuple[int, ...], ...] = ((1,), (1, 2), (2,), (1, 2, 3, 4))
 """Cycles a line of each variant; distorted signals (no pure sines) add the third and fourth."""
 SEARCHED = ((1,), (1, 2), (1, 2, 3, 4))
@@ -82,6 +84,15 @@ def is_of_teeth(order: float, multiples: Sequence[int], ratio: float, output: bo
     waves = (order, order / (1 + 1 / ratio)) if output else ()
     round_a_spline = any(abs(wave - round(wave)) < 1e-6 and round(wave) <= HARMONICS_OF_TEETH for wave in waves)
     return round_a_spline or any(abs(m * order - mesh_order(ratio)) < 1e-6 for m in multiples)
+
+
+def is_where_the_mesh_reaches(order: float, multiples: Sequence[int], ratio: float) -> bool:
+    """Whether any of the `multiples` of an encoder's line, at an `order` a turn of the input of a drive of `ratio` N,
+    is as near to the order of the tooth mesh, its double or its triple as the sidebands of a mesh that varies over the
+    turn: a form that is no sine, and a driving zone that changes with the teeth, make such lines too.
+    """
+    mesh = mesh_order(ratio)
+    return any(abs(m * order - k * mesh) < SIDEBAND_REACH for m in multiples for k in MESH_MULTIPLES)
 
 
 def lines_of_the_other(lines: int, ratio: float, output: bool) -> int:
@@ -170,8 +181,17 @@ class EncoderInterpolation(Effect):
         odds = FEW_LINES_ODDS if shape["lines"] < FEW_LINES else 0.0
         order = shape["lines"] / (conditions.ratio if output else 1.0)
         doubtful = is_of_teeth(order, shape["cycles"], conditions.ratio, output)
+        beside = (ToothMesh.id,) if is_where_the_mesh_reaches(order, shape["cycles"], conditions.ratio) else ()
         other = {OTHER: lines_of_the_other(int(shape["lines"]), conditions.ratio, output)}
-        return Term(self.id, dict(shape) | other, columns=columns, trials=trials, odds=odds, doubtful=doubtful)
+        return Term(
+            self.id,
+            dict(shape) | other,
+            columns=columns,
+            trials=trials,
+            odds=odds,
+            doubtful=doubtful,
+            doubtful_beside=beside,
+        )
 
     def is_part_of(self, shape: Shape, other: Shape) -> bool:
         """Whether `shape` has the lines of an encoder of which `other` holds a multiple."""

@@ -35,6 +35,8 @@ class Term:
     """Log prior odds of this variant against the effect's plainest one."""
     doubtful: bool = False
     """Whether it must beat all others clearly: it has no physics, or stands at the orders of another effect."""
+    doubtful_beside: tuple[str, ...] = ()
+    """Effects, by their ids, beside which it is doubtful: it stands where they reach too."""
     kept: bool = False
     """Whether the rows remember this term, so that what is computed of it may be remembered too."""
 

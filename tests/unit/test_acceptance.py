@@ -135,6 +135,31 @@ def test_lines_at_the_orders_of_the_teeth(lines, multiples, output, expected):
     assert is_of_teeth(order, multiples, RATIO, output) is expected
 
 
+@pytest.mark.parametrize(
+    ("lines", "output", "near"),
+    [
+        (164, False, True),  # beside the mesh, 162
+        (81, False, True),  # whose double is the mesh
+        (322, False, True),  # beside its double
+        (490, False, True),  # beside its triple
+        (240, False, True),  # whose double is
+        (215, False, False),
+        (400, False, False),
+        (326 * 80, True, True),
+        (2500, True, False),  # order 31
+    ],
+)
+def test_lines_within_reach_of_the_mesh_are_doubtful_beside_one(lines, output, near):
+    """A mesh half modulated was named with an encoder of twice its order less two. Faults caught: its double or triple
+    forgotten, the output's lines counted by the input's turn, and lines that are doubtful far from it.
+    """
+    angles = np.linspace(0.0, 1.0, 5)
+    rows = SimpleNamespace(theta=angles, output=angles / RATIO, input_as_read=angles, ratio=RATIO)
+    shape = {"lines": lines, "shaft": Shaft.OUTPUT if output else Shaft.INPUT, "cycles": (1, 2)}
+    term = EFFECTS["encoder_interpolation"].term(rows, shape)
+    assert term.doubtful_beside == (("tooth_mesh",) if near else ())
+
+
 def test_those_that_may_not_be_said_neither_lead_nor_rival(study):
     fit, _, _ = fitted(study, lambda t: 0.1 * np.sin(4 * t) + 0.08 * np.sin(8 * t + 1))
     bad = with_effect(fit, "cs_tooth_harmonics", shape_of((4, 6, 8)))

@@ -108,6 +108,20 @@ def test_a_doubtful_term_must_win_clearly():
     assert paid([doubtful], gain=1000.0) - paid([plain], gain=1000.0) == pytest.approx(0.5 * COSTS.clear_win * 1000.0)
 
 
+def test_a_term_that_stands_where_another_reaches_must_win_clearly_beside_it():
+    """Or taken out of the rows before. Faults caught: doubtful beside anything, or beside none."""
+    lines = term("encoder_interpolation", doubtful_beside=("tooth_mesh",))
+    mesh, pulse = term("tooth_mesh"), term("local_tooth_defect")
+
+    def doubt(beside, subtracted=()):
+        sets = ([lines, *beside], [term("encoder_interpolation"), *beside])
+        dear, plain = (paid(terms, gain=1000.0, beside=subtracted) for terms in sets)
+        return (dear - plain) / (0.5 * COSTS.clear_win * 1000.0)
+
+    assert [doubt([]), doubt([mesh]), doubt([pulse])] == pytest.approx([0.0, 1.0, 0.0])
+    assert doubt([], subtracted=[mesh]) == pytest.approx(1.0)
+
+
 def test_what_was_taken_out_to_the_last_digit_leaves_little_to_name():
     """Lines that were counted reach no other order; a pulse's shape may be wrong, by a part of its power."""
     own = paid([term("encoder_input_eccentricity")], gain=100.0)

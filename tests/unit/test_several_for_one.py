@@ -33,6 +33,7 @@ class Piece:
     effect: str
     width: int = 2
     doubtful: bool = False
+    doubtful_beside: tuple[str, ...] = ()
     met: object = None
     shape: object = None
 

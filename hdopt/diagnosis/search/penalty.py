@@ -65,7 +65,7 @@ def penalty(terms: Sequence[Term], gain: float, scale: Scale) -> float:
     cost -= sum(s.effect_cost + searched(t) for t in terms if is_cycle_of(t, subtracted.terms))
     names = {term.effect for term in terms}
     cost += s.one_in_the_other * sum(properties_of(name).special_case_of in names for name in names)
-    cost += sum(term.doubtful for term in terms) * s.clear_win * gain / scale.inflation / 2
+    cost += doubtful_among(terms, subtracted.terms) * s.clear_win * gain / scale.inflation / 2
     rough = [term for term in subtracted.terms if not leaves_nothing(term)]
     more = discrepancy([*terms, *rough], s) - discrepancy(rough, s)
     inexact = more * (gain + (subtracted.gain if rough else 0.0))
@@ -73,6 +73,12 @@ def penalty(terms: Sequence[Term], gain: float, scale: Scale) -> float:
         # What was taken out to the last digit leaves as little as another kind of effect.
         inexact += s.other_kind * subtracted.gain
     return cost + len(terms) * s.effect_cost + inexact / scale.inflation / 2
+
+
+def doubtful_among(terms: Sequence[Term], subtracted: Sequence[Term] = ()) -> int:
+    """How many of `terms`, beside each other and what was `subtracted` from the rows, must beat all others clearly."""
+    names = {term.effect for term in (*terms, *subtracted)}
+    return sum(term.doubtful or not names.isdisjoint(term.doubtful_beside) for term in terms)
 
 
 def of_far_base(gain: float, scale: Scale) -> float:

@@ -16,7 +16,7 @@ from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import Candidate, from_new_drives, in_order, joint_fit, paid_for_freedom
 from hdopt.diagnosis.search.explore import explore, pool_among
-from hdopt.diagnosis.search.penalty import bends, discrepancy, leaves_nothing
+from hdopt.diagnosis.search.penalty import bends, discrepancy, doubtful_among, leaves_nothing
 from hdopt.diagnosis.search.search_state import SearchState
 from hdopt.effects import HIGH_ORDER
 
@@ -72,7 +72,7 @@ def several_first(state: SearchState, candidates: list[Candidate]) -> list[Candi
     if best is None or state.above_noise(best.fit) > state.settings.begun * scale.rows:
         return candidates
     share = discrepancy(best.fit.terms, scale.settings)
-    share += scale.settings.clear_win * sum(term.doubtful for term in best.fit.terms)
+    share += scale.settings.clear_win * doubtful_among(best.fit.terms)
     freed = best.log_bayes_factor + share * state.top_gain / state.inflation / 2
     if first.log_bayes_factor > freed:
         return candidates
