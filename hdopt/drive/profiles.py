@@ -302,11 +302,13 @@ class MeasuredProfile:
             gaps.min() > 1e-9,
             f"{where} gives the angle {math.degrees(angles[gaps.argmin()]):.6g} deg twice; keep one point an angle",
         )
+        # A whole turn in rad, read as deg.
+        of_radians = "; these look like angles in rad, give them in deg" if math.degrees(np.ptp(angles)) < 6.3 else ""
         require(
             gaps.max() <= self.LARGEST_GAP,
             f"{where} has no point for {math.degrees(gaps.max()):.3g} deg after "
             f"{math.degrees(angles[gaps.argmax()]):.4g} deg; gaps of up to {math.degrees(self.LARGEST_GAP):g} deg "
-            "are allowed",
+            f"are allowed{of_radians}",
         )
         closed = np.append(angles, angles[0] + 2 * math.pi), np.append(radii, radii[0])
         weights = np.full(len(angles) + 1, 1 / self.noise if self.noise else 1.0)
@@ -366,8 +368,8 @@ def read_polar(path: Path, what: str) -> tuple[Array, Array]:
     last point that closes the turn is left out.
 
     A header line is optional, `#` starts a comment; between semicolons or tabs, numbers may have a decimal comma. A
-    header with both names may have more columns, and in any order. Raises `DriveError`, for a header that names other
-    units too, that names `what`, file and line.
+    header with both names may have more columns, and in any order, and stand below lines of words. Raises
+    `DriveError`, for a header that names other units too, that names `what`, file and line.
     """
     try:
         text = read_text(path, "a CSV text file", foreign=True)
@@ -376,10 +378,12 @@ def read_polar(path: Path, what: str) -> tuple[Array, Array]:
     points: list[tuple[float, float]] = []
     names: list[str] = []
     header_allowed = True
-    for number, line in enumerate(text.splitlines(), 1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
-        cells = [cell.strip() for cell in cells_of(line)]
+    lines = [
+        (number, line, [cell.strip() for cell in cells_of(line)])
+        for number, line in enumerate(text.splitlines(), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    for number, line, cells in lines[_above_names(lines) :]:
         where = f"{what} {path}, line {number}: {shown(line)}"
         if header_allowed and are_names(cells):
             names = _named(cells, where)
@@ -393,6 +397,13 @@ def read_polar(path: Path, what: str) -> tuple[Array, Array]:
     if len(angles) > 1 and math.isclose(abs(angles[-1] - angles[0]), 2 * math.pi, abs_tol=1e-9):
         angles, radii = angles[:-1], radii[:-1]
     return angles, radii
+
+
+def _above_names(lines: list[tuple[int, str, list[str]]]) -> int:
+    """How many of the `lines` of a table (number, text, cells) stand above a header with both names and hold words, as
+    what a measuring machine writes there; 0 where there is no such header, or numbers are above it."""
+    at = next((i for i, (_, _, cells) in enumerate(lines) if set(POLAR) <= set(cells)), 0)
+    return 0 if any(not are_names([cell]) for _, _, cells in lines[:at] for cell in cells[:1]) else at
 
 
 def _named(names: list[str], where: str) -> list[str]:

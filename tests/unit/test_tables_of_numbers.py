@@ -70,6 +70,28 @@ def test_named_columns_are_found_by_their_names(mark, tmp_path):
     assert radii == pytest.approx(RADII, abs=1e-9)
 
 
+def test_what_a_measuring_machine_writes_above_the_names_is_left_out(tmp_path):
+    """But no row of numbers. Faults caught: a second line above the header that ends the reading, rows that are left
+    out with it."""
+    rows = [f"{a:.1f};{r:.9f}" for a, r in zip(ANGLES, RADII, strict=True)]
+    above = ["Prisma 5", "Auftrag 17;4.5.2026", "Pruefer;A. B.;;"]
+    (path := tmp_path / "cam.csv").write_text("\n".join([*above, "angle_deg;radius_mm", *rows]))
+    assert read_polar(path, "cam")[1] == pytest.approx(RADII, abs=1e-9)
+    path.write_text("\n".join([rows[0], "angle_deg;radius_mm", *rows[1:]]))
+    with pytest.raises(HdoptError, match="line 2: 'angle_deg;radius_mm'; each line must hold two numbers"):
+        read_polar(path, "cam")
+
+
+def test_a_turn_in_radians_is_told_from_a_gap():
+    """Faults caught: no word of it, or that word of degrees with a gap."""
+    turn = np.radians(np.radians(ANGLES))
+    with pytest.raises(HdoptError, match="gaps of up to 30 deg are allowed; these look like angles in rad, give them"):
+        MeasuredProfile(turn, RADII)
+    half = ANGLES < 180
+    with pytest.raises(HdoptError, match="are allowed$"):
+        MeasuredProfile(np.radians(ANGLES[half]), RADII[half])
+
+
 @pytest.mark.parametrize("reversed_", [False, True])
 def test_a_last_point_that_closes_the_turn_is_left_out(reversed_, tmp_path):
     rows = [*ROWS, ROWS[0].replace("0.0,", "360.0,", 1)]
