@@ -149,10 +149,9 @@ def result_lines(result: SearchResult) -> Iterator[str]:
         state = "" if design.feasible else f"  breaks {'; '.join(design.broken_limits) or 'a limit'}"
         yield f"    {design.name:28s} {design.quantities[result.objective]:9.4f}{state}"
     for front in result.fronts:
-        yield (
-            f"  front of {front.objective} and {front.second}: {counted(len(front.designs), 'design')}, "
-            f"hypervolume {front.hypervolume:.4g}"
-        )
+        found = f"{counted(len(front.designs), 'design')}, hypervolume {front.hypervolume:.4g}"
+        kept = found if front.designs else "empty, as no design was found that meets all limits"
+        yield f"  front of {front.objective} and {front.second}: {kept}"
     if gaps := break_evens(result):
         more = "a further" if result.setup.trade.structure_costs else "worth"
         yield f"  {best.structure} stays the choice until what it costs is {more} {', '.join(gaps)}"

@@ -40,10 +40,10 @@ def test_a_person_reads_what_the_limits_cost(capsys):
 
 def test_no_design_is_status_1(capsys):
     limits = "search.limits={peak_to_peak_arcmin={max=0.05}}"
-    status, out, _ = run(
-        capsys, "csf-25-80", *SMALL, "--no-fronts", "--set", limits, "--set", 'search.objective="width_mm"'
-    )
+    status, out, _ = run(capsys, "csf-25-80", *SMALL, "--set", limits, "--set", 'search.objective="width_mm"')
     assert status == 1
+    assert "flank_pressure_mpa: empty, as no design was found that meets all limits" in out
+    assert "hypervolume" not in out
     assert "no design meets all limits" in out
     assert "Peak-to-peak at most 0.05 arcmin" in out
 
