@@ -5,7 +5,8 @@ cycles (Heydemann, Applied Optics 20 (1981) 3382). With L lines a turn the order
 by N), or L/N and 2 L/N of the output encoder, whose phase follows the angle that it reads itself: with thousands of
 lines an arcmin of kinematic error or drift moves it by a radian. Of a whole ratio N, L lines of the input and N L of
 the output stand at the same orders. Units: arcmin at the output; lines a whole number.
-Prior: 8 to 20000 lines; fewer than 17 are rare (two to eight poles of a resolver).
+Prior: 3 to 20000 lines; fewer than 17 are rare (pole pairs of a resolver, of which two and one stand at the drive's own
+orders), and fewer than 8 are looked for with their double alone.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from hdopt.effects.tooth_mesh import ToothMesh, mesh_order
 
 LOWEST_ORDER = 8.0
 LOWEST_PAIR = 3.0
-"""Lowest order of an output encoder's lines where both L and 2 L show: one line alone could be anything."""
+"""Lowest order of lines of which both L and 2 L are there: one line alone could be anything."""
 MODULATION_PER_OUTPUT_TURN, SIDEBAND_REACH = 3.5, 12.0
 """Orders that the teeth own: within so many 1/N of a whole sideband, up to so far from the mesh order."""
 MESH_MULTIPLES = (1, 2, 3)
@@ -101,7 +102,7 @@ def lines_of_the_other(lines: int, ratio: float, output: bool) -> int:
     """
     other = lines / ratio if output else lines * ratio
     whole = round(other)
-    return whole if whole >= LOWEST_ORDER and abs(other - whole) < WHOLE * other else 0
+    return whole if whole >= LOWEST_PAIR and abs(other - whole) < WHOLE * other else 0
 
 
 class EncoderInterpolation(Effect):
@@ -117,7 +118,7 @@ class EncoderInterpolation(Effect):
     bench_part = "an encoder"
     declared = (
         Category("shaft", Shaft, "the shaft whose encoder it is"),
-        Quantity("lines", "1", "lines a turn", "L", (8, 20_000), at_least=1, at_most=1_000_000, whole=True),
+        Quantity("lines", "1", "lines a turn", "L", (3, 20_000), at_least=1, at_most=1_000_000, whole=True),
         SINES,
     )
     examples = (
@@ -158,7 +159,7 @@ class EncoderInterpolation(Effect):
         # Rows that are no averages hold every cycle up to half their number.
         finest = highest if samples.are_averages else 0.5 * samples.rows_per_turn * (1 + 1e-6)
         per = samples.ratio if output else 1.0
-        lowest = max(probe.order_range[0], LOWEST_PAIR if output else LOWEST_ORDER)
+        lowest = max(probe.order_range[0], LOWEST_PAIR)
         lines = np.arange(np.ceil(lowest * per), np.floor(highest * per) + 1)
         if output:
             if samples.span_turns < LEAST_OUTPUT_TURNS * samples.ratio:

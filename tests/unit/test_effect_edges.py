@@ -290,6 +290,24 @@ def test_a_mesh_is_no_encoder_of_as_many_lines(waves, offered):
     assert (float(waves) in orders) is offered
 
 
+@pytest.mark.parametrize(("poles", "lines", "cycles"), [(2, None, 2), (3, 3, 2), (5, 5, 2), (8, 8, 2), (9, 9, 1)])
+def test_pole_pairs_of_a_resolver_are_lines_of_few(poles, lines, cycles):
+    """A wave of each pole pair and, of fewer than eight, with its double: one such wave alone could be anything's.
+    Faults caught: a resolver at the input that is not looked for, which was named waves of the teeth; one pole pair
+    less than a wave generator's own two ends; and low waves that are called lines without a double."""
+    theta = np.arange(60 * 100) * TURN / 100
+    table = pd.DataFrame({"input_angle_deg": np.degrees(theta), "output_angle_deg": np.degrees(theta / RATIO)})
+    rows = gather([recording_from_table(table, RATIO, name="one")])
+    rows = replace(rows, error=0.1 * np.sin(poles * theta) + (0.05 * np.sin(2 * poles * theta) if cycles > 1 else 0.0))
+    bare = evaluate(FitProblem(rows, None, np.ones((len(rows), 1)), Noise.white(rows, 0.01)), [], np.zeros(1), (), ())
+    found = EFFECTS["encoder_interpolation"].search(FitProbe(bare))
+    of_input = [term.shape for term in found if term.shape["shaft"] == Shaft.INPUT]
+    assert any(shape["lines"] == poles for shape in of_input) is (lines is not None)
+    assert all(len(shape["cycles"]) > 1 for shape in of_input if shape["lines"] < 8)
+    if lines:
+        assert all(term.odds < 0 for term in found if term.shape["lines"] == lines)
+
+
 def test_the_teeth_own_orders_about_the_mesh():
     """102 for N = 50 and its sidebands, up to 12 off, each 3.5 fiftieths wide."""
     orders = np.array([102.0, 102.06, 102.08, 110.0, 113.95, 114.05, 90.05, 89.95, 50.0])

@@ -387,7 +387,7 @@ def test_an_encoder_whose_second_cycle_stands_at_the_mesh_is_doubtful():
     [
         (9, Shaft.INPUT, 80.0, 720),
         (720, Shaft.OUTPUT, 80.0, 9),
-        (560, Shaft.OUTPUT, 80.0, 0),
+        (160, Shaft.OUTPUT, 80.0, 0),
         (500, Shaft.OUTPUT, 80.0, 0),
         (9, Shaft.INPUT, 79.95, 0),
     ],
