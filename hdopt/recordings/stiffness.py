@@ -7,6 +7,7 @@ T1 and T2, hysteresis loss the width of the loop at zero torque.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,8 +53,8 @@ def torsion_of(recording: Recording) -> Torsion | None:
         order = rows[np.argsort(torque[rows])]
         curve = np.interp(grid, torque[order], recording.error_arcmin[order], left=np.nan, right=np.nan)
         branches[float(passes.direction[rows[0]])].append(curve)
-    means = [np.nanmean(np.vstack(curves), axis=0) for curves in branches.values() if curves]
-    both = np.nanmean(np.vstack(means), axis=0)
+    means = [mean_where_known(curves) for curves in branches.values() if curves]
+    both = mean_where_known(means)
     seen = np.isfinite(both)
     loss = None
     if len(means) == 2 and grid[0] < 0 < grid[-1]:
@@ -63,6 +64,13 @@ def torsion_of(recording: Recording) -> Torsion | None:
     one = neighbour_noise(recording.error_arcmin) ** 2 + (recording.quantum_arcmin * OF_ROUNDING) ** 2
     sigma = math.sqrt(sum(one / max(len(curves), 1) for curves in branches.values()) + 2 * recording.sensor_arcmin**2)
     return Torsion(stiffness, knees, loss, sigma, left, grid[seen], both[seen])
+
+
+def mean_where_known(curves: Sequence[Array]) -> Array:
+    """The mean of the `curves`, (n,) each, at each place over those that are known there; nan where none is."""
+    known = np.isfinite(curves)
+    total, count = np.where(known, curves, 0.0).sum(axis=0), known.sum(axis=0)
+    return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
 
 
 def _hinges(torque: Array, first: float, second: float) -> Array:

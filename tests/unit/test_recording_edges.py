@@ -26,7 +26,7 @@ from hdopt.recordings.repairs import (
     unwrap_counter,
 )
 from hdopt.recordings.rows import gather
-from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
+from hdopt.recordings.stiffness import mean_where_known, starting_torque_nm, torsion_of
 from hdopt.recordings.table import Channel, Table
 
 TURN, RATIO, ROWS = 2 * np.pi, 80.0, 1000
@@ -275,6 +275,13 @@ def test_a_drive_is_at_rest_for_twenty_rows_and_a_hundredth_of_the_record(rows, 
     torque = np.r_[np.linspace(0.0, 4.0, rest), np.full(rows - rest, 1.0)]
     found = starting_torque_nm(recording(np.zeros(rows), theta, torque=torque))
     assert found == (pytest.approx(4.0) if told else None)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_place_that_no_sweep_reaches_has_no_mean_and_no_warning():
+    """`hdopt inspect` said `RuntimeWarning: Mean of empty slice` where sweeps end apart."""
+    curves = [np.array([1.0, 2.0, np.nan, np.nan]), np.array([np.nan, 4.0, 5.0, np.nan])]
+    np.testing.assert_array_equal(mean_where_known(curves), [1.0, 3.0, 5.0, np.nan])
 
 
 @pytest.mark.parametrize("knees", [(0.29, 0.61), (0.07, 0.15), (0.52, 0.93), (0.88, 0.95)])
