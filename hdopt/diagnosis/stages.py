@@ -23,6 +23,7 @@ from hdopt.diagnosis.inference.common_slope import TakenSlope, common_slope, inp
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.generic_basis import generic_columns
 from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.inference.normal_equations import least_squares
 from hdopt.diagnosis.inference.nuisance import nuisances_for, with_time_warp
 from hdopt.diagnosis.inference.residual_noise import measure_noise
 from hdopt.diagnosis.inference.settled_shapes import settled
@@ -85,7 +86,7 @@ def first_fit(
     if taken is not None:
         ruled_out = (*ruled_out, SCALE)
     problem = FitProblem(rows, base, nuisances.columns(rows), Noise.white(rows), settings=settings)
-    offsets = problem.nuisance @ np.linalg.lstsq(problem.nuisance, rows.error, rcond=None)[0]
+    offsets = problem.nuisance @ least_squares(problem.nuisance, rows.error)
     size = float(np.std(rows.error - offsets))
     sigma = max(settings.noise.first_share * size, settings.noise.smallest_arcmin)
     widened = max(1.0, size / settings.base.prior_arcmin)
@@ -320,7 +321,7 @@ def guessed(guess: Guess, problem: FitProblem) -> Fit:
     bare = evaluate(problem, guess.errors, np.zeros(problem.nuisance.shape[1]), (), ())
     terms = [problem.explanations[effect].term(problem.rows, shape, bare.motion) for effect, shape in guess.terms]
     fit = evaluate(problem, guess.errors, bare.offsets, terms, guess.coefficients)
-    offsets = bare.offsets + np.linalg.lstsq(problem.nuisance, fit.residual, rcond=None)[0]
+    offsets = bare.offsets + least_squares(problem.nuisance, fit.residual)
     return evaluate(problem, guess.errors, offsets, terms, guess.coefficients)
 
 

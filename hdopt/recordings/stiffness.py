@@ -70,7 +70,7 @@ def mean_where_known(curves: Sequence[Array]) -> Array:
     """The mean of the `curves`, (n,) each, at each place over those that are known there; nan where none is."""
     known = np.isfinite(curves)
     total, count = np.where(known, curves, 0.0).sum(axis=0), known.sum(axis=0)
-    return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+    return np.asarray(np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0), np.float64)
 
 
 def _hinges(torque: Array, first: float, second: float) -> Array:

@@ -7,10 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+import scipy.ndimage
 import scipy.signal
 
 from hdopt.diagnosis import diagnose, pipeline
-from hdopt.diagnosis.inference.input_steps import beyond_smooth, regression, smoothed, without_input_steps
+from hdopt.diagnosis.inference.input_steps import (
+    beyond_smooth,
+    hold_throughout,
+    regression,
+    smoothed,
+    without_input_steps,
+)
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.drive.geometry import ARCMIN
 from hdopt.kinematics.waveform import kinematic_error_arcmin
@@ -149,6 +156,15 @@ def test_a_diagnosis_sees_recordings_without_the_steps_of_their_input(monkeypatc
         pipeline.gather_evidence([recording], None, 1, DEFAULT)
     (seen,) = seen.value.args
     assert line(seen, 32) < 0.2 * line(recording, 32)
+
+
+@pytest.mark.parametrize("window", [1, 3, 21, 31])
+def test_a_window_holds_where_each_of_it_does(window):
+    """As a running minimum, cut off at both ends. Faults caught: a window one short on either side, or beyond an end
+    of 30 rows."""
+    flags = np.random.default_rng(window).random(30) > 0.1
+    expected = scipy.ndimage.minimum_filter1d(flags.astype(np.int8), window) > 0
+    np.testing.assert_array_equal(hold_throughout(flags, window), expected)
 
 
 @pytest.mark.slow

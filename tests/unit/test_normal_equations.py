@@ -7,6 +7,7 @@ from hdopt.diagnosis.inference.normal_equations import (
     GroupedColumns,
     bordered,
     gains_of_subsets,
+    least_squares,
     orthonormal,
     solved,
     sums_of_groups,
@@ -18,6 +19,15 @@ from hdopt.diagnosis.numerical import SMALL_RIDGE
 def columns():
     table = np.random.default_rng(3).normal(size=(40, 9))
     return table / np.linalg.norm(table, axis=0)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_least_squares_are_those_of_the_library(columns, count):
+    """Of one column too, which is worked out by itself; one of zeros takes nothing."""
+    values = np.arange(40.0)
+    expected = np.linalg.lstsq(5 * columns[:, :count], values, rcond=None)[0]
+    assert least_squares(5 * columns[:, :count], values) == pytest.approx(expected, rel=1e-12)
+    assert least_squares(np.zeros((40, count)), values) == pytest.approx(np.zeros(count))
 
 
 def test_a_system_is_solved(columns):

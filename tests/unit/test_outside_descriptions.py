@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scipy.ndimage
 from test_effect_physics import RATE, RATIO, TURN, moving
 from test_windup_curves import fit_of
 
@@ -15,7 +16,7 @@ from hdopt.diagnosis.inference.base_excitation import motion_of
 from hdopt.diagnosis.inference.change_points import find_steps
 from hdopt.diagnosis.inference.fit import refine
 from hdopt.diagnosis.inference.generic_basis import generic_columns
-from hdopt.diagnosis.inference.nonphysical_alternatives import alternatives, strongest_frequencies
+from hdopt.diagnosis.inference.nonphysical_alternatives import alternatives, smoothed, strongest_frequencies
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.drive.geometry import ARCMIN
@@ -64,6 +65,15 @@ SIGNALS = {
 def test_every_description_but_that_of_the_drive_is_asked():
     """A contact that varies follows the drive's own motion, mains want faster rows: both have tests of their own."""
     assert set(SIGNALS) | {"_varying_contact", "_mains"} == set(ONES)
+
+
+@pytest.mark.parametrize("reach", [1, 9, 40])
+def test_a_bump_is_looked_for_by_the_sums_of_all_neighbours(reach):
+    """As the library has them that goes through each, also where the kernel is longer than the record."""
+    values = np.random.default_rng(reach).normal(size=50)
+    kernel = np.exp(-((np.arange(-reach, reach + 1) / reach) ** 2))
+    expected = scipy.ndimage.convolve1d(values, kernel, mode="constant")
+    np.testing.assert_allclose(smoothed(values, kernel), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(

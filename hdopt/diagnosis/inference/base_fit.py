@@ -14,6 +14,7 @@ import numpy as np
 
 from hdopt.arrays import Array, Mask
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.normal_equations import least_squares
 from hdopt.diagnosis.numerical import HALF, NORMAL_95, SMALLEST_POWER
 from hdopt.diagnosis.settings import DEFAULT, BaseSettings
 from hdopt.drive.errors import ERROR_NAMES, DriveErrors
@@ -100,7 +101,7 @@ def thinned(term: Term, mask: Mask) -> Term:
 
 def _solve_offsets(fit: Fit) -> Fit:
     nuisance = fit.problem.nuisance
-    offsets = fit.offsets + np.linalg.lstsq(nuisance, fit.residual, rcond=None)[0]
+    offsets = fit.offsets + least_squares(nuisance, fit.residual)
     return evaluate(fit.problem, fit.errors, offsets, fit.terms, fit.coefficients)
 
 

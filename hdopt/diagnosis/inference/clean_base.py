@@ -17,6 +17,7 @@ from hdopt.arrays import Array
 from hdopt.diagnosis.inference.base_fit import fit_base
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
 from hdopt.diagnosis.inference.generic_basis import generic_columns
+from hdopt.diagnosis.inference.normal_equations import least_squares
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Term
 from hdopt.parallel.shared_memory import each
@@ -66,7 +67,7 @@ def _without_smooth_columns(fit: Fit, problem: FitProblem, terms: Sequence[Term]
     """The drive of `fit` on `problem`, and `terms` with their `coefficients`, with the offsets that these want."""
     free = fit.offsets[: problem.nuisance.shape[1]]
     bare = evaluate(problem, fit.errors, free, terms, coefficients)
-    offset = np.linalg.lstsq(problem.nuisance, bare.residual, rcond=None)[0]
+    offset = least_squares(problem.nuisance, bare.residual)
     return evaluate(problem, fit.errors, bare.offsets + offset, terms, coefficients)
 
 

@@ -163,7 +163,7 @@ class Fit:
         ahead = np.zeros(len(self.problem.rows)) if self.ahead is None else self.ahead
         step = self.problem.settings.fit.reading_step_rad
         behind, before = (
-            _base_value(self.problem, self.errors, self.terms, self.coefficients, ahead + side)[0]
+            _base_value(self.problem.where_it_stood(ahead + side), self.errors, self.terms, self.coefficients)[0]
             for side in (step, -step)
         )
         slope: Array = (before - behind) / (2 * step)
@@ -366,8 +366,11 @@ def evaluate(
     """
     rows = problem.rows
     ahead = read_ahead(rows, terms, coefficients)
+    angles = None
     if problem.base is not None:
-        base_value, zone, jacobian = _base_value(problem, errors, terms, coefficients, ahead)
+        stood = problem.where_it_stood(ahead)
+        angles = stood.met_angles(errors) if any(term.met is not None for term in terms) else None
+        base_value, zone, jacobian = _base_value(stood, errors, terms, coefficients, angles)
     else:
         base_value, zone, jacobian = (
             np.zeros(len(rows)),
@@ -384,25 +387,35 @@ def evaluate(
     if problem.base is not None:
         objective += problem.noise.sigma**2 * float(np.sum((errors / problem.prior) ** 2))
     own = tuple(coefficients)
-    return Fit(problem, errors, offsets, tuple(terms), own, base_value, zone, prediction, objective, jacobian, ahead)
+    fit = Fit(problem, errors, offsets, tuple(terms), own, base_value, zone, prediction, objective, jacobian, ahead)
+    if angles is not None:
+        fit.__dict__["met_angles"] = angles  # The cached property, worked out already.
+    return fit
 
 
 def _base_value(
-    problem: FitProblem, errors: Array, terms: Sequence[Term], coefficients: Sequence[Array], ahead: Array | None
+    stood: FitProblem,
+    errors: Array,
+    terms: Sequence[Term],
+    coefficients: Sequence[Array],
+    angles: Array | None = None,
 ) -> Evaluated:
-    """The base of `problem`, which it must have, with these `errors` and what `terms` add in its zones, where the input
-    angle was read `ahead` (n,) of where the drive stood, rad (None: nowhere)."""
-    assert problem.base is not None
-    stood = problem.where_it_stood(ahead)
-    extra, rises = _in_zones(stood, errors, terms, coefficients)
-    return problem.base.evaluate_at(stood.rotation, errors, extra, rises)
+    """The base of `stood`, which it must have, at the angles at which the drive stood, with these `errors` and what
+    `terms` add in its zones; `angles` as its `met_angles` (None: not worked out yet)."""
+    assert stood.base is not None
+    extra, rises = _in_zones(stood, errors, terms, coefficients, angles)
+    return stood.base.evaluate_at(stood.rotation, errors, extra, rises)
 
 
 def _in_zones(
-    problem: FitProblem, errors: Array, terms: Sequence[Term], coefficients: Sequence[Array]
+    problem: FitProblem,
+    errors: Array,
+    terms: Sequence[Term],
+    coefficients: Sequence[Array],
+    angles: Array | None = None,
 ) -> tuple[Array | None, Array | None]:
     """What `terms` add to the deviation of both zones, mm of arc, (2, n), and its slopes over the angles at which the
-    splines are met, mm/rad, (2, 2, n); None where nothing does."""
+    splines are met, mm/rad, (2, 2, n); None where nothing does. `angles` are those of `problem` (None: not known)."""
     extra: Array | None = None
     rises: Array | None = None
     on_splines = []
@@ -412,7 +425,7 @@ def _in_zones(
         elif term.zones is not None:
             extra = term.zones @ c if extra is None else extra + term.zones @ c
     if on_splines:
-        added, rises = sum_of(on_splines, problem.met_angles(errors))
+        added, rises = sum_of(on_splines, problem.met_angles(errors) if angles is None else angles)
         extra = added if extra is None else extra + added
     return extra, rises
 

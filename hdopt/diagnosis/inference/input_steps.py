@@ -15,9 +15,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import convolve1d, minimum_filter1d
 
-from hdopt.arrays import Array
+from hdopt.arrays import Array, Mask
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.settings import EncoderStepSettings
 from hdopt.drive.geometry import ARCMIN
@@ -68,10 +67,18 @@ def beyond_smooth(angle: Array, error: Array, settings: EncoderStepSettings) -> 
         if len(angle) < window:
             break
         off = angle - smoothed(angle, window, settings.smooth_degree)
-        smooth = minimum_filter1d((np.abs(off) < settings.farthest_off).astype(np.int8), window) > 0
+        smooth = hold_throughout(np.abs(off) < settings.farthest_off, window)
         beyond = np.where(smooth, off, beyond)
         of_error = np.where(smooth, error - smoothed(error, window, settings.smooth_degree), of_error)
     return beyond, of_error
+
+
+def hold_throughout(flags: Mask, window: int) -> Mask:
+    """Whether all of the `window` of `flags` (n,) about each hold, an odd number, as far as there are so many, (n,)."""
+    half, place = window // 2, np.arange(len(flags))
+    missed = np.r_[0, np.cumsum(~flags)]
+    from_here, to_there = np.maximum(place - half, 0), np.minimum(place + half + 1, len(flags))
+    return np.asarray(missed[to_there] == missed[from_here])
 
 
 def regression(error: Array, added: Array) -> tuple[float, float]:
@@ -92,6 +99,6 @@ def smoothed(values: Array, window: int, degree: int) -> Array:
     powers = np.vander(np.linspace(-1.0, 1.0, window), degree + 1)
     fitted = powers @ np.linalg.pinv(powers)
     half = window // 2
-    found = convolve1d(values, fitted[half])
+    found = np.convolve(values, fitted[half], "same")
     found[:half], found[-half:] = fitted[:half] @ values[:window], fitted[-half:] @ values[-window:]
     return np.asarray(found)

@@ -280,7 +280,7 @@ class Bump(Event):
                 continue
             reach = int(s.bump_reach * width) + 1
             kernel = np.exp(-((np.arange(-reach, reach + 1) / width) ** 2) / 2)
-            score = np.abs(_smoothed(probe.residual, kernel))
+            score = np.abs(smoothed(probe.residual, kernel))
             shapes.append({"row": float(np.argmax(score)), "width": float(width)})
         return best_terms(probe, [self.term(samples, shape) for shape in shapes])
 
@@ -300,7 +300,7 @@ class Bump(Event):
         )
 
 
-def _smoothed(values: Array, kernel: Array) -> Array:
+def smoothed(values: Array, kernel: Array) -> Array:
     """The sum of the neighbours of each of `values` (n,) weighed by a symmetric `kernel` of odd length, nothing beyond
     the ends, (n,): as `scipy.ndimage.convolve1d`, which goes through all neighbours of each.
     """

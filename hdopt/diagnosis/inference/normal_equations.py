@@ -29,6 +29,16 @@ def solved(matrix: Array, moment: Array) -> Array:
     return np.asarray(np.linalg.solve(matrix, moment) if failed else solution, np.float64)
 
 
+def least_squares(columns: Array, values: Array) -> Array:
+    """The coefficients (q,) of `columns` (n, q) that leave least of `values` (n,), of least size where that leaves them
+    open: as `numpy.linalg.lstsq`, which takes singular values of a single column too.
+    """
+    if columns.shape[1] != 1:
+        return np.asarray(np.linalg.lstsq(columns, values, rcond=None)[0], np.float64)
+    power = float(columns[:, 0] @ columns[:, 0])
+    return np.array([float(columns[:, 0] @ values) / power if power > 0 else 0.0])
+
+
 def orthonormal(columns: Array) -> Array:
     """An orthonormal basis (n, r) of what the `columns` (n, q), of like size, span beyond rounding: by Cholesky's
     factors of their inner products, taken twice (Yamamoto et al., ETNA 44, 2015: as orthogonal as Householder's), and
