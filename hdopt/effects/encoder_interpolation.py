@@ -52,6 +52,8 @@ HARMONICS_OF_TEETH = 40
 """Waves round the splines, h and h (1 + 1/N) up to so many, and the mesh order are the teeth's."""
 OTHER = "lines_of_the_other"
 """Key of a term's shape: the lines of the other shaft's encoder at the same orders, 0 where it has none."""
+LOW = "of_low_order"
+"""Key of the shape of lines below the lowest order at which one alone is taken for an encoder's."""
 FEW_LINES, FEW_LINES_ODDS = 17, -8.0
 """Below so many lines a turn bolts and teeth are likelier than an encoder; log odds."""
 SINES = Sines(
@@ -143,10 +145,11 @@ class EncoderInterpolation(Effect):
 
     def every_part_shows(self, term: Term, estimate: FitEstimate) -> bool:
         """Whether the line itself is there beside its multiples: two cycles a line without the first are any other
-        line's, and of a low one any wave's.
+        line's, and of a low one any wave's. Of a line of low order its double must be there too.
         """
         power = estimate.values[0 : term.width : 2] ** 2 + estimate.values[1 : term.width : 2] ** 2
-        return bool(power[0] >= SHOWS * power.max())
+        both = power[1] if term.shape.get(LOW) else power[0]
+        return bool(min(power[0], both) >= SHOWS * power.max())
 
     def search(self, probe: Probe) -> Sequence[Term]:
         found = [term for shaft in Shaft for term in self._of_shaft(probe, shaft)]
@@ -184,6 +187,8 @@ class EncoderInterpolation(Effect):
         doubtful = is_of_teeth(order, shape["cycles"], conditions.ratio, output)
         beside = (ToothMesh.id,) if is_where_the_mesh_reaches(order, shape["cycles"], conditions.ratio) else ()
         other = {OTHER: lines_of_the_other(int(shape["lines"]), conditions.ratio, output)}
+        if order < LOWEST_ORDER and len(shape["cycles"]) > 1:
+            other |= {LOW: 1}
         return Term(
             self.id,
             dict(shape) | other,

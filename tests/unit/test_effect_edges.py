@@ -308,6 +308,17 @@ def test_pole_pairs_of_a_resolver_are_lines_of_few(poles, lines, cycles):
         assert all(term.odds < 0 for term in found if term.shape["lines"] == lines)
 
 
+@pytest.mark.parametrize(("shaft", "lines", "low"), [(Shaft.INPUT, 6, True), (Shaft.INPUT, 8, False)])
+@pytest.mark.parametrize("double", [0.2, 0.05])
+def test_a_low_line_is_an_encoders_where_its_double_shows(shaft, lines, low, double):
+    """A sine of order 6 was `unknown`, since six lines with a double of a twenty-fifth took up the drive's misfit too:
+    named lobes before. Faults caught: a double that need not show, and one that a higher line needs."""
+    effect = EFFECTS["encoder_interpolation"]
+    term = effect.term(moving(), {"lines": lines, "shaft": shaft, "cycles": (1, 2)})
+    shows = effect.every_part_shows(term, FitEstimate(np.array([1.0, 0.0, 0.0, double]), np.eye(4)))
+    assert shows is (double > 0.1 or not low)
+
+
 def test_the_teeth_own_orders_about_the_mesh():
     """102 for N = 50 and its sidebands, up to 12 off, each 3.5 fiftieths wide."""
     orders = np.array([102.0, 102.06, 102.08, 110.0, 113.95, 114.05, 90.05, 89.95, 50.0])
