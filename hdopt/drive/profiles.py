@@ -403,7 +403,7 @@ def _above_names(lines: list[tuple[int, str, list[str]]]) -> int:
     """How many of the `lines` of a table (number, text, cells) stand above a header with both names and hold words, as
     what a measuring machine writes there; 0 where there is no such header, or numbers are above it."""
     at = next((i for i, (_, _, cells) in enumerate(lines) if set(POLAR) <= set(cells)), 0)
-    return 0 if any(not are_names([cell]) for _, _, cells in lines[:at] for cell in cells[:1]) else at
+    return at if all(are_names(cells[:1]) for _, _, cells in lines[:at]) else 0
 
 
 def _named(names: list[str], where: str) -> list[str]:

@@ -186,12 +186,12 @@ class EncoderInterpolation(Effect):
         order = shape["lines"] / (conditions.ratio if output else 1.0)
         doubtful = is_of_teeth(order, shape["cycles"], conditions.ratio, output)
         beside = (ToothMesh.id,) if is_where_the_mesh_reaches(order, shape["cycles"], conditions.ratio) else ()
-        other = {OTHER: lines_of_the_other(int(shape["lines"]), conditions.ratio, output)}
+        known = {OTHER: lines_of_the_other(int(shape["lines"]), conditions.ratio, output)}
         if order < LOWEST_ORDER and len(shape["cycles"]) > 1:
-            other |= {LOW: 1}
+            known[LOW] = True
         return Term(
             self.id,
-            dict(shape) | other,
+            dict(shape) | known,
             columns=columns,
             trials=trials,
             odds=odds,

@@ -308,11 +308,15 @@ def test_pole_pairs_of_a_resolver_are_lines_of_few(poles, lines, cycles):
         assert all(term.odds < 0 for term in found if term.shape["lines"] == lines)
 
 
-@pytest.mark.parametrize(("shaft", "lines", "low"), [(Shaft.INPUT, 6, True), (Shaft.INPUT, 8, False)])
+@pytest.mark.parametrize(
+    ("shaft", "lines", "low"),
+    [(Shaft.INPUT, 6, True), (Shaft.INPUT, 8, False), (Shaft.OUTPUT, 300, True), (Shaft.OUTPUT, 400, False)],
+)
 @pytest.mark.parametrize("double", [0.2, 0.05])
 def test_a_low_line_is_an_encoders_where_its_double_shows(shaft, lines, low, double):
     """A sine of order 6 was `unknown`, since six lines with a double of a twenty-fifth took up the drive's misfit too:
-    named lobes before. Faults caught: a double that need not show, and one that a higher line needs."""
+    named lobes before. Faults caught: a double that need not show, one that a higher line needs, and
+    an output encoder's lines counted by its own turn."""
     effect = EFFECTS["encoder_interpolation"]
     term = effect.term(moving(), {"lines": lines, "shaft": shaft, "cycles": (1, 2)})
     shows = effect.every_part_shows(term, FitEstimate(np.array([1.0, 0.0, 0.0, double]), np.eye(4)))

@@ -163,7 +163,7 @@ class Fit:
         ahead = np.zeros(len(self.problem.rows)) if self.ahead is None else self.ahead
         step = self.problem.settings.fit.reading_step_rad
         behind, before = (
-            _base_value(self.problem.where_it_stood(ahead + side), self.errors, self.terms, self.coefficients)[0]
+            _base_value(self.problem, self.errors, self.terms, self.coefficients, ahead + side)[0][0]
             for side in (step, -step)
         )
         slope: Array = (before - behind) / (2 * step)
@@ -368,9 +368,7 @@ def evaluate(
     ahead = read_ahead(rows, terms, coefficients)
     angles = None
     if problem.base is not None:
-        stood = problem.where_it_stood(ahead)
-        angles = stood.met_angles(errors) if any(term.met is not None for term in terms) else None
-        base_value, zone, jacobian = _base_value(stood, errors, terms, coefficients, angles)
+        (base_value, zone, jacobian), angles = _base_value(problem, errors, terms, coefficients, ahead)
     else:
         base_value, zone, jacobian = (
             np.zeros(len(rows)),
@@ -394,28 +392,23 @@ def evaluate(
 
 
 def _base_value(
-    stood: FitProblem,
-    errors: Array,
-    terms: Sequence[Term],
-    coefficients: Sequence[Array],
-    angles: Array | None = None,
-) -> Evaluated:
-    """The base of `stood`, which it must have, at the angles at which the drive stood, with these `errors` and what
-    `terms` add in its zones; `angles` as its `met_angles` (None: not worked out yet)."""
-    assert stood.base is not None
-    extra, rises = _in_zones(stood, errors, terms, coefficients, angles)
-    return stood.base.evaluate_at(stood.rotation, errors, extra, rises)
+    problem: FitProblem, errors: Array, terms: Sequence[Term], coefficients: Sequence[Array], ahead: Array | None
+) -> tuple[Evaluated, Array | None]:
+    """The base of `problem`, which it must have, with these `errors` and what `terms` add in its zones, where the input
+    angle was read `ahead` (n,) of where the drive stood, rad (None: nowhere); and the angles at which the splines are
+    met there, rad, (2, 2, n), None where no term stands on one."""
+    assert problem.base is not None
+    stood = problem.where_it_stood(ahead)
+    angles = stood.met_angles(errors) if any(term.met is not None for term in terms) else None
+    extra, rises = _in_zones(angles, terms, coefficients)
+    return problem.base.evaluate_at(stood.rotation, errors, extra, rises), angles
 
 
 def _in_zones(
-    problem: FitProblem,
-    errors: Array,
-    terms: Sequence[Term],
-    coefficients: Sequence[Array],
-    angles: Array | None = None,
+    angles: Array | None, terms: Sequence[Term], coefficients: Sequence[Array]
 ) -> tuple[Array | None, Array | None]:
-    """What `terms` add to the deviation of both zones, mm of arc, (2, n), and its slopes over the angles at which the
-    splines are met, mm/rad, (2, 2, n); None where nothing does. `angles` are those of `problem` (None: not known)."""
+    """What `terms` add to the deviation of both zones, mm of arc, (2, n), and its slopes over the `angles` at which the
+    splines are met, mm/rad, (2, 2, n); None where nothing does."""
     extra: Array | None = None
     rises: Array | None = None
     on_splines = []
@@ -424,8 +417,8 @@ def _in_zones(
             on_splines.append((term.met, c))
         elif term.zones is not None:
             extra = term.zones @ c if extra is None else extra + term.zones @ c
-    if on_splines:
-        added, rises = sum_of(on_splines, problem.met_angles(errors) if angles is None else angles)
+    if angles is not None:
+        added, rises = sum_of(on_splines, angles)
         extra = added if extra is None else extra + added
     return extra, rises
 
