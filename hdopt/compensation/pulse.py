@@ -16,7 +16,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.compensation.teeth import CELLS, Teeth
 from hdopt.effects.met import Spline, off_centre
-from hdopt.kinematics.cartesian import CartesianModel
+from hdopt.kinematics.cartesian import CartesianModel, rotation_of
 
 PLACES, TIMES = 96, 3
 """Output angles at which the place of a tooth is looked up, and how often, as it depends on itself."""
@@ -76,8 +76,7 @@ class Damage:
             place = np.full(PLACES, self.centre - math.pi * zone)
             for _ in range(TIMES):
                 turned = np.stack([place - j * b, place - j * b + b])
-                rotation = np.concatenate([[np.cos(t), np.sin(t)] for t in turned])
-                place = self.centre - math.pi * zone - model.beyond_at(rotation, errors)[self.spline, zone]
+                place = self.centre - math.pi * zone - model.beyond_at(rotation_of(turned), errors)[self.spline, zone]
             centre, cos, sin = (float(one) for one in np.linalg.lstsq(sways, place, rcond=None)[0])
             height = sense * self.height * model.arcmin_per_mm
             found.append(Pulse(zone, j, centre, cos, sin, self.half_width, height))

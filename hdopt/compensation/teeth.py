@@ -16,7 +16,7 @@ from hdopt.arrays import Array, Index
 from hdopt.compensation.pursuit import independent_share
 from hdopt.compensation.surface import DIMMEST
 from hdopt.effects.met import Spline, Waves, met_angles, met_at
-from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel
+from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel, rotation_of
 from hdopt.recordings.rows import Rows
 
 SHORTEST = 64
@@ -54,7 +54,7 @@ class Teeth:
     def added(self, turned: Array) -> Array:
         """What both zones meet, mm of arc, (2, n), where the input and the flexspline's teeth have `turned` (2, n),
         rad."""
-        return self.at_angles(met_at(turned, self.model.beyond_at(_rotation(turned), self.errors)))
+        return self.at_angles(met_at(turned, self.model.beyond_at(rotation_of(turned), self.errors)))
 
     def at_angles(self, angles: Array) -> Array:
         """What stands on the splines, mm of arc, (2, n), where the zones meet them at `angles` (2, 2, n), rad."""
@@ -63,7 +63,7 @@ class Teeth:
     def zones(self, turned: Array) -> Array:
         """What each zone would make if it drove alone, arcmin, (2, n), where the input and the flexspline's teeth have
         `turned` (2, n), rad; times `sense`."""
-        rotation, added = _rotation(turned), self.added(turned)
+        rotation, added = rotation_of(turned), self.added(turned)
         alone = [self.model.evaluate_at(rotation, self.errors, added - ALONE[1 - zone])[0] for zone in (0, 1)]
         return np.asarray(self.sense * np.stack(alone), float)
 
@@ -88,11 +88,6 @@ class Teeth:
 
 ALONE = 1e3 * np.eye(2)[:, :, None]
 """mm by which one zone is set back so that the other one drives."""
-
-
-def _rotation(turned: Array) -> Array:
-    """Cosine and sine of both rows of `turned` (2, n), rad, as `CartesianModel.rotation` has them, (4, n)."""
-    return np.concatenate([[np.cos(t), np.sin(t)] for t in turned])
 
 
 def _looked_up(table: Array, angle: Array) -> Array:

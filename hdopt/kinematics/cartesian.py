@@ -41,6 +41,12 @@ Evaluated: TypeAlias = tuple[Array, Index, Array]
 """KE (arcmin, n), the driving zone (0 or 1, n) and dKE/derrors (arcmin/mm, n x 12)."""
 
 
+def rotation_of(turned: Array) -> Array:
+    """cos and sin of both rows of `turned` (2, n), rad, how far the input and the flexspline's teeth
+    have turned; (4, n), for `CartesianModel.evaluate_at`."""
+    return np.concatenate([[np.cos(angle), np.sin(angle)] for angle in turned])
+
+
 def to_drive_errors(cartesian: Array, half_width: float) -> DriveErrors:
     """`DriveErrors` from `cartesian` errors (12,) in mm, in the order of `CARTESIAN_NAMES`; `half_width` is b/2 of the
     wave generator, mm."""
@@ -113,8 +119,8 @@ class CartesianModel:
 
     def rotation(self, theta: Array) -> Array:
         """cos and sin of the input angle (n,) rad, and of the FS teeth's advance: (4, n), for `evaluate_at`."""
-        advance = self.advance * np.asarray(theta, float)
-        return np.stack([np.cos(theta), np.sin(theta), np.cos(advance), np.sin(advance)])
+        turned = np.asarray(theta, float)
+        return rotation_of(np.stack([turned, self.advance * turned]))
 
     def evaluate(
         self, theta: Array, errors: Array, extra: Array | None = None, rises: Array | None = None
