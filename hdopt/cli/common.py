@@ -28,6 +28,10 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 
+TO_STANDARD_OUTPUT = ("json_file", "csv")
+"""Options that take '-' in place of a file."""
+
+
 class OutputFile(click.ParamType):  # type: ignore[type-arg]  # generic in newer Click only
     """A file that the command will write: checked before any work is done, refused where it is an input as well."""
 
@@ -37,6 +41,8 @@ class OutputFile(click.ParamType):  # type: ignore[type-arg]  # generic in newer
         path = Path(value)
         if str(value) != "-":
             claim_output(path)
+        elif param is not None and param.name not in TO_STANDARD_OUTPUT:
+            self.fail("only --json and --csv write to standard output; give the name of a file", param, ctx)
         return path
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:

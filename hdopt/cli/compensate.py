@@ -70,6 +70,8 @@ def command(
 
 
 def _lines(found: Compensated, output: Path) -> Iterator[str]:
+    from hdopt.compensation.applied import crossing_deg
+
     yield f"held out: {found.held_out}; method: {found.method}"
     yield (
         f"peak-to-peak on what the fit did not see: {found.before:.4g} arcmin without, {found.after:.4g} with; expect "
@@ -79,8 +81,9 @@ def _lines(found: Compensated, output: Path) -> Iterator[str]:
         one = found.ways[way]
         yield f"  {way}: {left:.4g} arcmin left, expect {one.expected:.4g} ({one.low:.4g} to {one.high:.4g})"
     if found.found.crossing.deg:
-        way = "play crosses" if found.found.crossing.straight else "the return error crosses"
-        yield f"  after a reversal {way} over about {found.found.crossing.deg:.2g} deg of output"
+        straight = found.found.crossing.straight
+        way = "play crosses" if straight else "nine tenths of the return error cross"
+        yield f"  after a reversal {way} over about {crossing_deg(found.found.crossing):.2g} deg of output"
     if len(found.recordings) > 1:
         for part in found.recordings:
             rate = "" if part.speed_rpm is None else f" at {part.speed_rpm:.4g} r/min"

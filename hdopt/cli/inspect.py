@@ -57,7 +57,7 @@ def sheet_options(command: Callable[..., R]) -> Callable[..., R]:
     def bundled(
         given: RecordingOptions,
         *,
-        limits: str | None,
+        limits: tuple[str, ...],
         speed_rpm: float | None,
         mountings: str | None,
         serial: str,
@@ -70,7 +70,7 @@ def sheet_options(command: Callable[..., R]) -> Callable[..., R]:
 
         wanted = {"report": report_file, "bench": bench_out}
         asked = SheetOptions(
-            parse_limits(limits) or None,
+            parse_limits(",".join(limits)) or None,
             speed_rpm,
             tuple(name.strip() for name in (mountings or "").split(",") if name.strip()),
             serial,
@@ -81,7 +81,11 @@ def sheet_options(command: Callable[..., R]) -> Callable[..., R]:
 
     options = (
         click.option(
-            "--limit", "limits", metavar="NAME=VALUEarcmin,...", help="Limits, such as peak_to_peak=1.0arcmin."
+            "--limit",
+            "limits",
+            metavar="NAME=VALUEarcmin,...",
+            multiple=True,
+            help="Limits, such as peak_to_peak=1.0arcmin; may be repeated.",
         ),
         click.option("--mounting", "mountings", metavar="A,A,B,...", help="The mounting of each file: gauge study."),
         click.option("--speed-rpm", type=float, help="Input speed for the slope in time."),

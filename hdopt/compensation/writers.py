@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any  # Any: values of JSON
 
+from hdopt.compensation.applied import crosses, crossing_deg, how_applied
 from hdopt.compensation.mesh import Beat
 from hdopt.compensation.of_speed import Angular, OfSpeed
 from hdopt.compensation.pulse import Pulse
@@ -26,10 +27,11 @@ def written(found: Found, form: str, facts: Mapping[str, Any]) -> str:
 
 def _csv(given: Found, facts: Mapping[str, Any]) -> str:
     found, own = (given.common, _own(given)) if isinstance(given, OfSpeed) else (given, [])
-    head = [f"# {key}: {str(value).replace(chr(10), ' ')}" for key, value in facts.items()]
+    said = {**how_applied(given), **facts}
+    head = [f"# {key}: {str(value).replace(chr(10), ' ')}" for key, value in said.items()]
     head.append(f"# half_return_arcmin: {found.back!r}")
     head.append(f"# return_crossing_output_deg: {found.crossing.deg!r}")
-    head.append(f"# return_crosses: {crosses(found)}")
+    head.append(f"# return_crosses: {crosses(found.crossing)}")
     head.append(f"# return_path_at_start: {found.crossing.start!r}")
     if isinstance(given, OfSpeed):
         head.append(f"# lag_arcmin_per_input_rpm: {given.lag!r}")
@@ -38,7 +40,6 @@ def _csv(given: Found, facts: Mapping[str, Any]) -> str:
             head.append(f"# of_each_speed: {BETWEEN}")
     if not isinstance(found, Grid):
         if isinstance(found, Zones):
-            head.append(f"# error_arcmin: sum 0, with the half return, + the {_which(found)} of sums 1 and 2")
             head += [f"# pulses: {PULSES}"] * bool(found.pulses)
             head += [f"# pulse: {','.join(map(repr, _pulse(pulse)))}" for pulse in found.pulses]
         return "\n".join([*head, *_csv_terms(found, own)]) + "\n"
@@ -85,10 +86,6 @@ def _csv_terms(found: Harmonics | Zones, own: Sequence[tuple[float, int, int, fl
     return [title, *rows, *(f"{k},{j},{c!r},{s!r}" + ",0" * summed + f",{rpm!r}" for rpm, k, j, c, s in own)]
 
 
-def _which(found: Zones) -> str:
-    return "larger" if found.sense > 0 else "smaller"
-
-
 def _terms(found: Harmonics | Zones) -> list[tuple[int, int, float, float, int]]:
     """k, j, cosine, sine of every term, and the sum that it belongs to: 0, or 1 and 2 for the zones."""
     sums = (found.rest, found.first, found.second) if isinstance(found, Zones) else (found,)
@@ -101,7 +98,8 @@ def _terms(found: Harmonics | Zones) -> list[tuple[int, int, float, float, int]]
 
 def _json(given: Found, facts: Mapping[str, Any]) -> str:
     found = given.common if isinstance(given, OfSpeed) else given
-    content: dict[str, Any] = {"schema": 1, **facts, "half_return_arcmin": found.back}
+    content: dict[str, Any] = {"schema": 1, **how_applied(given), **facts}
+    content["half_return_arcmin"] = found.back
     if isinstance(given, OfSpeed):
         content["lag_arcmin_per_input_rpm"] = given.lag
         content["of_each_speed"] = BETWEEN
@@ -110,14 +108,14 @@ def _json(given: Found, facts: Mapping[str, Any]) -> str:
             for rpm, one in zip(given.speeds, given.own, strict=True)
         ]
     content["return_crossing_output_deg"] = found.crossing.deg
-    content["return_crosses"] = crosses(found)
+    content["return_crosses"] = crosses(found.crossing)
     content["return_path_at_start"] = found.crossing.start
     if isinstance(found, Grid):
         content["table"] = "input angle by output angle" if isinstance(found, Surface) else "input angle by input turn"
+        content["input_step_deg"], content["output_step_deg"] = (360 / steps for steps in found.values.shape)
         content["table_arcmin"] = found.values.tolist()
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
     if isinstance(found, Zones):
-        content["error"] = f"sum 0 + the {_which(found)} of sums 1 and 2"
         if found.pulses:
             content["pulses_say"] = PULSES
             content["pulses"] = [dict(zip(PULSE, _pulse(pulse), strict=True)) for pulse in found.pulses]
@@ -133,7 +131,7 @@ _HEAD = """/* Kinematic error of a drive, to be subtracted: output = input/N - e
 {facts}
    input_rad from the zero of the recording's input count, output_rad = input_rad/N counted on;
    path: the side of the return error, +1 forward, -1 backward, 0 unknown; keep it, and after each move call
-   path = hdopt_path(path, output_moved_rad), which crosses over {crossing!r} deg of output after a reversal.
+   path = hdopt_path(path, output_moved_rad), which crosses {crosses} after a reversal{over}.
    The recordings began with a path of {start!r} times the side of their first motion. */
 #include <math.h>
 
@@ -273,9 +271,9 @@ def _c(found: Found, facts: Mapping[str, Any]) -> str:
             speeds=len(found.speeds), rpm=_list(found.speeds), end=_list(list(end)), lag=repr(found.lag), **numbers
         )
     said = "\n".join(f"   {key}: {value}" for key, value in facts.items()).replace("*/", "* /")
-    head = _HEAD.format(
-        facts=said, crossing=found.crossing.deg, start=found.crossing.start, moves=_moves(found.crossing)
-    )
+    crossing = found.crossing
+    over = f", over about {crossing_deg(crossing):.3g} deg of output" if crossing.deg else ""
+    head = _HEAD.format(facts=said, crosses=crosses(crossing), over=over, start=crossing.start, moves=_moves(crossing))
     if not isinstance(found, Grid):
         columns = list(zip(*_terms(found), strict=True)) or [()] * 5
         numbers = {name: _list(column) for name, column in zip(("k", "j", "cos", "sin", "sum"), columns, strict=True)}
@@ -301,13 +299,6 @@ def _moves(crossing: Crossing) -> str:
         return f"path += 2 * output_moved_rad / {turn!r};\n    return side * path > 1 ? side : path;"
     # Crossing at once leaves nothing of the old side, however small the move.
     return f"return side + (path - side) * {f'exp(-fabs(output_moved_rad) / {turn!r})' if turn > 0 else '0'};"
-
-
-def crosses(found: Found) -> str:
-    """How the return error of `found` crosses after a reversal, in words."""
-    if found.crossing.deg == 0:
-        return "at once"
-    return "in a straight line" if found.crossing.straight else "exponentially"
 
 
 def _list(values: Sequence[float]) -> str:

@@ -16,6 +16,8 @@ from hdopt.files import are_names, cells_of, on_commas, read_text
 from hdopt.keywords import names_keywords
 
 KINDS = ("cumulative", "single")
+OTHER_LENGTH = re.compile(r"(?<![a-zA-Zµμ])(mm|cm|nm|m|mils?|thou|in|inch|inches|uin|µin|μin)(?=[\s\])]*$)", re.I)
+"""A unit of length at the end of a column's name that is not the micrometre."""
 FINEST = 5e-5
 """mm: half the last digit of what gear inspection writes, 0.1 um; a whole spline is never as good."""
 ALIKE = 0.3
@@ -78,22 +80,30 @@ class MeasuredTeeth:
 def _doubts(values: Array, kind: str) -> tuple[str, ...]:
     """Why the deviations `values` (mm, (n,)) may be of another unit, or of another kind than the `kind` told.
 
-    Single deviations close: they add up to nothing. Cumulative ones begin or end at 0, and neighbours are alike.
+    Single deviations close: they add up to nothing, and neighbours are unlike. Cumulative ones begin or end at 0, and
+    neighbours are alike.
     """
     doubts = []
     spread, total, largest = np.ptp(values), abs(values.sum()), np.abs(values).max()
     rounding = 3 * FINEST * math.sqrt(len(values) / 3)
     if 0 < spread < FINEST:
         doubts.append(f"all deviations lie within {1000 * spread:.2g} um, less than machines resolve: are they in um?")
+    centred = values - values.mean()
+    likeness = float(centred @ np.roll(centred, 1)) / max(float(centred @ centred), 1e-300)
     if kind == "single" and total > largest / 4 + rounding:
         doubts.append(
             f"the single deviations add up to {1000 * total:.3g} um where a turn closes; each was lessened by "
             f"{1000 * total / len(values):.3g} um, as if pitches had been compared with one of them. If they are "
             'cumulative, say so: deviation = "cumulative"'
         )
+    elif kind == "single" and likeness > 1 - ALIKE:
+        span = np.ptp(np.cumsum(centred))
+        doubts.append(
+            "neighbouring single deviations are alike, as cumulative ones are, and add up to as much as "
+            f'{1000 * span:.3g} um. If they are cumulative, say so: deviation = "cumulative"'
+        )
     if kind == "cumulative" and total < largest / 4 and values[0] != 0 and values[-1] != 0:
-        centred = values - values.mean()
-        if centred @ np.roll(centred, 1) < ALIKE * (centred @ centred):
+        if likeness < ALIKE:
             doubts.append(
                 "the cumulative deviations add up to nothing, begin and end off 0, and neighbours are unlike, as "
                 'those of single ones are. If they are single, say so: deviation = "single"'
@@ -154,7 +164,10 @@ def _rows(text: str, path: Path) -> list[tuple[int, str, float]]:
             where = f"measured teeth {path}, line {number}: {shown(line)}"
             header = header_allowed and are_names(cells)
             require(header, f"{where}; each line must hold tooth, flank, fp_um{on_commas(line, cells, 3)}")
-            in_mm = len(cells) == 3 and re.search(r"(?<![a-zA-Z])mm\b", cells[-1])
-            require(not in_mm, f"{where}; deviations must be in um: give them times 1000, and name the column fp_um")
+            unit = OTHER_LENGTH.search(cells[-1]) if len(cells) == 3 else None
+            if unit is not None:
+                raise DriveError(
+                    f"{where}; deviations must be in um, not {unit.group()}: give them so, and name the column fp_um"
+                ) from None
         header_allowed = False
     return rows

@@ -102,7 +102,8 @@ def _beside(wanted: str, known: Sequence[str]) -> str:
 
 def _told(channel: str, column: Column) -> str:
     turned = ", turned around" if column.sign < 0 else ""
-    return f"{channel} = {column.name!r} in {column.unit}{turned}"
+    meant = ", taken as input/N - output" if channel == "error" else ""
+    return f"{channel} = {column.name!r} in {column.unit}{turned}{meant}"
 
 
 def _converted(channel: str, column: Column, source: Channel, name: str) -> tuple[Array, list[str]]:

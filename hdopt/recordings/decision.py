@@ -77,6 +77,8 @@ def parse_limits(text: str | None) -> dict[str, float]:
             raise HdoptError(f"--limit holds {item.strip()!r}; write NAME=NUMBERarcmin, such as peak_to_peak=1.0arcmin")
         if name not in LIMIT_NAMES:
             raise HdoptError(unknown_name("figure in --limit", name, LIMIT_NAMES))
+        if name in found:
+            raise HdoptError(f"--limit gives {name} twice; name each figure once")
         units = SLOPE_UNITS if name == "slope" else LIMIT_UNITS
         if match.group(2) not in units:
             known = ", ".join(filter(None, units))

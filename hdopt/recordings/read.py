@@ -87,7 +87,7 @@ def _channels(table: Table, told: dict[str, Column] | None, name: str) -> Channe
         channels = mapped_channels(table, told, False, name)
         left = [f"{name}: {sentence}" for sentence in not_read(table, told)]
         return replace(channels, understood=(*channels.understood, *left))
-    plain = {"input_angle_deg", "output_angle_deg"} & set(table.channels)
+    plain = {"input_angle_deg", "output_angle_deg"} <= set(table.channels)
     chosen, said = default_columns(table) if plain else choose_columns(table, name)
     channels = mapped_channels(table, chosen, True, name)
     return replace(channels, understood=(*said, *channels.understood))

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any  # Any: values of JSON
 import numpy as np
 
 from hdopt.arrays import Array, Mask
+from hdopt.compensation.applied import crosses, how_counted
 from hdopt.compensation.expected import NORMAL, peak_to_peak_again
 from hdopt.compensation.of_speed import OfSpeed, shows_lag, signed_rpm, with_speed
 from hdopt.compensation.path import half_about, paths_of
-from hdopt.compensation.writers import FORMATS, Found, crosses, homing_arcmin, written
+from hdopt.compensation.writers import FORMATS, Found, homing_arcmin, written
 from hdopt.compensation.zones import MOST_TERMS, SMALL
 from hdopt.drive.geometry import Drive
 from hdopt.errors import HdoptError
@@ -91,8 +92,8 @@ class Compensated(ShownAsTable):
     `before` and `after` of the held-out parts together, each part scored by a choice made without it; `predicted` for a
     fresh recording of the same length, with its 95 % interval `low`, `high`; `both` is what is left in each direction,
     `ways` what to expect of it there, and `speeds` (r/min) what to expect at each speed where the recordings differ.
-    `strain_wave` says whether it is of a harmonic drive, `worth` whether the fall is beyond chance (`evidence` standard
-    errors, over so many `stretches` of the record; fewer than three say nothing).
+    `strain_wave` says whether it is of a harmonic drive, `counted` how the channels were read, `worth` whether the fall
+    is beyond chance (`evidence` standard errors, over so many `stretches` of the record; fewer than three say nothing).
     """
 
     found: Found
@@ -115,6 +116,7 @@ class Compensated(ShownAsTable):
     ways: Mapping[str, Expected] = field(default_factory=dict)
     speeds: Mapping[float, Expected] = field(default_factory=dict)
     strain_wave: bool = True
+    counted: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def judged(self) -> bool:
@@ -129,6 +131,7 @@ class Compensated(ShownAsTable):
     def facts(self) -> dict[str, Any]:
         """What the file says of itself: method, what it leaves, what it needs, what makes it void."""
         return {
+            **self.counted,
             "ratio": self.ratio,
             "method": self.method,
             "peak_to_peak_before_arcmin": round(self.before, 4),
@@ -160,7 +163,7 @@ class Compensated(ShownAsTable):
             "return": {
                 "half_arcmin": self.found.back,
                 "crossing_output_deg": self.found.crossing.deg,
-                "crosses": crosses(self.found),
+                "crosses": crosses(self.found.crossing),
                 "path_at_start": self.found.crossing.start,
             },
             "recordings": [vars(part) for part in self.recordings],
@@ -317,6 +320,7 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
         _by_way(each, left, rng),
         _by_speed(rows, of_each),
         drive is not None,
+        how_counted(moving),
     )
 
 

@@ -15,12 +15,15 @@ def words_on_measured_parts(drive: Drive) -> list[str]:
     for name, teeth in (("cs_teeth", drive.cs_teeth), ("fs_teeth", drive.fs_teeth)):
         if teeth is None:
             continue
-        as_offset = 1000 * teeth.eccentricity / math.tan(drive.geometry.pressure_angle)
-        size = f"{name}: a first harmonic of {1000 * teeth.eccentricity:.2f} um, as of {as_offset:.1f} um eccentricity,"
+        # A probe at a constant radius sees e/cos(alpha) of a part held e off its centre: e along the tooth's pitch and
+        # e tan(alpha) across it, a quarter of a turn apart.
+        held = 1000 * teeth.eccentricity * math.cos(drive.geometry.pressure_angle)
+        wave = f"a first harmonic of {1000 * teeth.eccentricity:.2f} um"
+        size = f"{name}: {wave}, as of a part held {held:.2f} um off-centre,"
         done = (
-            f"was taken out, as of a part held off-centre; {name}.recentre = false keeps it"
+            f"was taken out; {name}.recentre = false keeps it"
             if teeth.recentred
-            else f"is kept; {name}.recentre = true takes it out, for a part held off-centre"
+            else f"is kept; {name}.recentre = true takes it out"
         )
         found.append(f"{size} {done}")
         found += [f"{name}: {doubt}" for doubt in teeth.doubts]

@@ -8,10 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hdopt.compensation.applied import crosses, crossing_deg
 from hdopt.compensation.path import crossing_of, half_about, half_return, path_of, paths_of
 from hdopt.compensation.pursuit import independent_share
 from hdopt.compensation.surface import AT_ONCE, Crossing, Harmonics, grid_angles, nothing, surface_of
-from hdopt.compensation.writers import crosses, homing_arcmin
+from hdopt.compensation.writers import homing_arcmin
 from hdopt.compensation.zones import zone_values
 from hdopt.workflow.compensate import _per_recording, _predicted, _worth
 
@@ -132,8 +133,15 @@ def test_homing_of_either_shaft_adds_by_its_own_orders():
 
 def test_words_say_how_a_return_error_crosses():
     for crossing, words in ((AT_ONCE, "at once"), (Crossing(2.0), "exponentially"), (Crossing(2.0, 1.0, True), "line")):
-        empty = nothing()
-        assert words in crosses(Harmonics(empty.k, empty.j, empty.cos, empty.sin, 0.3, crossing))
+        assert words in crosses(crossing)
+
+
+def test_an_exponential_has_crossed_nine_tenths_where_it_says():
+    """From -1, 1 - 2 exp(-x/L) = 0.8 at L ln 10, the law that `hysteresis.transition_deg` is said in. Fault caught: the
+    length at which it falls to 1/e said as the travel, 2.3 times too short."""
+    deg = crossing_deg(Crossing(0.2))
+    assert 1 - 2 * np.exp(-deg / 0.2) == pytest.approx(0.8)
+    assert crossing_deg(Crossing(0.2, 1.0, True)) == 0.2
 
 
 def test_terms_added_keep_the_return_error_of_the_first():

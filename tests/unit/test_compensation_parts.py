@@ -106,7 +106,7 @@ def read_back(text, form, a, b, way):
         lines = text.splitlines()
         facts = dict(line[2:].split(": ", 1) for line in lines if line[0] == "#")
         rows = [[float(cell) for cell in line.split(",")] for line in lines if line[0].isdigit() or line[0] == "-"]
-        back, rule = float(facts["half_return_arcmin"]), facts.get("error_arcmin", "")
+        back, rule = float(facts["half_return_arcmin"]), facts.get("error", "")
         table = [row[1:] for row in rows] if any(line.startswith("input_deg") for line in lines) else None
     if table is not None:
         return (

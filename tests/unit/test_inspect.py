@@ -429,3 +429,14 @@ def test_many_drives_go_on_where_they_were_interrupted(tmp_path, capsys, monkeyp
     assert found[0]["drives"] == found[1]["drives"]
     assert {f"d{k}.csv" for k in range(4)} <= set(found[1]["provenance"]["inputs"])
     assert run("inspect", paths[0], "--drive", "none", "--ratio", "80", "--resume") == 2
+
+
+def test_a_figure_is_limited_once(tmp_path, capsys):
+    """Fault caught: the last of two limits wins, and a drive meets what it misses."""
+    with pytest.raises(HdoptError, match="gives peak_to_peak twice"):
+        parse_limits("peak_to_peak=1arcmin,peak_to_peak=2arcmin")
+    (tmp_path / "a.csv").write_text("")
+    given = ["--limit", "peak_to_peak=1arcmin", "--limit", "peak_to_peak=2arcmin"]
+    with pytest.raises(SystemExit, match="2"):
+        main(["inspect", str(tmp_path / "a.csv"), *given])
+    assert "gives peak_to_peak twice" in capsys.readouterr().err

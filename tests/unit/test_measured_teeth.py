@@ -185,6 +185,9 @@ def test_a_table_told_wrongly_is_doubted_and_one_told_rightly_is_not(seed):
     assert 'If they are single, say so: deviation = "single"' in doubt
     (doubt,) = MeasuredTeeth.of(from_tooth_1, "single").doubts
     assert 'If they are cumulative, say so: deviation = "cumulative"' in doubt
+    (doubt,) = MeasuredTeeth.of(about_mean, "single").doubts
+    assert doubt.startswith("neighbouring single deviations are alike")
+    assert f"add up to as much as {1000 * np.ptp(np.cumsum(about_mean)):.3g} um" in doubt
     assert MeasuredTeeth.of(np.zeros(Z_CS)).doubts == ()
 
 
@@ -253,7 +256,10 @@ def test_a_stack_evens_out_term_by_term_as_ke_does(study_with_teeth):
         ("tooth,flank,fp_um\n1,left,0,5\n", "line 2: '1,left,0,5'; .*between decimal commas, semicolons must part"),
         ('<?xml version="1.0"?><gde/>', "holds no row of tooth, flank, fp_um; give a CSV text file"),
         ("angle_deg,radius_mm\n0,15\n", "line 2: '0,15'; each line must hold tooth, flank, fp_um"),
-        ("Zahn;Flanke;fp [mm]\n1;links;0,004\n", "line 1: .*deviations must be in um: give them times 1000"),
+        ("Zahn;Flanke;fp [mm]\n1;links;0,004\n", "line 1: .*deviations must be in um, not mm: give them so"),
+        ("tooth,flank,fp_mil\n1,left,4\n", "line 1: .*deviations must be in um, not mil: give them so"),
+        ("tooth,flank,fp (nm)\n1,left,4\n", "line 1: .*deviations must be in um, not nm: give them so"),
+        ("tooth,flank,fp in inch\n1,left,4\n", "line 1: .*deviations must be in um, not inch: give them so"),
     ],
 )
 def test_a_table_that_is_none_is_refused(tmp_path, text, message):
@@ -272,3 +278,26 @@ def test_a_table_of_a_german_spreadsheet(tmp_path, encoding, mark):
     assert read_teeth(tmp_path / "t.csv", 8).tolist() == pytest.approx(
         [0.0, 0.0015, -0.00025, *5 * [0.0003]], abs=1e-15
     )
+
+
+@pytest.mark.parametrize(
+    "header", ["tooth,flank,fp_um", "Zahn,Flanke,fp in um", "tooth,flank,fp (\u00b5m)", "tooth,flank,fp [\u03bcm]"]
+)
+def test_a_header_in_micrometres_is_read(tmp_path, header):
+    """Fault caught: the m of a micrometre, or the word in before it, taken for a unit of its own."""
+    (tmp_path / "t.csv").write_text(header + "\n" + "".join(f"{tooth},left,{tooth}\n" for tooth in range(1, 9)))
+    assert read_teeth(tmp_path / "t.csv", 8) == pytest.approx(np.arange(1, 9) / 1000)
+
+
+def test_a_first_harmonic_says_how_far_the_part_was_held_off_its_centre(study_with_teeth):
+    """A probe at a constant radius, a flank at the pressure angle alpha: e sin(t) along the pitch, and e cos(t) across,
+    which moves the point of the flank that is touched by e cos(t) tan(alpha). Fault caught: e read as what an axis off
+    by it does in the drive, 5 times as much."""
+    study = load_study(study_with_teeth)
+    alpha, held = study.drive.geometry.pressure_angle, 10.0
+    angle = 2 * np.pi * np.arange(Z_CS) / Z_CS
+    seen = held * (np.sin(angle) + np.cos(angle) * np.tan(alpha))
+    rows = (f"{tooth},left,{value:.6f}\n" for tooth, value in enumerate(seen, 1))
+    (study_with_teeth.parent / "cs.csv").write_text("".join(rows))
+    notes = kinematic_error(load_study(study_with_teeth, ["cs_teeth.deviation=cumulative"])).notes
+    assert any("cs_teeth" in note and "held 10.00 um off-centre" in note for note in notes)
