@@ -24,19 +24,20 @@ def how_applied(found: Angular | OfSpeed) -> dict[str, str]:
 
 
 def which_sum(found: Zones) -> str:
-    """Which of both zones' sums drives."""
+    """Which of both zones' sums of `found` drives."""
     return "larger" if found.sense > 0 else "smaller"
 
 
 def crosses(crossing: Crossing) -> str:
-    """How the return error crosses after a reversal, in words."""
+    """How the return error crosses after a reversal by its `crossing`, in words."""
     if crossing.deg == 0:
         return "at once"
     return "in a straight line" if crossing.straight else "exponentially"
 
 
 def crossing_deg(crossing: Crossing) -> float:
-    """Output travel (deg) after a reversal over which the return error has crossed, of an exponential nine tenths."""
+    """Output travel (deg) after a reversal over which the return error has crossed by its `crossing`, of an exponential
+    nine tenths."""
     return crossing.deg * (1.0 if crossing.straight else CROSSED)
 
 

@@ -14,6 +14,8 @@ from hdopt.toml_lines import Keys
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 EXAMPLE = re.compile(r"\b(?:such as|as in|as with|for example)\b[^;]*")
 """What a message shows for its reader to write: numbers there are nobody's."""
+LINE = re.compile(r"\blines? \d+(?:(?:, \d+)*(?:,? (?:and|to) \d+)?)")
+"""Where something stands in a file: no number of a study."""
 KEY = re.compile(r"(?<![\w.\-/])[a-z]\w*(?:\.\w+)+|\[(\w+)\](?: (\w+))?")
 """A key as messages name it: export.bore_mm, [tolerances], [tolerances] axis_tilt_x_deg."""
 COMMON = 100
@@ -29,8 +31,9 @@ DIGITS = range(6, 18)
 
 
 def numbers_in(message: str) -> set[float]:
-    """The numbers that stand in `message`, but in its examples; a comma or a full stop that follows is none of them."""
-    return {float(found) for found in NUMBER.findall(EXAMPLE.sub("", message))}
+    """The numbers that stand in `message`, but in its examples and those of lines; a comma or a full stop that follows
+    is none of them."""
+    return {float(found) for found in NUMBER.findall(LINE.sub("", EXAMPLE.sub("", message)))}
 
 
 def without_numbers(message: str, values: Iterable[float]) -> str:
@@ -55,7 +58,11 @@ def shows(message: str, value: Any, name: str) -> bool:
 
 def _speaks_of(name: str, message: str) -> bool:
     """Whether `message` has a part of the `name`, with any end where it has three letters or more: but for its unit and
-    little words, which stand in any message."""
+    little words, which stand in any message. A single letter is a name where it is written as one, 'a = 2', 'n is 1' or
+    'cost.a'.
+    """
+    if len(name) == 1:
+        return re.search(rf"(?<![\w.]){name}(?: ?=| is\b)|\.{name}\b", message) is not None
     parts = [part for part in re.split(r"[_\-]", UNIT.sub("", name)) if part and part not in LITTLE]
     return any(re.search(rf"\b{part}" + ("" if len(part) > 2 else r"\b"), message) for part in parts)
 
@@ -76,8 +83,13 @@ def values_named(document: Document, message: str) -> tuple[str, ...]:
 
 
 def keys_named(document: Document, message: str) -> tuple[str, ...]:
-    """Where in `document` the keys and sections stand that `message` names, 'FILE, line N, a.b' each; keys that it
-    does not have, and those of examples, are left out."""
+    """Where in `document` the keys and sections stand that `message` names, 'FILE, line N, a.b' each."""
+    return tuple(map(document.where, keys_of(document, message)))
+
+
+def keys_of(document: Document, message: str) -> tuple[Keys, ...]:
+    """The keys and sections of `document` that `message` names; keys that it does not have, and those of examples, are
+    left out."""
     found: dict[Keys, None] = {}
     for named in KEY.finditer(EXAMPLE.sub("", message)):
         section, key = named.groups()
@@ -86,12 +98,17 @@ def keys_named(document: Document, message: str) -> tuple[str, ...]:
             if longest in document.lines:
                 found.pop(path, None)
                 found[longest] = None
-    return tuple(document.where(path) for path in found)
+    return tuple(found)
 
 
 def places_named(document: Document, message: str) -> tuple[str, ...]:
-    """Where in `document` to look for what `message` says: at the values that it shows, then at the keys it names."""
-    return tuple(dict.fromkeys((*values_named(document, message), *keys_named(document, message))))
+    """Where in `document` to look for what `message` says: at the values that it shows, then at the keys it names. A
+    value of a key that is named is that key's, whatever else is as large."""
+    named = keys_of(document, message)
+    values = (_at(document.data, path) for path in named)
+    own = {float(value) for value in values if isinstance(value, int | float) and not isinstance(value, bool)}
+    shown = values_named(document, without_numbers(message, own))
+    return tuple(dict.fromkeys((*shown, *map(document.where, named))))
 
 
 def _stands(document: Document, path: Keys) -> bool:

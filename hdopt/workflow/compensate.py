@@ -295,7 +295,6 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
     left = np.where(met_elsewhere(rows)[samples.row], trials[method], again)
     rng = np.random.default_rng(seed)
     of_each = _each(each, left, np.ones(len(each), np.bool_), rng)
-    predicted, low, high = _predicted(of_each)
     return Compensated(
         found,
         method,
@@ -303,9 +302,7 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
         evidence,
         float(np.ptp(before)),
         float(np.ptp(nested)),
-        predicted,
-        low,
-        high,
+        *_predicted(of_each),
         {name: float(np.ptp(nested[each.direction == way])) for name, way in _ways(rows).items()},
         _per_recording(moving, each, (before, nested), of_each),
         held_out,

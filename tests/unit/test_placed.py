@@ -146,6 +146,25 @@ def test_of_keys_with_one_value_the_one_that_is_spoken_of_is_meant():
     assert len(values_named(document, "0.5 mm are too small")) == 2
 
 
+def test_a_line_of_another_file_and_a_letter_are_no_values():
+    """Faults caught: 102 teeth for line 102 of a cam, and 'a = 2' of a distribution for 'slot 2 for a disc'."""
+    document = parse_document("teeth = 102\na = 2\nlines = 720\n", "s.toml")
+    assert values_named(document, "line 102: holds a number that is not finite") == ()
+    assert values_named(document, "lines 7, 9 and 102: no numbers") == ()
+    assert values_named(document, "slot 2 for a disc reaches 33.2 mm") == ()
+    assert values_named(document, "a = 2 is too small") == ("s.toml, line 2, a",)
+    assert values_named(document, "720 lines are too many") == ("s.toml, line 3, lines",)
+    assert values_named(document, "102 teeth are too few") == ("s.toml, line 1, teeth",)
+
+
+def test_a_value_of_a_key_that_is_named_is_that_keys():
+    """Fault caught: a bore of 30 mm, named and refused, said to be a direction of 30 deg too."""
+    document = parse_document("[errors]\ndirection_deg = 30\n[export]\nbore_mm = 30\n", "s.toml")
+    said = "the keyway of a 30 mm bore reaches beyond; give a smaller export.bore_mm or another direction"
+    assert places_named(document, said) == ("s.toml, line 4, export.bore_mm",)
+    assert "errors.direction_deg" in places_named(document, "the direction of 30 is odd")[0]
+
+
 @pytest.mark.parametrize("where", ["cam.csv: ", "cam.csv, line 3: ", "{folder}/my cam.csv: "])
 def test_a_message_that_begins_with_a_file_points_to_no_study(where, tmp_path, monkeypatch):
     """In Python as on the command line: its numbers are of that file, whatever values of the study they equal."""
