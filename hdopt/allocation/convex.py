@@ -372,10 +372,10 @@ def _solve_with_choices(items: Sequence[Item], requirement: Requirement) -> Solu
         constraints.append(_requirement_tangent(requirement, scale, unit, t, at / scale))
         constraints += [_cost_tangent(items[i], t[i], cost[i], at[i] / scale[i]) for i in curved]
     if best is None:
-        reachable = requirement.value(low * scale)
+        reachable, rule = requirement.value(low * scale), requirement.rule or "given"
         raise Infeasible(
-            f"no choice of grades meets the requirement {requirement.limit:g} ({problem.status}); the best reachable "
-            f"is {reachable:.6g}; allow finer grades or relax the requirement",
+            f"no choice of grades meets the requirement {requirement.limit:g} by the {rule} rule "
+            f"({problem.status}); the best reachable is {reachable:.6g}; allow finer grades or relax the requirement",
             reachable,
         )
     return _finish(
@@ -455,7 +455,8 @@ def _solve_choice(
 
 
 def _first_tangents(low: float, high: float) -> Array:
-    return np.geomspace(max(low, 1e-2), min(max(high, 2e-2), 1e2), 12)
+    """Twelve tolerances, relative to the present one, from `low` to `high` or over four decades of them at most."""
+    return np.geomspace(max(low, 1e-2), min(max(high, 2e-2), 1e2 * max(low, 1.0)), 12)
 
 
 def _cost_tangent(item: Item, t: Expression, cost: Expression, at: float) -> Expression:

@@ -16,6 +16,8 @@ from hdopt.keywords import names_keywords
 
 Expression: TypeAlias = Any
 """A variable or expression of cvxpy, which has no types for them."""
+ROUNDING = 1e-9
+"""How much finer than the finest of the cost data, relative to it, a tolerance may be and still count as that one."""
 
 
 class CostModel(Protocol):
@@ -112,7 +114,8 @@ class Exponential:
 @names_keywords
 @dataclass(frozen=True)
 class Piecewise:
-    """Straight lines between quoted points (tolerance, cost), at least two, tolerances rising."""
+    """Straight lines between quoted points (tolerance, cost), at least two, tolerances rising. What is finer than all
+    of them has an unknown cost, NaN; what is wider costs no more than the last."""
 
     points: tuple[tuple[float, float], ...]
 
@@ -146,7 +149,9 @@ class Piecewise:
 
     def cost(self, tolerance: ArrayLike) -> Array:
         tolerances, costs = np.transpose(self.points)
-        return np.asarray(np.interp(np.asarray(tolerance, float), tolerances, costs))
+        at = np.asarray(tolerance, float)
+        known = at >= tolerances[0] * (1 - ROUNDING)
+        return np.where(known, np.interp(at, tolerances, costs), math.nan)
 
     def slope(self, tolerance: ArrayLike) -> Array:
         slopes = np.array([slope for slope, _ in self.segments])

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any  # Any: values of JSON
 
-from hdopt.allocation.convex import Item, Solution
+from hdopt.allocation.convex import Infeasible, Item, Solution
 from hdopt.allocation.cost import GradeTable
 from hdopt.allocation.rules import Allocation
 from hdopt.errors import HdoptError
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class AllocatedError:
     """One tolerance: before and after, its grade where grades are used, and why that grade's standard does not reach
-    here, if so; `unit` is that of the tolerance."""
+    here, if so; `unit` is that of the tolerance, `at_assumed_bound` the key of the cost that moves the bound that it
+    stands at, where that bound is assumed."""
 
     tolerance: float
     present: float
@@ -34,6 +35,7 @@ class AllocatedError:
     grade: str | None = None
     extrapolated: str = ""
     source: str = "assumed"
+    at_assumed_bound: str = ""
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,7 @@ class AllocateResult(ShownAsTable):
                     "present_tolerance": e.present,
                     "present_cost": e.present_cost,
                     "cost_source": e.source,
+                    "at_assumed_bound": e.at_assumed_bound or None,
                 }
                 for name, e in self.errors.items()
             },
@@ -143,7 +146,8 @@ class AllocateResult(ShownAsTable):
 
         shares = [row.tolerance / row.present if row.present else math.nan for row in self.errors.values()]
         bars = go.Bar(y=list(self.errors), x=shares, orientation="h")
-        title = f"{self.study}: cost {self.total_cost:.4g}, now {self.present_cost:.4g}"
+        now = "unknown" if math.isnan(self.present_cost) else f"{self.present_cost:.4g}"
+        title = f"{self.study}: cost {self.total_cost:.4g}, now {now}"
         layout = {"title": title, "xaxis_title": "tolerance over the present one", "yaxis_title": "error"}
         return drawn(go.Figure(bars, layout).add_vline(1.0, line_dash="dash"), backend)
 
@@ -169,10 +173,12 @@ def allocated_errors(
     chosen: Allocation | Solution,
     present: Mapping[str, float],
     unit: str = "",
+    at: Mapping[str, str] | None = None,
 ) -> dict[str, AllocatedError]:
     """One record a tolerance of `items`: what was `chosen` beside what is `present`.
 
-    `sources` says where each cost comes from; `unit` is that of all tolerances, by their names (deg, mm) if empty.
+    `sources` says where each cost comes from; `unit` is that of all tolerances, by their names (deg, mm) if empty;
+    `at` names the key of the bound that a tolerance stands at, where it is assumed.
     """
     rows = {}
     for item in items:
@@ -183,16 +189,28 @@ def allocated_errors(
             present=present[item.name],
             cost=chosen.costs[item.name],
             present_cost=cost_or_nan(item, present[item.name]),
-            unit=unit or ("deg" if item.name.endswith("_deg") else "mm"),
+            unit=unit or unit_of(item.name),
             grade=grade.name if grade else None,
             extrapolated=grade.extrapolated if grade else "",
             source=sources.get(item.name, ""),
+            at_assumed_bound=(at or {}).get(item.name, ""),
         )
     return rows
 
 
+def infeasible(rule: str, error: Infeasible) -> RuleOutcome:
+    """What stands beside the other rules for a `rule` that ended in `error`."""
+    nothing = IntervalEstimate(math.nan, math.nan, math.nan)
+    return RuleOutcome(rule, math.nan, {}, nothing, math.nan, error.best_reachable, f"infeasible: {error}")
+
+
+def unit_of(name: str) -> str:
+    """Unit of the tolerance of a drive's error or contributor, by its `name`."""
+    return "deg" if name.endswith("_deg") else "mm"
+
+
 def cost_or_nan(item: Item, tolerance: float) -> float:
-    """Cost of `tolerance` by the cost model of `item`; NaN where it is finer than every grade."""
+    """Cost of `tolerance` by the cost model of `item`; NaN where it is finer than the cost data."""
     try:
         return float(item.cost.cost(tolerance))
     except HdoptError:
@@ -200,8 +218,21 @@ def cost_or_nan(item: Item, tolerance: float) -> float:
 
 
 def cost_of(items: Sequence[Item], present: Mapping[str, float]) -> float:
-    """Cost of the tolerances `present` of all `items`; NaN where one is finer than every grade."""
+    """Cost of the tolerances `present` of all `items`; NaN where one is finer than the cost data."""
     return float(sum(cost_or_nan(item, present[item.name]) for item in items))
+
+
+def finer_than_data(items: Sequence[Item], present: Mapping[str, float]) -> str:
+    """Which of the tolerances `present` of `items` are finer than the cost data, so that the cost is unknown; '' for
+    none."""
+    names = [item.name for item in items if math.isnan(cost_or_nan(item, present[item.name]))]
+    return f"cost unknown: {', '.join(names)} finer than the cost data" if names else ""
+
+
+def present_notes(items: Sequence[Item], present: Mapping[str, float]) -> tuple[str, ...]:
+    """The note of `finer_than_data`, said of the `present` tolerances of `items`; none where every cost is known."""
+    finer = finer_than_data(items, present)
+    return (f"present {finer}",) if finer else ()
 
 
 def marginal_reason(of_what: str, unit: str, value: float | None, grades: Mapping[str, str]) -> str:
@@ -209,3 +240,11 @@ def marginal_reason(of_what: str, unit: str, value: float | None, grades: Mappin
     if value is None:
         return "a choice among grades alone has no slope"
     return f"dual of the {of_what}, cost per {unit} of the limit" + (", grades held" if grades else "")
+
+
+def not_reached(rule: str, verified: IntervalEstimate, required_yield: float) -> str:
+    """What is said where the yield that was `verified` of the tolerances by `rule` is below the `required_yield`."""
+    return (
+        f"the {rule} rule's tolerances do not reach the yield: its lower bound is {verified.low:.5f}, "
+        f"required is {required_yield:g}"
+    )

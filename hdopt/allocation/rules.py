@@ -231,7 +231,12 @@ def allocate_by_equal_scaling(problem: AllocationProblem, seed: int = 1) -> Allo
     constraint = _quantile_constraint(problem, problem.required_yield, seed)
     low, high = 1e-2, 4.0
     if constraint.value(low * problem.current) > problem.limit:
-        _refuse_unreachable(problem, constraint.value(low * problem.current))
+        best = constraint.value(low * problem.current)
+        raise Infeasible(
+            f"{_cannot_be_met(problem, 'equal scaling')}: with a hundredth of every tolerance the response is still "
+            f"{best:.6g} {problem.unit}; relax the requirement",
+            best,
+        )
     factor = high
     if constraint.value(high * problem.current) > problem.limit:
         factor = brentq(lambda f: constraint.value(f * problem.current) - problem.limit, low, high, xtol=1e-5)
@@ -282,17 +287,25 @@ def _judge(problem: AllocationProblem, tolerances: Array, n: int, seed: int, qua
     )
 
 
-def _refuse_unreachable(problem: AllocationProblem, best: float) -> None:
+def _refuse_unreachable(problem: AllocationProblem, best: float, rule: str = "yield") -> None:
+    """Raise `Infeasible` where `best`, the response as `rule` sees it with every tolerance at its lower bound, is above
+    the limit."""
     if best > problem.limit:
         bounds = ", ".join(f"{item.name} >= {item.bounds[0]:g}" for item in problem.items)
         held = [name for name in problem.space.names if name not in {item.name for item in problem.items}]
         raise Infeasible(
-            f"the requirement {problem.limit:g} {problem.unit} at yield {problem.required_yield:g} cannot be met: with "
+            f"{_cannot_be_met(problem, f'the {rule} rule')}: with "
             f"every tolerance at its lower bound ({bounds}) the best reachable is {best:.6g} {problem.unit}"
             + (f"; {', '.join(held)} stay as they are" if held else "")
             + "; allow finer tolerances or relax the requirement",
             best,
         )
+
+
+def _cannot_be_met(problem: AllocationProblem, by: str) -> str:
+    """'the requirement 0.6 arcmin cannot be met by the worst case rule'; the worst case knows no yield."""
+    required = "" if "worst case" in by else f" at yield {problem.required_yield:g}"
+    return f"the requirement {problem.limit:g} {problem.unit}{required} cannot be met by {by}"
 
 
 def _tangent(problem: AllocationProblem, rule: str, value: Array | float, slopes: Array, at: Array) -> Requirement:
@@ -356,7 +369,7 @@ def _successive(
             # out of reach in one step: go as far down as it allows, and look again from there
             tightest = np.array([item.bounds[0] for item in near])
             if np.allclose(tightest, at, rtol=1e-9) or step == MAX_STEPS:
-                _refuse_unreachable(problem, requirement.value(tightest))
+                _refuse_unreachable(problem, requirement.value(tightest), constraint.name)
                 raise
             at, reach = tightest, np.full(len(at), REACH)
             continue
@@ -369,7 +382,7 @@ def _successive(
             break
         reach, before = _next_reach(reach, went, before), went
     near = [_chosen(_within(item, t, 1.2), t) for item, t in zip(problem.items, at, strict=True)]
-    return _corrected(problem, near, constraint.model(at), measured), step
+    return _corrected(problem, near, constraint.model(at), measured, constraint.name), step
 
 
 def _next_reach(reach: Array, went: Array, before: Array) -> Array:
@@ -390,9 +403,13 @@ def _chosen(item: Item, tolerance: float) -> Item:
 
 
 def _corrected(
-    problem: AllocationProblem, items: Sequence[Item], requirement: Requirement, measured: Callable[[Array], float]
+    problem: AllocationProblem,
+    items: Sequence[Item],
+    requirement: Requirement,
+    measured: Callable[[Array], float],
+    rule: str,
 ) -> Solution:
-    """Solutions of one convex model under a limit moved by what the response is measured to exceed it."""
+    """Solutions of one convex model of `rule` under a limit moved by what the response is measured to exceed it."""
     limit, best, value = problem.limit, None, math.inf
     for _ in range(CORRECTIONS):
         solution = solve(items, requirement.with_limit(limit))
@@ -406,19 +423,21 @@ def _corrected(
         limit -= excess + CLOSE / 2 * problem.limit
     if best is None:
         raise Infeasible(
-            f"no tolerances were found that keep {problem.limit:g} {problem.unit}; the last ones reached {value:.6g}: "
-            "allow finer tolerances or relax the requirement",
+            f"{_cannot_be_met(problem, f'the {rule} rule')}: no tolerances were found that do; the last ones reached "
+            f"{value:.6g} {problem.unit}; allow finer tolerances or relax the requirement",
             value,
         )
     return best
 
 
 def _within(item: Item, tolerance: float, reach: float) -> Item:
-    """The item kept near a tolerance; grades are free, they come in steps."""
+    """The item kept near a tolerance, or near the end of its bounds next to that; grades are free, they come in
+    steps."""
     if item.cost.discrete:
         return item
     low, high = item.bounds
-    return replace(item, lower=min(max(tolerance / reach, low), high * 0.999), upper=min(tolerance * reach, high))
+    near = min(max(tolerance, low), high)
+    return replace(item, lower=min(max(near / reach, low), high * 0.999), upper=min(near * reach, high))
 
 
 def _by_rule(problem: AllocationProblem, constraint: _Constraint, seed: int) -> Allocation:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import StudyOptions, emit, status, study_options, table_options, work_options
+from hdopt.cli.common import DEFAULTS, StudyOptions, emit, status, study_options, table_options, work_options
 from hdopt.cli.completion import offered, rules
 from hdopt.cli.log import looked_at
 
@@ -38,10 +38,13 @@ def command(asked: StudyOptions, rule: str | None, compare: bool | None, json_fi
 
     from hdopt.allocation.convex import Infeasible
     from hdopt.workflow.allocate import allocate
+    from hdopt.workflow.allocation_bounds import default_lines
     from hdopt.workflow.allocation_stages import AllocationWatch
     from hdopt.workflow.requirement import of_allocation
 
     loaded, watch = asked.load(), AllocationWatch(get_ident())
+    context = click.get_current_context()
+    context.meta[DEFAULTS] = (*context.meta[DEFAULTS], *default_lines(loaded))
     try:
         with looked_at("allocation", watch.words):
             result = allocate(loaded, rule, compare=compare, seed=seed, progress=watch.rules)
@@ -67,10 +70,10 @@ def _lines(result: AllocateResult) -> Iterator[str]:
         grade = f"  {row.grade}" if row.grade else ""
         flag = f" (extrapolated: {row.extrapolated})" if row.extrapolated else ""
         yield (
-            f"  {name:32s} {row.tolerance:12.6g} {row.present:12.6g} {row.cost:9.4f} {row.present_cost:9.4f} "
+            f"  {name:32s} {row.tolerance:12.6g} {row.present:12.6g} {row.cost:9.4f} {_cost(row.present_cost)} "
             f"{row.unit}{grade}{flag}"
         )
-    yield f"  {'total cost':58s} {result.total_cost:9.4f} {result.present_cost:9.4f}"
+    yield f"  {'total cost':58s} {result.total_cost:9.4f} {_cost(result.present_cost)}"
     gap = "not known" if result.optimality_gap is None else f"{result.optimality_gap:.2g}"
     yield f"  optimality gap {gap}: {result.optimality_gap_reason}"
     if result.marginal_cost is not None:
@@ -79,11 +82,11 @@ def _lines(result: AllocateResult) -> Iterator[str]:
     yield f"  verified yield {check.value:.6f} ({check.low:.6f} to {check.high:.6f}), n = {result.verify_n}"
     for outcome in result.comparison:
         share = outcome.conforming
-        if isnan(outcome.total_cost):
+        if not outcome.tolerances:
             yield f"  {outcome.rule:14s} {outcome.note}"
             continue
         yield (
-            f"  {outcome.rule:14s} cost {outcome.total_cost:9.4f}  yield {share.value:.5f} "
+            f"  {outcome.rule:14s} cost {_cost(outcome.total_cost)}  yield {share.value:.5f} "
             f"({share.low:.5f} to {share.high:.5f}) {outcome.note}"
         )
     if result.cost_curve:
@@ -92,3 +95,7 @@ def _lines(result: AllocateResult) -> Iterator[str]:
         yield f"  limit {limit:9.5g} {result.unit}: cost {cost:.4f}"
     for note in result.notes:
         yield f"  note: {note}"
+
+
+def _cost(value: float) -> str:
+    return f"{'unknown':>9s}" if isnan(value) else f"{value:9.4f}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -10,6 +11,21 @@ from hdopt.allocation.cost import CostModel, Exponential, Grade, GradeTable, Pie
 from hdopt.allocation.grades import GradeValue, iso_1328_pitch, it_grade, jis_1702_pitch
 from hdopt.errors import HdoptError, MissingValue
 from hdopt.study.base import NotNegative, Positive, Section
+
+PER_MM = {
+    "nm": 1e6,
+    "um": 1e3,
+    "\u00b5m": 1e3,
+    "\u03bcm": 1e3,
+    "mm": 1.0,
+    "cm": 0.1,
+    "m": 1e-3,
+    "in": 1 / 25.4,
+    "inch": 1 / 25.4,
+    "mil": 1e3 / 25.4,
+    "thou": 1e3 / 25.4,
+}
+"""Units of length in which grades in mm can be given: how many make a mm."""
 
 
 class CostRow(Section):
@@ -31,7 +47,7 @@ class ReciprocalRow(CostRow):
     b: Positive
     """Cost times tolerance."""
 
-    def build(self, gear: tuple[float, float] | None) -> CostModel:
+    def build(self, gear: tuple[float, float] | None, unit: str = "mm") -> CostModel:
         return Reciprocal(self.a, self.b)
 
 
@@ -45,7 +61,7 @@ class PowerRow(CostRow):
     k: Positive
     """Exponent."""
 
-    def build(self, gear: tuple[float, float] | None) -> CostModel:
+    def build(self, gear: tuple[float, float] | None, unit: str = "mm") -> CostModel:
         return Power(self.a, self.b, self.k)
 
 
@@ -59,7 +75,7 @@ class ExponentialRow(CostRow):
     fixed: float = 0.0
     """Cost that does not depend on the tolerance."""
 
-    def build(self, gear: tuple[float, float] | None) -> CostModel:
+    def build(self, gear: tuple[float, float] | None, unit: str = "mm") -> CostModel:
         return Exponential(self.a, self.b, self.fixed)
 
 
@@ -69,7 +85,7 @@ class PiecewiseRow(CostRow):
     points: list[list[float]] = Field(min_length=2)
     """[tolerance, cost] pairs, tolerances rising."""
 
-    def build(self, gear: tuple[float, float] | None) -> CostModel:
+    def build(self, gear: tuple[float, float] | None, unit: str = "mm") -> CostModel:
         if any(len(point) != 2 for point in self.points):
             raise HdoptError(f"the piecewise cost has points {self.points}; each must be a pair [tolerance, cost]")
         return Piecewise(tuple((t, c) for t, c in self.points))
@@ -98,19 +114,39 @@ class TableRow(CostRow):
     nominal_mm: Positive | None = None
     """Nominal size, for ISO 286."""
     factor: Positive = 1.0
-    """Tolerance of this input per mm of the grade's: 0.5 for an eccentricity by a coaxiality, or F_p as one sine."""
+    """Tolerance of this input over the grade's: 0.5 for an eccentricity by a coaxiality, or F_p as one sine. Where the
+    input is no length, its tolerance in its own unit (deg) for each mm of the grade's, which must be given then."""
 
-    def build(self, gear: tuple[float, float] | None) -> CostModel:
-        built = []
-        for row in self.grades:
-            if self.system is None:
-                if row.tolerance is None:
-                    raise MissingValue(f"grade {row.grade}", "tolerance (or system, the standard that gives it)")
-                built.append(Grade(str(row.grade), row.tolerance, row.cost))
-            else:
-                value = self._standard(row.grade, gear)
-                built.append(Grade(value.name, self.factor * value.tolerance, row.cost, value.extrapolated))
-        return GradeTable(tuple(built))
+    def build(self, gear: tuple[float, float] | None, unit: str = "mm") -> CostModel:
+        """The grades as choices, tolerances in `unit`; `gear` is (module, pitch diameter), mm, for gear grades."""
+        if self.system is None:
+            return GradeTable(tuple(Grade(str(row.grade), self._own(row), row.cost) for row in self.grades))
+        per_mm = self._per_mm(unit)
+        values = [(self._standard(row.grade, gear), row.cost) for row in self.grades]
+        return GradeTable(tuple(Grade(v.name, per_mm * v.tolerance, cost, v.extrapolated) for v, cost in values))
+
+    @staticmethod
+    def _own(row: GradeRow) -> float:
+        if row.tolerance is None:
+            raise MissingValue(f"grade {row.grade}", "tolerance (or system, the standard that gives it)")
+        return row.tolerance
+
+    def _per_mm(self, unit: str) -> float:
+        """Tolerance of this input, in `unit`, for each mm of the grade's."""
+        given = "factor" in self.model_fields_set
+        if unit not in PER_MM:
+            if given:
+                return self.factor
+            raise HdoptError(
+                f'the grades of system = "{self.system}" are lengths, and this tolerance is in {unit!r}, which is no '
+                f"length ({', '.join(PER_MM)}); write factor = the tolerance in {unit} for each mm of the grade's"
+                + (" (57.3/L for a tilt over a length of L mm)" if unit == "deg" else "")
+            )
+        if given and unit != "mm" and math.isclose(self.factor, PER_MM[unit], rel_tol=1e-3):
+            raise HdoptError(
+                f"factor is {self.factor:g}, the {unit} in a mm; grades are taken in {unit} without it: leave it out"
+            )
+        return self.factor * PER_MM[unit]
 
     def _standard(self, grade: str | int, gear: tuple[float, float] | None) -> GradeValue:
         if self.system == "iso286":

@@ -11,6 +11,7 @@ from hdopt.errors import HdoptError, unknown_name
 from hdopt.parallel.engine import Engine
 from hdopt.study import AnyStudy, Study, as_study
 from hdopt.tolerance.intervals import IntervalEstimate
+from hdopt.workflow.allocation_bounds import DEFAULT_REACH, assumed_bounds, at_assumed_bounds, bound_notes
 from hdopt.workflow.placed import numbers_named
 from hdopt.workflow.stack import ToleranceProblem, study_problem, words_on_model
 
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
     from hdopt.allocation.rules import Allocation, AllocationProblem
     from hdopt.tolerance.space import InputSpace
 
-DEFAULT_REACH = (0.1, 3.0)
-"""How far an allocated tolerance may go where the study does not say, as multiples of the present one: the closed form
-of the kinematic error is checked up to three times the shipped tolerances."""
 RULES = ("worst_case", "rss", "yield")
 
 Progress = Callable[[Sequence[str]], Iterable[str]]
@@ -70,6 +68,7 @@ def allocate(
 def items_of(study: Study, space: InputSpace) -> tuple[list[Item], dict[str, str]]:
     """The tolerances of `study` that have a cost, as items bounded in `space`, and where the costs come from."""
     from hdopt.allocation.convex import Item
+    from hdopt.allocation.results import unit_of
     from hdopt.study.tolerances import ContributorsSection, TolerancesBase
 
     sections = (study.find("tolerances", TolerancesBase), study.find("contributors", ContributorsSection))
@@ -96,21 +95,15 @@ def items_of(study: Study, space: InputSpace) -> tuple[list[Item], dict[str, str
                 "a direction has no tolerance, so leave its cost out"
             )
         try:
-            model = row.build(gear)
+            model = row.build(gear, unit_of(name))
         except HdoptError as error:
             raise HdoptError(f"cost of {name}: {error}") from error
-        low, high = (factor * value for factor in DEFAULT_REACH)
+        low, high = assumed_bounds(row, value, DEFAULT_REACH)
         if row.model in ("table", "piecewise"):
-            low, high = model.range
-        items.append(
-            Item(
-                name,
-                model,
-                value,
-                low if row.tightest is None else row.tightest,
-                high * (1 + 1e-12) if row.widest is None else row.widest,
+            low, high = (
+                given or of_data for given, of_data in zip((row.tightest, row.widest), model.range, strict=True)
             )
-        )
+        items.append(Item(name, model, value, low, high * (1 + 1e-12) if row.widest is None else high))
     return items, {name: row.source for name, row in rows.items()}
 
 
@@ -125,30 +118,36 @@ def _allocate_drive(study: Study, request: AllocationRequest, progress: Progress
     chosen, outcomes = _by_rules(problem, request, progress)
     verified = methods.verify(problem, chosen.tolerances, request.verification_seed, request.verify_n).conforming
     points = methods.yield_cost_curve(problem, [factor * stated.limit for factor in request.curve], request.seed)
-    return _drive_result(stated, problem, request, (chosen, sources), verified, (outcomes, tuple(points)))
+    at = at_assumed_bounds(study, items, chosen.tolerances)
+    return _drive_result(stated, problem, request, (chosen, sources, at), verified, (outcomes, tuple(points)))
 
 
 def _drive_result(
     stated: ToleranceProblem,
     problem: AllocationProblem,
     request: AllocationRequest,
-    decided: tuple[Allocation, dict[str, str]],
+    decided: tuple[Allocation, dict[str, str], dict[str, str]],
     verified: IntervalEstimate,
     beside: tuple[tuple[RuleOutcome, ...], tuple[tuple[float, float], ...]],
 ) -> AllocateResult:
-    from hdopt.allocation.results import AllocateResult, allocated_errors, cost_of, marginal_reason
+    from hdopt.allocation.results import (
+        AllocateResult,
+        allocated_errors,
+        cost_of,
+        marginal_reason,
+        not_reached,
+        present_notes,
+    )
 
-    chosen, sources = decided
+    chosen, sources, at = decided
     outcomes, points = beside
     status = "verified" if verified.low >= stated.required_yield else "not verified"
     allocated = replace(stated, space=stated.space.with_tolerances(chosen.tolerances))
     notes = [*stated.notes, *words_on_model(allocated, request.seed)]
     if status == "not verified":
-        notes.append(
-            f"the {request.rule} rule's tolerances do not reach the yield: its lower bound is {verified.low:.5f}, "
-            f"required is {stated.required_yield:g}"
-        )
+        notes.append(not_reached(request.rule, verified, stated.required_yield))
     present = problem.by_name(problem.current)
+    notes += [*bound_notes(at, problem.items), *present_notes(problem.items, present)]
     assert chosen.solution is not None
     return AllocateResult(
         study=stated.study,
@@ -157,7 +156,7 @@ def _drive_result(
         limit=stated.limit,
         required_yield=stated.required_yield,
         status=status,
-        errors=allocated_errors(problem.items, sources, chosen, present),
+        errors=allocated_errors(problem.items, sources, chosen, present, at=at),
         total_cost=chosen.total_cost,
         present_cost=cost_of(problem.items, present),
         optimality_gap=None,
@@ -204,24 +203,23 @@ def _by_rules(
 
 def _attempt(name: str, run: Callable[[], Allocation]) -> RuleOutcome:
     from hdopt.allocation.convex import Infeasible
-    from hdopt.allocation.results import RuleOutcome
+    from hdopt.allocation.results import infeasible
 
     try:
         return _outcome(name, run())
     except Infeasible as error:
-        nothing = IntervalEstimate(float("nan"), float("nan"), float("nan"))
-        return RuleOutcome(name, float("nan"), {}, nothing, float("nan"), error.best_reachable, f"infeasible: {error}")
+        return infeasible(name, error)
 
 
 def _present(problem: AllocationProblem, seed: int) -> RuleOutcome:
     """The tolerances as they are, judged like every rule's."""
-    from hdopt.allocation.results import RuleOutcome, cost_of
+    from hdopt.allocation.results import RuleOutcome, cost_of, finer_than_data
     from hdopt.allocation.rules import COMPARE_POINTS, verify
 
     tolerances = problem.by_name(problem.current)
     judged = verify(problem, tolerances, seed + 1, COMPARE_POINTS)
-    cost = cost_of(problem.items, tolerances)
-    return RuleOutcome("present", cost, tolerances, judged.conforming, judged.required_quantile.value, None)
+    cost, finer = cost_of(problem.items, tolerances), finer_than_data(problem.items, tolerances)
+    return RuleOutcome("present", cost, tolerances, judged.conforming, judged.required_quantile.value, None, finer)
 
 
 def _outcome(name: str, allocation: Allocation) -> RuleOutcome:

@@ -7,17 +7,40 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdopt.allocation.convex import Item, Requirement, Solution, cost_curve, rss_rule, solve, worst_case_rule
+from hdopt.allocation.convex import (
+    Infeasible,
+    Item,
+    Requirement,
+    Solution,
+    cost_curve,
+    rss_rule,
+    solve,
+    worst_case_rule,
+)
 from hdopt.allocation.request import AllocationRequest
-from hdopt.allocation.results import AllocateResult, RuleOutcome, allocated_errors, cost_of, marginal_reason
+from hdopt.allocation.results import (
+    AllocateResult,
+    RuleOutcome,
+    allocated_errors,
+    cost_of,
+    finer_than_data,
+    infeasible,
+    marginal_reason,
+    not_reached,
+    present_notes,
+)
+from hdopt.allocation.spread import spread_factors
 from hdopt.errors import HdoptError
 from hdopt.study import Study
 from hdopt.study.costs import Cost
 from hdopt.study.tolerances import LinearStackSection
+from hdopt.tolerance.intervals import smallest_n
 from hdopt.tolerance.linear_stack import Dimension, linear_problem
 from hdopt.tolerance.stack import Stack, StackRequest, run_stack
+from hdopt.workflow.allocation_bounds import LINEAR_REACH, assumed_bounds, at_assumed_bounds, bound_notes
 from hdopt.workflow.stack import STACK_N
 
+NORMAL = "the verified yield takes each dimension as normal, truncated at its tolerance"
 MAKERS = {"worst_case": worst_case_rule, "rss": rss_rule}
 
 
@@ -38,8 +61,14 @@ class LinearProblem:
     def requirement(self, rule: str) -> Requirement:
         """What `rule` asks of the tolerances that have a cost; the others are held."""
         dimensions = self.section.dimensions
-        fixed = [d.sensitivity * d.tolerance for name, d in dimensions.items() if name not in self.costs]
-        return MAKERS[rule]([dimensions[name].sensitivity for name in self.costs], self.section.gap_tolerance, fixed)
+        counted = dict.fromkeys(dimensions, 1.0)
+        if rule == "rss":
+            sigmas = np.array([d.sigmas for d in dimensions.values()])
+            factors = spread_factors(sigmas, self.section.required_yield)
+            counted = dict(zip(dimensions, map(float, factors), strict=True))
+        slopes = {name: counted[name] * d.sensitivity for name, d in dimensions.items()}
+        fixed = [slopes[name] * d.tolerance for name, d in dimensions.items() if name not in self.costs]
+        return MAKERS[rule]([slopes[name] for name in self.costs], self.section.gap_tolerance, fixed)
 
     def judged(self, tolerances: Mapping[str, float], n: int) -> Stack:
         """The stack of `n` samples under other `tolerances`."""
@@ -68,6 +97,9 @@ def allocate_linear(study: Study, request: AllocationRequest) -> AllocateResult:
     requirement = problem.requirement(request.rule)
     solution = solve(items, requirement)
     comparison = _comparison(problem, solution) if request.compare else ()
+    verified = problem.judged(solution.tolerances, request.verify_n).conforming
+    missed = verified.value < section.required_yield
+    at = at_assumed_bounds(study, items, solution.tolerances)
     sources = {name: cost.source for name, cost in problem.costs.items()}
     return AllocateResult(
         study=study.name,
@@ -75,8 +107,8 @@ def allocate_linear(study: Study, request: AllocationRequest) -> AllocateResult:
         unit=section.unit,
         limit=section.gap_tolerance,
         required_yield=section.required_yield,
-        status="optimal",
-        errors=allocated_errors(items, sources, solution, problem.present, section.unit),
+        status="not verified" if missed else "optimal",
+        errors=allocated_errors(items, sources, solution, problem.present, section.unit, at),
         total_cost=solution.total_cost,
         present_cost=cost_of(items, problem.present),
         optimality_gap=solution.optimality_gap,
@@ -86,12 +118,17 @@ def allocate_linear(study: Study, request: AllocationRequest) -> AllocateResult:
         marginal_cost=solution.marginal_cost,
         marginal_cost_reason=marginal_reason("requirement", section.unit, solution.marginal_cost, solution.grades),
         slack=solution.slack,
-        verified_yield=problem.judged(solution.tolerances, request.verify_n).conforming,
+        verified_yield=verified,
         verify_n=request.verify_n,
         verify_seed=request.verification_seed,
         comparison=comparison,
         cost_curve=tuple(cost_curve(items, requirement, [factor * section.gap_tolerance for factor in request.curve])),
-        notes=("the verified yield takes each dimension as normal, truncated at its tolerance",),
+        notes=(
+            NORMAL,
+            *((not_reached(request.rule, verified, section.required_yield),) if missed else ()),
+            *bound_notes(at, items),
+            *present_notes(items, problem.present),
+        ),
     )
 
 
@@ -102,30 +139,38 @@ def _problem(study: Study, request: AllocationRequest) -> LinearProblem:
     costs = {name: d.cost for name, d in section.dimensions.items() if d.cost is not None}
     if not costs:
         raise HdoptError("allocate needs costs: give at least one dimension of [linear_stack] a cost")
-    items = tuple(
-        Item(
-            name,
-            cost.build(None),
-            section.dimensions[name].tolerance,
-            cost.tightest or 0.0,
-            cost.widest or float("inf"),
-        )
-        for name, cost in costs.items()
-    )
+    items = tuple(_item(name, section, cost) for name, cost in costs.items())
     return LinearProblem(section, request, costs, items)
+
+
+def _item(name: str, section: LinearStackSection, cost: Cost) -> Item:
+    """The dimension `name` of the stack as a tolerance to choose at this `cost`."""
+    try:
+        model = cost.build(None, section.unit)
+    except HdoptError as error:
+        raise HdoptError(f"cost of {name}: {error}") from error
+    present = section.dimensions[name].tolerance
+    return Item(name, model, present, *assumed_bounds(cost, present, LINEAR_REACH))
 
 
 def _comparison(problem: LinearProblem, solution: Solution) -> tuple[RuleOutcome, ...]:
     """The present tolerances and those of each rule, judged by the same stack; `solution` is the rule's asked for."""
 
+    fewer = smallest_n(problem.section.required_yield) <= STACK_N
+    n = STACK_N if fewer else problem.request.verify_n
+
     def outcome(name: str, tolerances: dict[str, float], cost: float, modelled: float | None) -> RuleOutcome:
-        found = problem.judged(tolerances, STACK_N)
-        return RuleOutcome(name, cost, tolerances, found.conforming, found.required_quantile.value, modelled)
+        found, note = problem.judged(tolerances, n), finer_than_data(problem.items, tolerances)
+        return RuleOutcome(name, cost, tolerances, found.conforming, found.required_quantile.value, modelled, note)
 
     outcomes = [outcome("present", problem.present, cost_of(problem.items, problem.present), None)]
     for name in MAKERS:
         requirement = problem.requirement(name)
-        found = solution if name == problem.request.rule else solve(problem.items, requirement)
+        try:
+            found = solution if name == problem.request.rule else solve(problem.items, requirement)
+        except Infeasible as error:
+            outcomes.append(infeasible(name, error))
+            continue
         value = requirement.value(np.array(list(found.tolerances.values())))
         outcomes.append(outcome(name, found.tolerances, found.total_cost, value))
     return tuple(outcomes)

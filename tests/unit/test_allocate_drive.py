@@ -14,7 +14,9 @@ from hdopt.allocation.rules import (
     verify,
     yield_margin,
 )
-from hdopt.workflow.allocate import allocate
+from hdopt.errors import HdoptError
+from hdopt.study import load_study
+from hdopt.workflow.allocate import allocate, items_of
 from hdopt.workflow.stack import study_problem
 
 
@@ -56,3 +58,15 @@ def test_shipped_study_with_grades():
     assert result.errors["cs_tooth_amplitude_mm"].grade.startswith("ISO 1328 class")
     assert "this gear has 0.396 mm" in result.errors["cs_tooth_amplitude_mm"].extrapolated
     assert result.optimality_gap is None and "no lower bound" in result.optimality_gap_reason
+
+
+def test_grades_of_an_error_in_degrees_are_no_millimetres():
+    """IT6 of 18 to 30 mm is 0.013 mm (ISO 286-1, Table 1). Fault caught: 0.013 deg, taken without a word; a factor in
+    degrees for each mm is right."""
+    cost = (
+        'tolerances.axis_tilt_y_deg.cost={model="table",system="iso286",nominal_mm=20,grades=[{grade="IT6",cost=5}]%s}'
+    )
+    with pytest.raises(HdoptError, match=r"cost of axis_tilt_y_deg: .*in 'deg', which is no length .*write factor"):
+        items_of(load_study("csf-25-80", (cost % "",)), study_problem("csf-25-80").space)
+    (item,), _ = items_of(load_study("csf-25-80", (cost % ",factor=3",)), study_problem("csf-25-80").space)
+    assert item.bounds == pytest.approx((3 * 0.013, 3 * 0.013))

@@ -1,12 +1,13 @@
 """Requirements, prices and rules of an allocation, by hand and by differences."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hdopt.allocation import convex, rules
-from hdopt.allocation.convex import Item, rss_rule, solve, worst_case_rule
+from hdopt.allocation.convex import Infeasible, Item, rss_rule, solve, worst_case_rule
 from hdopt.allocation.cost import Exponential, Grade, GradeTable, Piecewise, Reciprocal
 from hdopt.allocation.rules import (
     AllocationProblem,
@@ -192,3 +193,61 @@ def test_tolerances_that_break_the_requirement_are_no_answer():
     assert convex._finish(items, requirement, np.array([0.5 * (1 + 1e-10)]), **end).slack < 0
     with pytest.raises(HdoptError, match="break the requirement by 1e-06"):
         convex._finish(items, requirement, np.array([0.5 * (1 + 1e-6)]), **end)
+
+
+@pytest.mark.parametrize(
+    ("rule", "said"),
+    [
+        (allocate_by_worst_case, r"^the requirement 0\.4 mm cannot be met by the worst case rule: .*reachable is 0\.8"),
+        (
+            allocate_by_rss,
+            r"^the requirement 0\.4 mm at yield 0\.9 cannot be met by the rss rule: .*reachable is 0\.51",
+        ),
+        (allocate_by_yield, r"^the requirement 0\.4 mm at yield 0\.9 cannot be met by the yield rule: .*is 0\.5"),
+    ],
+)
+def test_what_cannot_be_met_is_so_by_a_rule(quick, rule, said):
+    """The held input has a standard deviation of 0.1 to 0.4 within 8 of it: 0.8 or more in the worst case, 1.2816 x 0.4
+    at the yield. Fault caught: the yield in the sentence of the worst case, whatever the rule, which is false where the
+    requirement can be met by yield."""
+    held = 0.1 if rule is allocate_by_worst_case else 0.4
+    with pytest.raises(Infeasible, match=said):
+        rule(problem(held), seed=3)
+
+
+def test_what_equal_scaling_cannot_meet_has_no_lower_bounds(quick):
+    """Fault caught: lower bounds of the tolerances in the sentence of a rule that knows none."""
+    with pytest.raises(
+        Infeasible, match=r"cannot be met by equal scaling: with a hundredth of every tolerance .* 0\.5"
+    ):
+        allocate_by_equal_scaling(problem(0.4), seed=3)
+
+
+@pytest.mark.parametrize("lower", [0.9, 2.0])
+@pytest.mark.parametrize("rule", [allocate_by_rss, allocate_by_worst_case, allocate_by_yield])
+def test_bounds_may_begin_far_above_the_present_tolerance(quick, rule, lower):
+    """From tolerances of 0.4 to at least 2.3 and 5 times as much, which a limit of 8 leaves room for. Fault caught: the
+    reach of a step that ends below the bounds, refused as "may run from 0.9 to 0.64"."""
+    one = problem(limit=8.0)
+    items = (replace(one.items[0], lower=lower, upper=1.5 * lower), one.items[1])
+    found = rule(replace(one, items=items), seed=3)
+    # wider is cheaper and the limit leaves room, but for the worst case
+    assert lower <= found.tolerances["a"] <= 1.5 * lower * (1 + 1e-9)
+    assert found.modelled <= 8.0
+
+
+@pytest.mark.parametrize(
+    ("bounds", "tolerance", "kept"),
+    [
+        ((0.9, 2.0), 0.1, (0.9, 1.44)),
+        ((0.9, 1.2), 0.1, (0.9, 1.2)),
+        ((0.01, 0.05), 0.4, (0.03125, 0.05)),
+        ((0.1, 2.0), 0.4, (0.25, 0.64)),
+        ((0.3, 0.5), 0.4, (0.3, 0.5)),
+    ],
+)
+def test_a_step_starts_at_the_end_of_the_bounds_next_to_it(bounds, tolerance, kept):
+    """A factor of 1.6 to either side of where a tolerance stands, or of the end of its bounds next to that. Fault
+    caught: an upper end of a step below the lower one of the bounds."""
+    item = rules._within(Item("a", Reciprocal(0.0, 1.0), tolerance, *bounds), tolerance, 1.6)
+    assert (item.lower, item.upper) == pytest.approx(kept)

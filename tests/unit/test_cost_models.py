@@ -1,5 +1,7 @@
 """Costs of tolerances and the margin of a yield, by hand."""
 
+import math
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -38,6 +40,14 @@ def test_lines_meet_at_their_points():
     assert model.cost([1.5, 3.0]) == pytest.approx([7.0, 3.0])
     assert model.slope(np.array([1.5, 3.0])) == pytest.approx([-6.0, -1.0])
     assert model.convex and not Piecewise(((1.0, 10.0), (2.0, 9.0), (4.0, 2.0))).convex
+
+
+def test_lines_say_nothing_of_what_is_finer_than_their_points():
+    """Fault caught: the end's cost for a tolerance that nobody quoted; and none for one at the end but for rounding, or
+    for one wider than all, which costs no more than the widest."""
+    model = Piecewise(((0.1, 10.0), (0.2, 4.0)))
+    assert model.cost([0.02, 0.09]) == pytest.approx([math.nan, math.nan], nan_ok=True)
+    assert model.cost([0.1, 0.1 * (1 - 1e-12), 0.2, 0.9]) == pytest.approx([10.0, 10.0, 4.0, 4.0])
 
 
 def test_the_cheapest_grade_that_keeps_a_tolerance():

@@ -218,3 +218,36 @@ def test_a_measured_curve_of_another_size_is_refused(surface, times, said, tmp_p
     drive = DriveGeometry(100, 102, 0.5, math.radians(20), 24.0)
     with pytest.raises(HdoptError, match=rf"{said}.*measure radii in mm from the axis, and say by surface"):
         WaveGeneratorSection(**keys, surface=surface).build_profile(drive, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("unit", "tolerance"),
+    [("nm", 33e3), ("um", 33.0), ("\u00b5m", 33.0), ("mm", 0.033), ("cm", 0.0033), ("m", 33e-6), ("in", 0.033 / 25.4)],
+)
+def test_grades_of_a_standard_come_in_the_unit_of_the_stack(unit, tolerance):
+    """IT8 from 18 to 30 mm is 33 um (ISO 286-1, Table 1). Fault caught: millimetres taken for the stack's own unit,
+    which makes the grade a thousand times too fine in um; and a factor, a ratio of lengths, that is not one."""
+    row = {"model": "table", "grades": [{"grade": "IT8", "cost": 1.0}], "system": "iso286", "nominal_mm": 20.0}
+    assert TableRow(**row).build(None, unit).grades[0].tolerance == pytest.approx(tolerance, rel=1e-12)
+    assert TableRow(**row, factor=0.5).build(None, unit).grades[0].tolerance == pytest.approx(tolerance / 2, rel=1e-12)
+
+
+def test_grades_of_a_standard_for_an_angle_need_a_factor():
+    """An angle of 0.013 mm over 20 mm is 0.013/20 rad. Fault caught: 0.013 mm read as 0.013 deg; a factor of 1 that
+    was written taken for none; and one that converts a unit once more."""
+    row = {"model": "table", "grades": [{"grade": "IT6", "cost": 1.0}], "system": "iso286", "nominal_mm": 20.0}
+    with pytest.raises(
+        HdoptError, match=r"in 'deg', which is no length .*write factor = the tolerance in deg for each"
+    ):
+        TableRow(**row).build(None, "deg")
+    over_20_mm = TableRow(**row, factor=math.degrees(1 / 20)).build(None, "deg").grades[0].tolerance
+    assert over_20_mm == pytest.approx(0.013 / 20 * 180 / math.pi)
+    assert TableRow(**row, factor=1.0).build(None, "deg").grades[0].tolerance == pytest.approx(0.013)
+    with pytest.raises(HdoptError, match="factor is 1000, the um in a mm; .* leave it out"):
+        TableRow(**row, factor=1000.0).build(None, "um")
+
+
+def test_grades_that_a_study_states_itself_are_in_its_own_unit():
+    """Fault caught: a conversion of tolerances that no standard gives."""
+    row = TableRow(model="table", grades=[{"grade": "A", "tolerance": 4.0, "cost": 1.0}])
+    assert [row.build(None, unit).grades[0].tolerance for unit in ("um", "in", "deg")] == [4.0, 4.0, 4.0]
