@@ -111,6 +111,11 @@ def _of_allocation(found: Found) -> list[str]:
     if "total_cost" not in allocation:
         return []
     check, what = allocation["verified_yield"]["value"], _of_what(found.get("stack", {}))
+    if allocation.get("status") == "not verified":
+        return [
+            f"The tolerances found cost {allocation['total_cost']:.4g}; only {percent(check)} of {what} then stay "
+            "within the limit, fewer than are needed: [[allocate-tolerances]]."
+        ]
     return [
         f"The least-cost tolerances that keep it cost {allocation['total_cost']:.4g}, and {percent(check)} of {what} "
         "then stay within the limit: [[allocate-tolerances]]."

@@ -211,3 +211,16 @@ def test_the_status_says_whether_the_requirement_is_met(answer, checked, value, 
     if verdict is not None:
         assert verdict.met is not missed
         assert verdict.line.startswith("requirement missed" if missed else "requirement met")
+
+
+@pytest.mark.parametrize(
+    "line", ["compensate r.csv -o -", "inspect r.csv --report -", "stack csf-25-80-tolerances --xlsx -"]
+)
+def test_standard_output_is_no_file_where_nothing_is_written_to_it(line, tmp_path, monkeypatch):
+    """Fault caught: a file called '-' in the working directory, and no word of it."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.csv").write_text("input_deg,output_deg\n0,0\n")
+    said = CliRunner().invoke(cli, line.split(), standalone_mode=True)
+    assert said.exit_code != 0
+    assert "-" not in {path.name for path in tmp_path.iterdir()}
+    assert "only --json and --csv write to standard output" in said.output

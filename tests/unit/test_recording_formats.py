@@ -608,3 +608,15 @@ def test_a_number_in_a_files_refusal_is_none_of_the_studys(tmp_path, capsys):
         main(["inspect", str(tmp_path / "bin.csv"), "--drive", "csf-25-80"])
     assert ended.value.code == 2
     assert capsys.readouterr().err.startswith("hdopt: bin.csv is not a text file: line 1, byte 6 is no character")
+
+
+@pytest.mark.parametrize("other", ["error_arcmin", "output_angle_rad", "load_deg"])
+def test_the_input_of_the_default_layout_is_read_beside_any_output(tmp_path, other):
+    """Fault caught: a file with one column of the default layout refused for the other, though the same columns under
+    worse names are read."""
+    angle = np.linspace(0, 20 * 360, 2000)
+    size = {"error_arcmin": 0.3 * np.sin(np.radians(angle)), "output_angle_rad": np.radians(angle) / 80}
+    pd.DataFrame({"input_angle_deg": angle, other: size.get(other, angle / 80)}).to_csv(tmp_path / "r.csv", index=False)
+    found = read_recording(tmp_path / "r.csv", 80.0)
+    assert np.ptp(found.input_angle) == pytest.approx(40 * np.pi)
+    assert np.ptp(found.error_arcmin) == pytest.approx(0.6 if other == "error_arcmin" else 0.0, abs=1e-3)

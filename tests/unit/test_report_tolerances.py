@@ -1,5 +1,7 @@
 """The tolerance sections' numbers: what they show is what the results hold."""
 
+from dataclasses import replace
+
 import pytest
 
 from hdopt.report import Figure, KeyFigures, Report, Table
@@ -83,6 +85,17 @@ def test_allocation_shows_the_rules(sections):
     rules = of_kind(sections["allocate"], Table)["allocate-rules"].frame
     assert rules["rule"].tolist() == ["present", "worst_case", "rss"]
     assert rules["cost"].tolist() == pytest.approx([9.3359, 11.07783, 8.053611], abs=5e-5)
+
+
+def test_an_allocation_that_verification_misses_is_not_said_to_meet_the_requirement():
+    """Fault caught: 'meets the requirement' over a status that says it does not, and a present cost of 'nan'."""
+    found = replace(allocate("chase-shaft-housing", compare=False), present_cost=float("nan"))
+    assert "rule meets the requirement at a cost of" in allocate_section(found).summary
+    missed = allocate_section(replace(found, status="not verified"))
+    assert "meets the requirement" not in missed.summary
+    assert f"only {100 * found.verified_yield.value:.3f} % are verified" in missed.summary
+    (figures,) = (item for item in missed.items if isinstance(item, KeyFigures))
+    assert "now: not known" in str(figures) and "nan" not in str(figures)
 
 
 def test_the_page_is_written(sections, tmp_path):

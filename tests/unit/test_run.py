@@ -118,6 +118,12 @@ def test_a_verdict_on_many_drives_says_what_the_one_drive_is():
     assert "CS tooth amplitude (70 %) and WG tilt major (20 %)" in said
     assert "It is one example" in said
     assert section_of_run(None, found) is None
+    allocation = {"status": "not verified", "total_cost": 12.0, "verified_yield": {"value": 0.98}}
+    for status, words in (("verified", "tolerances that keep it cost 12"), ("not verified", "only 98")):
+        told = {**found, "allocate": {**allocation, "status": status}}
+        said = " ".join(section_of_run(of_run(load_study("csf-25-80"), told), told).items[1].sentences)
+        assert words in said.replace("\u00a0", " ")
+        assert ("keep it" in said) == (status == "verified")
     parts = section_of_run(of_run(load_study("csf-25-80"), found), {"stack": {**found["stack"], "method": None}})
     said = parts.items[0].text + " ".join(parts.items[1].sentences)
     assert "assemblies" in said and "drives" not in said, "a stack of dimensions has no drives"

@@ -397,15 +397,22 @@ def allocate_section(result: AllocateResult, key: str = "allocate") -> Section:
         key,
         "What the tolerances should be",
         tuple(items),
-        f"The {result.rule.replace('_', ' ')} rule meets the requirement at a cost of {result.total_cost:.4g}"
+        f"The {result.rule.replace('_', ' ')} rule {_meets(result)} at a cost of {result.total_cost:.4g}"
         + (f", {abs(change):.3g} {'more' if change > 0 else 'less'} than now." if np.isfinite(change) else "."),
     )
 
 
+def _meets(result: AllocateResult) -> str:
+    if result.accepted:
+        return "meets the requirement"
+    return f"finds tolerances of which only {100 * result.verified_yield.value:.3f} % are verified,"
+
+
 def _allocate_figures(result: AllocateResult) -> dict[str, str]:
     check = result.verified_yield
+    now = f"{result.present_cost:.4g}" if np.isfinite(result.present_cost) else "not known"
     figures = {
-        "Cost": f"{result.total_cost:.4g} (as toleranced now: {result.present_cost:.4g})",
+        "Cost": f"{result.total_cost:.4g} (as toleranced now: {now})",
         "Verified yield": f"{100 * check.value:.3f} % ({100 * check.low:.3f} to {100 * check.high:.3f})",
         "Status": result.status,
         "Optimality gap": "not known" if result.optimality_gap is None else f"{100 * result.optimality_gap:.2g} %",
