@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 import click
@@ -78,7 +79,12 @@ def _numbers_of_options(message: str, context: click.Context) -> Iterator[float]
 
 def _begins_with_an_input(message: str, work: FilesOfWork) -> bool:
     """Whether `message` speaks of a file that was read: its numbers are of that file, whatever a study holds."""
-    return any(message.startswith(path.name) for path in work.inputs)
+    return message.startswith(tuple(name for path in work.inputs for name in _ends_of(path)))
+
+
+def _ends_of(path: Path) -> list[str]:
+    """What `path` may be called from a folder above it: 'cam.csv', 'cams/cam.csv', and so on up to all of it."""
+    return [str(Path(*path.parts[start:])) for start in range(len(path.parts))]
 
 
 def _names_an_input(message: str, context: click.Context | None, work: FilesOfWork) -> bool:

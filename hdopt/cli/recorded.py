@@ -82,8 +82,8 @@ def recording_options(command: Callable[..., R]) -> Callable[..., R]:
         click.option(
             "--columns",
             metavar="CHANNEL=NAME:UNIT,...",
-            help="Layout: input, output or error (input/N - output), time, torque, temperature; NAME may be a path in the "
-            "file, UNIT counts/16384, -rad, deg/gear3.",
+            help="Layout: input, output or error (input/N - output), time, torque, temperature; NAME may be a path in "
+            "the file, UNIT counts/16384, -rad, deg/gear3.",
         ),
         click.option(
             "--bench",

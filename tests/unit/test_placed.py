@@ -1,6 +1,8 @@
 """A refusal names the option, or the file and line, of the number that it speaks of."""
 
 import re
+from dataclasses import replace
+from pathlib import Path
 
 import click
 import pytest
@@ -247,6 +249,16 @@ def test_a_message_that_names_a_key_comes_with_its_line(source):
 
 def of(document):
     return FilesOfWork(facts={"source": document.source}, values=lambda message: places_named(document, message))
+
+
+@pytest.mark.parametrize("called", ["cam.csv", "cams/cam.csv", "/work/cams/cam.csv"])
+def test_the_numbers_of_a_file_that_was_read_are_no_studys(called):
+    """Fault caught: an input known by its bare name alone, so that one in a folder is placed at a study's line."""
+    document = parse_document("radius_mm = 21.5\n", "s.toml")
+    work = replace(of(document), inputs={Path("/work/cams/cam.csv"): ""})
+    said = f"{called}, line 7: the radius 21.5 comes twice"
+    assert placed(said, None, work) == said
+    assert placed("the radius 21.5 is too large", None, work).startswith("s.toml, line 1, radius_mm")
 
 
 def test_an_engine_that_fails_is_no_fault_of_the_study():
