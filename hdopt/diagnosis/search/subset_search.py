@@ -32,6 +32,7 @@ from hdopt.diagnosis.search.candidates import (
 )
 from hdopt.diagnosis.search.completion import completed
 from hdopt.diagnosis.search.explore import explore
+from hdopt.diagnosis.search.in_place_of_others import in_place_of_others
 from hdopt.diagnosis.search.penalty import flexibility, leaves_nothing
 from hdopt.diagnosis.search.plain_for_waves import plain_for_waves
 from hdopt.diagnosis.search.refinement import (
@@ -273,8 +274,8 @@ def beside_a_far_drive(state: SearchState) -> SearchState:
 
 
 def beside_what_is_told(state: SearchState) -> SearchState:
-    """What a drive as built and its bench may do without a finding, in place of the leader and beside it; where that
-    leads, the search goes on about it. `state` is where the work stands.
+    """What a drive as built and its bench may do without a finding, in place of the leader, beside it and in place of
+    some of its effects; where that leads, the search goes on about it. `state` is where the work stands.
     """
     before = state.leader
     for effect in state.base.problem.explanations.values():
@@ -282,7 +283,10 @@ def beside_what_is_told(state: SearchState) -> SearchState:
             continue
         for start in (state.base, *([before.fit] if before is not None else [])):
             found = search_terms(state.probe(start), only=[effect.id])
-            state = state.taking([joint_fit(start, [*start.terms, term]) for term in found])
+            fits = [joint_fit(start, [*start.terms, term]) for term in found]
+            state = state.taking(fits)
+            for fit in fits:
+                state = in_place_of_others(state, start, fit)
     return about_a_new_leader(state, before)
 
 
