@@ -48,7 +48,8 @@ def _biarcs(curve: ParallelCurve) -> Array:
         count *= 2
     raise HdoptError(
         f"the {curve.profile.name} profile is too rough for wire cutting: {MOST_ARCS} arcs do not follow it within "
-        f"{ARC_TOLERANCE * 1e3:g} um; give the points' scatter as noise, so that the profile is smoothed"
+        f"{ARC_TOLERANCE * 1e3:g} um; give the points' scatter as wave_generator.noise_um, so that the profile is "
+        "smoothed"
     )
 
 

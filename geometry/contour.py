@@ -65,10 +65,13 @@ class ParallelCurve:
         tightest = kappa.max() if self.distance > 0 else kappa.min()
         if 1 - self.distance * tightest <= 0:
             side = "inside" if self.distance > 0 else "outside"
+            scattered = isinstance(self.profile, MeasuredProfile)
+            noise = ", or, where measured points scatter, by how much as wave_generator.noise_um" if scattered else ""
             raise HdoptError(
                 f"a parallel curve {abs(self.distance):.4g} mm {side} the {self.profile.name} profile crosses itself: "
                 f"the profile's least radius of curvature is {1 / abs(tightest):.4g} mm; "
                 "give a thinner bearing (wave_generator.bearing_thickness_mm), or a profile that bends less sharply"
+                f"{noise}"
             )
 
     @cached_property

@@ -62,7 +62,7 @@ def wheel_path(contour: ParallelCurve, wheel_radius: float) -> Array:
         count *= 2
     raise HdoptError(
         f"the {contour.profile.name} profile is too rough for grinding in 46,080 blocks; give the points' scatter as "
-        "noise (wave_generator.noise_um), so that the profile is smoothed"
+        "wave_generator.noise_um, so that the profile is smoothed"
     )
 
 

@@ -97,7 +97,7 @@ def spans_needed(curve: ParallelCurve) -> int:
         spans *= 2
     raise HdoptError(
         f"the {curve.profile.name} profile is too rough for a smooth surface: {MOST_SPANS} spline spans still miss it "
-        f"by {worst * 1e3:.2g} um; give the points' scatter as noise, so that the profile is smoothed"
+        f"by {worst * 1e3:.2g} um; give the points' scatter as wave_generator.noise_um, so that the profile is smoothed"
     )
 
 

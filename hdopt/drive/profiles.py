@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hdopt.arrays import Array
+from hdopt.drive.polar_points import last_place, require_one_point_an_angle, without_closing_point
 from hdopt.drive.values import DriveError, require, require_positive
 from hdopt.errors import HdoptError, shown
 from hdopt.files import are_names, cells_of, on_commas, read_text
@@ -264,6 +265,7 @@ class MeasuredProfile:
     noise: float = 0.0
     source: str = "array"
     _spline: tuple[Array, Array, int] = field(init=False, repr=False, compare=False)
+    _inside: tuple[MeasuredProfile, float] | None = field(init=False, repr=False, compare=False, default=None)
     name = "measured"
     tip_is_smooth = False
 
@@ -295,13 +297,10 @@ class MeasuredProfile:
         require(
             math.isfinite(self.noise) and self.noise >= 0, f"{where}: noise is {self.noise!r} mm; it must be 0 or above"
         )
+        require_one_point_an_angle(angles, where)
         order = np.argsort(angles)
         angles, radii = angles[order], radii[order]
         gaps = np.diff(np.append(angles, angles[0] + 2 * math.pi))
-        require(
-            gaps.min() > 1e-9,
-            f"{where} gives the angle {math.degrees(angles[gaps.argmin()]):.6g} deg twice; keep one point an angle",
-        )
         # A whole turn in rad, read as deg.
         of_radians = "; these look like angles in rad, give them in deg" if math.degrees(np.ptp(angles)) < 6.3 else ""
         require(
@@ -350,6 +349,18 @@ class MeasuredProfile:
         return sum(_arc_length(self, a, b) for a, b in itertools.pairwise(knots))
 
     @property
+    def table(self) -> MeasuredProfile:
+        """The profile through the points that were measured: another one where this is its parallel curve."""
+        return self if self._inside is None else self._inside[0]
+
+    def smoothed(self, noise: float) -> MeasuredProfile:
+        """The profile of the same points with another `noise`, mm."""
+        if self._inside is None:
+            return MeasuredProfile(self.angles, self.radii, noise, self.source)
+        table, distance = self._inside
+        return parallel_profile(table.smoothed(noise), distance)
+
+    @property
     def off_centre(self) -> float:
         """How far the centroid of the area within the curve lies from the origin of its angles, mm."""
         phi = np.arange(3600) * (math.pi / 1800)
@@ -365,7 +376,7 @@ _OTHER_UNIT = re.compile(r"(?<![a-zA-Z])(?:rad|gon|arcmin|turns?|[uµμ]m|inch|c
 
 def read_polar(path: Path, what: str) -> tuple[Array, Array]:
     """Angles (rad) and radii (mm) from the CSV file `path` of rows angle_deg, radius_mm, (n,) each, as they stand; a
-    last point that closes the turn is left out.
+    last point that closes the turn is left out (`without_closing_point`).
 
     A header line is optional, `#` starts a comment; between semicolons or tabs, numbers may have a decimal comma. A
     header with both names may have more columns, and in any order, and stand below lines of words. Raises
@@ -375,7 +386,7 @@ def read_polar(path: Path, what: str) -> tuple[Array, Array]:
         text = read_text(path, "a CSV text file", foreign=True)
     except HdoptError as error:
         raise DriveError(f"{what} {path}: cannot be read ({error})") from error
-    points: list[tuple[float, float]] = []
+    points: list[tuple[float, float, float]] = []
     names: list[str] = []
     header_allowed = True
     lines = [
@@ -393,10 +404,8 @@ def read_polar(path: Path, what: str) -> tuple[Array, Array]:
             )
         header_allowed = False
     require(bool(points), f"{what} {path} holds no points; give lines of angle_deg,radius_mm")
-    angles, radii = np.array(points).T
-    if len(angles) > 1 and math.isclose(abs(angles[-1] - angles[0]), 2 * math.pi, abs_tol=1e-9):
-        angles, radii = angles[:-1], radii[:-1]
-    return angles, radii
+    angles, radii, places = np.array(points).T
+    return without_closing_point(angles, radii, float(places.min()), f"{what} {path}")
 
 
 def _above_names(lines: list[tuple[int, str, list[str]]]) -> int:
@@ -420,16 +429,18 @@ def _named(names: list[str], where: str) -> list[str]:
     return []
 
 
-def _point(cells: list[str], names: list[str], where: str, hint: str) -> tuple[float, float]:
-    """Angle (rad) and radius (mm) of a row of `cells`, by the `names` of their columns where a header gave them;
-    `where` begins and `hint` ends the message of a row that holds something else."""
+def _point(cells: list[str], names: list[str], where: str, hint: str) -> tuple[float, float, float]:
+    """Angle (rad), radius (mm) and the unit of the radius's last digit (mm) of a row of `cells`, by the `names` of
+    their columns where a header gave them; `where` begins and `hint` ends the message of a row that holds something
+    else."""
     beyond = bool(names) and any(cells[len(names) :])
     try:
-        angle, radius = map(float, [cells[names.index(name)] for name in POLAR] if names and not beyond else cells)
+        told, radius_told = [cells[names.index(name)] for name in POLAR] if names and not beyond else cells
+        angle, radius = float(told), float(radius_told)
     except (ValueError, IndexError):
         raise DriveError(f"{where} two numbers, {','.join(POLAR)}{hint}") from None
     require(math.isfinite(angle) and math.isfinite(radius), f"{where} finite numbers; leave the point out")
-    return math.radians(angle), radius
+    return math.radians(angle), radius, last_place(radius_told)
 
 
 def parallel_profile(profile: WaveGeneratorProfile, distance: float, points: int = 1440) -> MeasuredProfile:
@@ -444,7 +455,10 @@ def parallel_profile(profile: WaveGeneratorProfile, distance: float, points: int
     outward, along = r + distance * r / length, -distance * r1 / length
     source = f"{getattr(profile, 'source', profile.name)}, {distance:g} mm outside"
     angles = np.asarray(phi + np.arctan2(along, outward), float)
-    return MeasuredProfile(angles, np.asarray(np.hypot(outward, along), float), source=source)
+    found = MeasuredProfile(angles, np.asarray(np.hypot(outward, along), float), source=source)
+    if isinstance(profile, MeasuredProfile):
+        object.__setattr__(found, "_inside", (profile, distance))
+    return found
 
 
 PROFILES: dict[str, type] = {"ellipse": Ellipse, "resal": Resal, "two_disk": TwoDisk, "measured": MeasuredProfile}

@@ -15,6 +15,7 @@ from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.drive.profiles import WaveGeneratorProfile
 from hdopt.errors import HdoptError, MissingValue
+from hdopt.mechanics.zone_sides import mean_of_sides, zone_sides
 
 TIPS, FLANKS = "tips", "flanks"
 """What counts as contact: tips that overlap, as Jia 2021 counts, or flanks that carry (`Mesh.carrying_angle`)."""
@@ -37,9 +38,16 @@ def contact_angle(geometry: DriveGeometry, profile: WaveGeneratorProfile) -> flo
     """Half angle from the major axis to where the tips cease to overlap, rad (Jia 2021, Table 4).
 
     The tips are those of `geometry`, the flexspline deflected by `profile` as in `tip_overlap`. Reproduces the
-    published Resal and two-disk values within 0.03 deg. Raises `HdoptError` where the tips never overlap, or overlap
+    published Resal and two-disk values within 0.03 deg. Of a measured profile, whose two zones may differ and be
+    lopsided, it is the mean of the angles on the four sides of both zones (`zone_sides`), so that Z_mp stays the mean
+    number of teeth on one side of one zone. Raises `HdoptError` where on any side the tips never overlap, or overlap
     all round (the teeth would not clear each other on the minor axis).
     """
+    return mean_of_sides([_angle_on_a_side(geometry, side) for side in zone_sides(profile)])
+
+
+def _angle_on_a_side(geometry: DriveGeometry, profile: WaveGeneratorProfile) -> float:
+    """Angle from the tip, over the first quarter of a turn of `profile`, to where the tips cease to overlap, rad."""
     from scipy.optimize import brentq
 
     at_major, at_minor = tip_overlap(geometry, profile, [0.0, math.pi / 2])
@@ -79,7 +87,8 @@ def homogenization_coefficient(teeth_in_mesh: float, base: float = 1.0) -> float
 class Contact:
     """The teeth that are in contact: k_e and the mean flank pressure both count these and no others.
 
-    `angle` is the half angle (rad) from the major axis up to which teeth count, `summed_depth` the depth of engagement
+    `angle` is the half angle (rad) from the major axis up to which teeth count (on the mean of the four sides of both
+    zones, where they differ), `summed_depth` the depth of engagement
     summed over the teeth up to there on the approaching flank of both zones, mm; `counts` says what was counted, `TIPS`
     that overlap or `FLANKS` that carry. Made by `hdopt.mechanics.tooth_path.Mesh.contact`.
     """

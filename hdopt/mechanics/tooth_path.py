@@ -41,6 +41,7 @@ from hdopt.mechanics.tooth_gap import (
     ring_of,
     straight_flanks,
 )
+from hdopt.mechanics.zone_sides import mean_of_sides, zone_sides
 
 GRID = np.linspace(0.0, math.pi / 2, NODES)
 """Where a profile is sampled with two derivatives: quintics between 1 deg steps keep 1e-13 mm of smooth profiles, and
@@ -52,10 +53,20 @@ NO_STRETCH = 1e-10
 
 @dataclass(frozen=True)
 class Mesh:
-    """The mesh of one flexspline on one profile; everything here is independent of the wave generator's width."""
+    """The mesh of one flexspline on one profile; everything here is independent of the wave generator's width.
+
+    Path, ring and gaps are those of the quarter turn behind the first tip. The quantities of the whole mesh are the
+    mean over all four `sides` of its two zones, or the worst of them, where a measured profile makes them differ.
+    """
 
     geometry: DriveGeometry
     profile: WaveGeneratorProfile
+
+    @cached_property
+    def sides(self) -> tuple[Mesh, ...]:
+        """The mesh on every side of both zones: itself alone where the profile makes them all alike (`zone_sides`)."""
+        sides = zone_sides(self.profile)
+        return (self,) if len(sides) == 1 else tuple(Mesh(self.geometry, side) for side in sides)
 
     @cached_property
     def _sampled(self) -> Array:
@@ -115,6 +126,8 @@ class Mesh:
     @cached_property
     def contact_angle(self) -> float:
         """Half angle over which the tips overlap, rad; the same as `hdopt.mechanics.contact.contact_angle`."""
+        if len(self.sides) > 1:
+            return mean_of_sides([side.contact_angle for side in self.sides])
         psi = _falls_to(self._sampled, self._clearance)
         return contact_angle(self.geometry, self.profile) if math.isnan(psi) else psi
 
@@ -122,34 +135,57 @@ class Mesh:
         """Largest angle psi (rad) up to which the leading straight flank runs free: t <= d tan(alpha) + backlash/2.
 
         pi/2 where it always does. Rack approximation: a flank that is corrected for the tooth's lean, see `tip_relief`.
+        The mean over the sides of both zones.
         """
         if backlash < 0:
             raise HdoptError(f"the backlash is {backlash:g} mm; it must not be negative")
+        if len(self.sides) > 1:
+            return mean_of_sides([side.free_flank_angle(pressure_angle, backlash) for side in self.sides])
         return _free_angle(self._sampled, self.geometry.module, math.tan(pressure_angle), backlash / 2)
 
     def tip_relief(self, pressure_angle: float, backlash: float) -> float:
         """By how much (mm) a straight flank of `pressure_angle` (rad) overlaps its space at most on the way to the
-        carrying angle, by the exact motion: what the tooth form must be corrected by. `backlash` in mm."""
+        carrying angle, by the exact motion: what the tooth form must be corrected by, on the worst side of a zone.
+        `backlash` in mm."""
+        if len(self.sides) > 1:
+            return max(side.tip_relief(pressure_angle, backlash) for side in self.sides)
         to = self.carrying_angle(pressure_angle, backlash)
         return float(largest_overlap(self.ring, self.flanks(pressure_angle, backlash), to))
 
     def trailing_flank_room(self, pressure_angle: float, backlash: float) -> float:
         """Least gap (mm) of the trailing straight flank of `pressure_angle` (rad) on a tooth's way out, with the
-        `backlash` in mm. Below zero the flanks jam near the major axis. It is at most half the backlash."""
+        `backlash` in mm; on the worst side of a zone. Below zero the flanks jam near the major axis. It is at most half
+        the backlash."""
+        if len(self.sides) > 1:
+            return min(side.trailing_flank_room(pressure_angle, backlash) for side in self.sides)
         return float(least_trailing_gap(self.ring, self.flanks(pressure_angle, backlash)))
 
     def carrying_angle(self, pressure_angle: float, backlash: float) -> float:
-        """Half angle over which flanks can carry, rad: overlapped tips whose flanks run free."""
+        """Half angle over which flanks can carry, rad: overlapped tips whose flanks run free. `pressure_angle` in rad,
+        `backlash` in mm; the mean over the sides of both zones."""
+        if len(self.sides) > 1:
+            return mean_of_sides([side.carrying_angle(pressure_angle, backlash) for side in self.sides])
         return min(self.contact_angle, self.free_flank_angle(pressure_angle, backlash))
 
     def summed_depth(self, angle: float) -> float:
-        """Depth of engagement summed over the teeth up to `angle` on the approaching flank of both zones, mm."""
+        """Depth of engagement summed over the teeth up to `angle` (rad) on the approaching flank of both zones, mm; the
+        mean over the sides that may be the approaching one."""
+        if len(self.sides) > 1:
+            return mean_of_sides([side.summed_depth(angle) for side in self.sides])
         overlap = deflection_at(self._sampled, angle)[2] - angle * self._clearance
         return 2 * self.geometry.circular_spline_teeth / (2 * math.pi) * overlap
 
     def contact(self, counts: str, pressure_angle: float, backlash: float | None) -> Contact:
         """The teeth in contact: all whose tips overlap, or where `counts` is `FLANKS`, those whose flanks carry at this
-        `pressure_angle` (rad) and `backlash` (mm). Raises `MissingValue` where flanks count without a backlash."""
+        `pressure_angle` (rad) and `backlash` (mm). Each side of a zone counts up to its own angle, and the contact is
+        the mean of the sides. Raises `MissingValue` where flanks count without a backlash."""
+        if len(self.sides) > 1:
+            found = [side.contact(counts, pressure_angle, backlash) for side in self.sides]
+            angle, depth = (
+                mean_of_sides([one.angle for one in found]),
+                mean_of_sides([one.summed_depth for one in found]),
+            )
+            return Contact(self.geometry, angle, depth, counts)
         if counts == TIPS:
             angle = self.contact_angle
         elif backlash is None:
@@ -169,6 +205,8 @@ class Mesh:
     @cached_property
     def largest_curvature_change(self) -> float:
         """As `hdopt.mechanics.bending.max_curvature_change`, from `GRID` and the end of the wrap, where its kink is."""
+        if len(self.sides) > 1:
+            return max(side.largest_curvature_change for side in self.sides)
         gear = self.geometry
         half_wall = ring_wall(gear) / 2
         neutral = gear.flexspline_inner_radius + half_wall

@@ -29,6 +29,7 @@ from hdopt.workflow.effect_selection import inclusion
 from hdopt.workflow.effect_table import effect_table, remarks, walked_extended_arcmin
 from hdopt.workflow.measured_parts import words_on_measured_parts
 from hdopt.workflow.placed import numbers_named
+from hdopt.workflow.rough_profile import words_on_a_rough_profile
 from hdopt.workflow.waveform import WaveformResult, converged_extremes_arcmin, held_arcmin, model_of, waveform_of
 
 if TYPE_CHECKING:
@@ -377,5 +378,5 @@ def profile(study: AnyStudy = None) -> ProfileResult:
         phi=phi,
         deflection_mm=curve.radius(phi) - gear.flexspline_inner_radius,
         curvature_change_per_mm=notes.value(curvature_change, gear, curve, phi),
-        notes=tuple(notes.notes),
+        notes=(*words_on_a_rough_profile(drive), *notes.notes),
     )
