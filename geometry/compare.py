@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from hdopt.arrays import Array
+from hdopt.drive.polar_points import SAME_RADIUS, last_place, require_one_point_an_angle, without_closing_point
 from hdopt.errors import HdoptError
 from hdopt.files import cells_of, read_text
 from hdopt.geometry.contour import Circle, Contour
@@ -68,8 +69,9 @@ def read_cam(path: Path) -> Array:
     x_mm,y_mm.
 
     `#` starts a comment; further columns, and what a machine says above the line of names, are left alone. Cells are
-    parted by commas, or by semicolons or tabs, between which numbers may have a decimal comma. Raises `HdoptError` with
-    the line of what cannot be used.
+    parted by commas, or by semicolons or tabs, between which numbers may have a decimal comma. A last point that closes
+    the turn is left out, as a study's measured profile leaves it out. Raises `HdoptError` with the line of what cannot
+    be used, and for an angle that comes twice.
     """
     lines = [
         (number, line)
@@ -78,7 +80,7 @@ def read_cam(path: Path) -> Array:
     ]
     first, header, kind = _header(path, lines)
     columns = [header.index(name) for name in kind]
-    values = []
+    values, places = [], []
     for number, line in lines[first + 1 :]:
         cells = cells_of(line)
         if any(cell.strip() for cell in cells[len(header) :]):
@@ -93,13 +95,24 @@ def read_cam(path: Path) -> Array:
         if not all(math.isfinite(value) for value in row):
             raise HdoptError(f"{path}, line {number}: holds a number that is not finite; leave the point out")
         values.append(row)
+        places.append([last_place(cells[column]) for column in columns])
     if len(values) < FEWEST_POINTS:
         raise HdoptError(f"{path} has {counted(len(values), 'point')}; at least {FEWEST_POINTS} are needed")
-    table = np.array(values)
-    if kind is CARTESIAN:
-        return table
-    angle = np.radians(table[:, 0])
-    return np.column_stack([table[:, 1] * np.sin(angle), table[:, 1] * np.cos(angle)])
+    return _points_of(np.array(values), np.min(places, axis=0), kind, f"{path}:")
+
+
+def _points_of(table: Array, places: Array, kind: tuple[str, str], where: str) -> Array:
+    """Points (n, 2), mm, of the columns of `kind` in a `table` (n, 2), one an angle, without one that closes
+    the turn; `where` names its file, and `places` are the units of the columns' last digits."""
+    if kind is POLAR:
+        angle, radius = without_closing_point(np.radians(table[:, 0]), table[:, 1], float(places[1]), where)
+        require_one_point_an_angle(angle, where)
+        return np.column_stack([radius * np.sin(angle), radius * np.cos(angle)])
+    closes = np.abs(table[-1] - table[0]) <= np.maximum(places, SAME_RADIUS) * (1 + 1e-6)
+    points = table[:-1] if closes.all() else table
+    about = points - points.mean(0)  # the part may lie anywhere on the machine's table
+    require_one_point_an_angle(np.arctan2(about[:, 0], about[:, 1]), where)
+    return points
 
 
 def _header(path: Path, lines: Sequence[tuple[int, str]]) -> tuple[int, list[str], tuple[str, str]]:

@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal  # Any: values of JSON
 
+import numpy as np
+
+from hdopt.drive.profiles import MeasuredProfile
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.figures import drawn
 from hdopt.files import ShownAsTable, replacing_all, write_text
@@ -52,9 +55,19 @@ class CompareResult(ShownAsTable):
     """Least width of a zone about the cam that holds every point, mm."""
 
     @property
-    def met(self) -> bool:
+    def form_met(self) -> bool:
         """Whether every point lies within the zone about its best fit."""
         return self.fit.largest <= self.zone / 2
+
+    @property
+    def eccentricity_met(self) -> bool | None:
+        """Whether the best fit lies within what its eccentricity may be; None where nothing bounds it."""
+        return None if self.eccentricity_allowed is None else self.eccentricity <= self.eccentricity_allowed
+
+    @property
+    def met(self) -> bool:
+        """Whether the cam keeps all that is asked of it: its form, and its location where a tolerance bounds that."""
+        return self.form_met and self.eccentricity_met is not False
 
     @property
     def eccentricity(self) -> float:
@@ -80,7 +93,8 @@ class CompareResult(ShownAsTable):
             "noise_um": 1e3 * self.fit.noise,
             "eccentricity_um": 1e3 * self.eccentricity,
             "eccentricity_allowed_um": None if allowed is None else 1e3 * allowed,
-            "eccentricity_met": None if allowed is None else self.eccentricity <= allowed,
+            "eccentricity_met": self.eccentricity_met,
+            "form_met": self.form_met,
             "met": self.met,
         }
 
@@ -173,7 +187,7 @@ def _nominal(job: Job, surface: Surface, part: str | None) -> tuple[str, Contour
 
 def write_measured_study(study: Study, result: CompareResult, path: Path) -> Path:
     """Write the `study` to `path` with the measured cam of `result` in place of its profile, and the cam's table beside
-    it; both files or neither.
+    it; both files or neither, and neither where `hdopt ke` would refuse the table.
 
     The table's name is the study file's with `-cam.csv` for its ending; it keeps the cam's own eccentricity about the
     axis that it was measured from. Returns the table's path. Raises `HdoptError` where a file cannot be written.
@@ -181,11 +195,7 @@ def write_measured_study(study: Study, result: CompareResult, path: Path) -> Pat
     import tomlkit
 
     table = path.with_name(f"{path.stem}-cam.csv")
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("angle_deg", "radius_mm"))
-    points = sorted((math.degrees(math.atan2(x, y)) % 360, math.hypot(x, y)) for x, y in result.fit.points.tolist())
-    writer.writerows((f"{angle:.9g}", f"{radius:.7f}") for angle, radius in points)
+    text = _table_of_cam(result)
     data = {name: dict(section) if isinstance(section, dict) else section for name, section in study.data.items()}
     generator = dict(study.data["wave_generator"])
     for key in ("semi_major_mm", "semi_minor_mm", "wrap_angle_deg"):
@@ -194,6 +204,19 @@ def write_measured_study(study: Study, result: CompareResult, path: Path) -> Pat
     generator |= {"profile": "measured", "file": table.name, "surface": result.surface, "noise_um": noise}
     data["wave_generator"] = generator
     with replacing_all((table, path)) as (new_table, new_study):
-        new_table.write_bytes(text.getvalue().encode())
+        new_table.write_bytes(text.encode())
         new_study.write_bytes(tomlkit.dumps(data).encode("utf-8", "surrogateescape"))
     return table
+
+
+def _table_of_cam(result: CompareResult) -> str:
+    """The measured cam of a `result` as the CSV that a study reads. Raises `HdoptError` where none would take it."""
+    points = sorted((math.degrees(math.atan2(x, y)) % 360, math.hypot(x, y)) for x, y in result.fit.points.tolist())
+    rows = [(f"{angle:.9g}", f"{radius:.7f}") for angle, radius in points]
+    angles, radii = np.array(rows, dtype=float).T
+    MeasuredProfile(np.radians(angles), radii, source="of the measured cam, as its study is to have it,")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("angle_deg", "radius_mm"))
+    writer.writerows(rows)
+    return text.getvalue()

@@ -227,3 +227,109 @@ def test_files_of_german_machines_say_the_same(encoding, separator, tmp_path):
         np.radians([float(row[0]) for row in rows]).tolist(),
         [float(row[1]) for row in rows],
     ]
+
+
+@pytest.mark.parametrize(
+    ("off_um", "lobes_um", "status"), [(2.0, 3.0, 0), (40.0, 3.0, 1), (2.0, 6.0, 1), (40.0, 6.0, 1)]
+)
+def test_a_cam_off_its_axis_is_not_kept_however_good_its_form(off_um, lobes_um, status, tmp_path, capsys):
+    """Would catch "BEYOND the tolerances" with exit status 0, and a verdict on the form that takes the location in: the
+    bound is 5 um here, the half zone 3.75 um."""
+    cam = save(
+        tmp_path / "cam.csv", measured(error=lambda t: lobes_um / 1e3 * np.cos(6 * t), shift=(0.0, off_um / 1e3))
+    )
+    study = ("--set", 'tolerances.wg_eccentricity_mm={distribution="half_normal",scale=0.002,upper=0.005}')
+    study = (*study, "--set", "export.profile_tolerance_mm=0.0075")
+    code, said = run(capsys, cam, *study, "--json", tmp_path / "a.json")
+    values = json.loads((tmp_path / "a.json").read_text())
+    form, location = lobes_um <= 3.75, off_um <= 5.0
+    assert code == status == (not values["met"])
+    assert (values["form_met"], values["eccentricity_met"]) == (form, location)
+    assert f"form: {'within' if form else 'OUTSIDE'} the profile's zone of 7.5 um" in said.out
+    assert f"um, {'within' if location else 'BEYOND'} the 5 um of the tolerances" in said.out
+    lost = [name for name, met in (("form", form), ("location", location)) if not met]
+    assert (f"not kept: {' and '.join(lost)}" in said.out) == bool(lost)
+
+
+def test_without_a_bound_of_the_eccentricity_the_form_alone_decides(tmp_path):
+    """Would catch a location that nothing bounds taken for one that is missed."""
+    from hdopt.workflow.compare import CompareResult
+
+    fit = fit_cam(measured(shift=(0.3, 0.0)), CAM)
+    free = CompareResult("s", "cam", "cam", 0.0, 0.0075, fit, None)
+    assert free.met and free.form_met and free.eccentricity_met is None
+
+
+def polar_rows(points=72, places=6):
+    """Angle (deg) and radius (mm) of a perfect cam as text, from the ellipse's formula."""
+    at = measured(points=points)
+    angle = np.degrees(np.arctan2(*at.T)) % 360
+    return [(f"{a:.9f}", f"{r:.{places}f}") for a, r in zip(angle.tolist(), np.hypot(*at.T).tolist(), strict=True)]
+
+
+def table(path, rows):
+    path.write_text("\n".join(["angle_deg,radius_mm", *map(",".join, rows)]))
+    return path
+
+
+def refused(path, capsys):
+    """What either command says of one measured cam: `compare`, and `ke` of a study that has it; None each where it is
+    taken."""
+    said = []
+    given = (
+        f"wave_generator.{key}"
+        for key in ("profile=measured", f"file={path}", "surface=cam", "bearing_thickness_mm=3.0")
+    )
+    ke = ["ke", "csf-25-80", *(word for one in given for word in ("--set", one))]
+    for arguments in (["compare", str(path), "--write-study", str(path.parent / "own.toml")], ke):
+        with pytest.raises(SystemExit) as stopped:
+            main(arguments)
+        said.append(capsys.readouterr().err if stopped.value.code == 2 else None)
+    return said
+
+
+@pytest.mark.parametrize(
+    ("places", "last_um", "taken"),
+    [(6, 0.0, True), (3, 1.0, True), (3, 2.0, False), (6, 0.002, False), (6, 50.0, False)],
+)
+def test_a_closing_point_may_differ_by_the_files_rounding_alone(places, last_um, taken, tmp_path, capsys):
+    """Would catch a closing point of another radius that one command drops and the other counts, and one that is
+    refused for the last digit of the file."""
+    rows = polar_rows(places=places)
+    closing = ("360", f"{float(rows[0][1]) + last_um / 1e3:.{places}f}")
+    path = table(tmp_path / "cam.csv", [*rows, closing])
+    said = refused(path, capsys)
+    if taken:
+        assert said == [None, None]
+        assert len(read_cam(path)) == len(rows) == len(read_polar(path, "cam")[0])
+    else:
+        assert all(f"{last_um:.4g} um apart" in message for message in said), said
+        assert f"{path}: closes the turn" in said[0]
+        assert not (tmp_path / "own.toml").exists()
+
+
+def test_an_angle_that_comes_twice_is_refused_by_both_commands(tmp_path, capsys):
+    """Would catch `compare --write-study` that writes a study which `ke` refuses; also by points x_mm,y_mm."""
+    rows = polar_rows()
+    rows.insert(10, (rows[9][0], f"{float(rows[9][1]) + 0.02:.6f}"))
+    path = table(tmp_path / "cam.csv", rows)
+    angle = float(rows[9][0])
+    assert all(f"gives the angle {angle:.6g} deg twice; keep one" in said for said in refused(path, capsys))
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["cam.csv"]
+    points = measured()
+    twice = save(tmp_path / "xy.csv", np.vstack([points, points[180] * 1.001]))
+    with pytest.raises(HdoptError, match=r"xy\.csv: gives the angle .* deg twice"):
+        read_cam(twice)
+    # The first point again at the end closes the turn.
+    assert len(read_cam(save(tmp_path / "xy.csv", np.vstack([points, points[:1]])))) == len(points)
+    # A part that lies beside the machine's origin has two points in one direction from there.
+    aside = save(tmp_path / "aside.csv", points + np.array([0.0, 100.0]))
+    assert len(read_cam(aside)) == len(points)
+
+
+def test_no_study_is_written_whose_table_is_refused(tmp_path, capsys):
+    """Would catch a study of a cam that its own reader refuses: here one that was measured beside the axis."""
+    aside = save(tmp_path / "aside.csv", measured(shift=(0.0, 100.0)))
+    code, said = run(capsys, aside, "--write-study", tmp_path / "own.toml")
+    assert code == 2 and "of the measured cam, as its study is to have it" in said.err
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["aside.csv"]
