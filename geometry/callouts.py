@@ -2,7 +2,7 @@
 
 Datums (ISO 5459): A is the feature that holds the part, B what locks its rotation. Frames (ISO 1101) take their zones
 from the budgets of eccentricity and tilt. A profile that is not round has a profile tolerance (ISO 1660), never a
-coaxiality.
+coaxiality; a round one has size, cylindricity and coaxiality, of which no one bounds another (ISO 8015).
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def _profile(part: Part, model: WaveGeneratorModel) -> Callout | None:
         return Callout(
             (place[0], place[1] + contour.offset),
             (f"rim Ø{2 * contour.radius:.4f} ±{zone / 2:.4g}", "Ra 0.4"),
-            (Frame("coaxiality", located, True, "A"),),
+            (Frame("cylindricity", zone), Frame("coaxiality", located, True, "A")),
             faces=(Cylinder(contour.radius, (0.0, contour.offset)),),
             size=(2 * contour.radius, -zone / 2, zone / 2),
         )
@@ -351,10 +351,11 @@ def _upright(part: Part, model: WaveGeneratorModel, slide: Slide) -> tuple[Frame
             "perpendicularity", slide.squareness, False, "B"
         )
     centred = model.plan.zone(part.name, "wg_eccentricity")
-    first = Frame("symmetry", centred, False, "A") if centred else Frame("parallelism", slide.zone, False, "A")
+    upright = Frame("parallelism", slide.zone, False, "A")
+    first = (Frame("symmetry", centred, False, "A"), upright) if centred else (upright,)
     # A keyway lies across the block, and so its flat along it. They only say how the block stands on the shaft.
     turned = {"keyway": "perpendicularity", "flat": "parallelism"}.get(secondary(part) or "")
-    return (first, Frame(turned, GENERAL_POSITION, False, "B", usual=True)) if turned else (first,)
+    return (*first, Frame(turned, GENERAL_POSITION, False, "B", usual=True)) if turned else first
 
 
 def _seat(part: Part, model: WaveGeneratorModel) -> Callout | None:

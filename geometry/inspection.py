@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from hdopt.files import JsonReady
 from hdopt.geometry.callouts import callouts_of
 from hdopt.geometry.check import CheckFailed
+from hdopt.geometry.contour import Circle
 from hdopt.geometry.slides import slides_of
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ INSTRUMENTS = (
 )
 """Largest expanded uncertainty that is allowed, mm -> the class of instrument that reaches it."""
 
-POINTS = {"profile": 360, "perimeter": 360, "diameter": 24, "zone": 24, "length": 5}
+POINTS = {"profile": 360, "cylindricity": 360, "perimeter": 360, "diameter": 24, "zone": 24, "length": 5}
 COLUMNS = tuple(
     "number part feature nominal_mm lower_mm upper_mm zone_mm uncertainty_mm instrument points source".split()
 )
@@ -86,7 +87,8 @@ def inspection_plan(job: Job) -> tuple[Check, ...]:
         )
 
     for carrier in job.model.profiled:
-        add(carrier.name, "profile of the rim, all round at three heights", None, job.model.profile_zone, "ISO 1101")
+        form = "cylindricity" if isinstance(carrier.contour, Circle) else "profile"
+        add(carrier.name, f"{form} of the rim, all round at three heights", None, job.model.profile_zone, "ISO 1101")
     for row in job.dimensions:
         if row.nominal is not None and row.lower is not None and row.upper is not None:
             add(row.part, row.name, (row.nominal, row.nominal + row.lower, row.nominal + row.upper), None, row.source)
@@ -110,7 +112,7 @@ def inspection_plan(job: Job) -> tuple[Check, ...]:
 
 
 def _points(feature: str, zone: float | None) -> int:
-    kind = next((kind for kind in ("profile", "perimeter") if kind in feature), None)
+    kind = next((kind for kind in ("profile", "cylindricity", "perimeter") if kind in feature), None)
     if kind is None:
         round_ones = ("bore", "seat", "journal", "diameter", "hole")
         kind = "zone" if zone is not None else "diameter" if any(w in feature for w in round_ones) else "length"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 KINDS = {
     "SURFACE_PROFILE_TOLERANCE": "profile",
+    "CYLINDRICITY_TOLERANCE": "cylindricity",
     "COAXIALITY_TOLERANCE": "coaxiality",
     "POSITION_TOLERANCE": "position",
     "PERPENDICULARITY_TOLERANCE": "perpendicularity",

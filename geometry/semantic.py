@@ -24,6 +24,7 @@ NEAR = 1e-6
 
 SYMBOLS = {
     "profile": "ProfileOfSurface",
+    "cylindricity": "Cylindricity",
     "coaxiality": "Coaxiality",
     "position": "Position",
     "perpendicularity": "Perpendicularity",

@@ -243,6 +243,12 @@ class Sheet:
         elif symbol == "symmetry":
             for shift, reach in ((-1.1, 1.2), (0.0, 2.0), (1.1, 1.2)):
                 self.line((x - reach, y + shift), (x + reach, y + shift))
+        elif symbol == "cylindricity":
+            self.circle(centre, 1.1)
+            lean, lift = math.cos(math.pi / 3), math.sin(math.pi / 3)
+            for side in (-1.1, 1.1):  # two tangents that lean by 60 degrees
+                at_x, at_y = x + side * lift, y + side * lean
+                self.line((at_x - 2 * lean, at_y + 2 * lift), (at_x + 2 * lean, at_y - 2 * lift))
         elif symbol == "coaxiality":
             self.circle(centre, 1.8)
             self.circle(centre, 1.0)

@@ -23,7 +23,8 @@ from hdopt.geometry.drawing import Placed
 from hdopt.geometry.export import export_drive
 from hdopt.geometry.inspection import inspection_plan
 from hdopt.geometry.job import make_job
-from hdopt.geometry.mating_drawing import fill_mating_sheet
+from hdopt.geometry.mating import MatingRow
+from hdopt.geometry.mating_drawing import allowed, fill_mating_sheet, sums
 from hdopt.geometry.options import ExportOptions
 from hdopt.geometry.part_sheets import sheets
 from hdopt.geometry.sheet import Area, Line, Ring, Sheet, Solid, label_box, text_width
@@ -310,8 +311,8 @@ def test_mating_sheet_says_every_row_and_spends_the_bound():
         assert row.feature in said and row.requirement in said
     # Four shares of e1 = 15 um, each 7.5 um on diameter; two of the tilts' 0.2 deg.
     assert said.count("0.0075") == 4 and said.count("0.00375 mm") == 4 and said.count("0.1 deg") == 2
-    assert any(line.startswith("e1") and line.endswith(": 0.015 mm") for line in said)
-    assert any(line.endswith(": 0.2 deg") for line in said)
+    assert any(line.startswith("e1") and line.endswith(": 0.015 mm, within the bound of 0.015 mm") for line in said)
+    assert any(line.endswith(": 0.2 deg, within the bound of 0.2 deg") for line in said)
 
 
 @pytest.mark.parametrize(
@@ -405,3 +406,77 @@ def test_discs_are_drawn_about_their_own_axis(name):
     angles = np.sort(np.arctan2(*(rim - middle).T))
     sagitta = np.ptp(front[:, 0]) / 2 * (1 - np.cos(np.diff(angles).max() / 2))
     assert sagitta < 0.05
+
+
+@pytest.mark.parametrize("bounds", [{}, BOUNDS], ids=["no bounds", "bounds"])
+@pytest.mark.parametrize("profile", ["ellipse", "resal", "two_disk", "measured"])
+@pytest.mark.parametrize("structure", list(Structure))
+def test_every_zone_that_the_plan_checks_has_its_frame(profile, structure, bounds):
+    """Would catch a form that is inspected though no drawing asks for it, as the rims of two discs once: ISO 8015 lets
+    neither size nor coaxiality bound it. Every zone of the plan has a frame, a form one of its symbol."""
+    job = make_job(drive(profile, structure), ExportOptions(), "csf-25-80", bounds)
+    frames = Counter(
+        (part.name, frame.zone, frame.symbol if frame.symbol in ("profile", "cylindricity") else "")
+        for part in job.model.parts
+        for callout in callouts_of(part, job.model)
+        for frame in callout.frames
+    )
+    planned = Counter(
+        (row.part, row.zone_mm, form if (form := row.feature.split(" of ")[0]) in ("profile", "cylindricity") else "")
+        for row in inspection_plan(job)
+        if row.zone_mm is not None
+    )
+    # One frame may be measured twice, as the profile alone and about its datums.
+    assert set(planned) == set(frames) and frames <= planned
+    assert all((part.name, job.model.profile_zone, "cylindricity") in planned for part in job.model.profiled) == (
+        profile == "two_disk"
+    )
+
+
+def test_the_sheet_of_a_disc_asks_for_the_form_that_the_plan_checks():
+    """Would catch a frame that the callouts have and the sheet leaves out: the zone stands in a frame of its own,
+    with two slanted tangents of a circle for its symbol."""
+    job = job_of("two_disk", Structure.INTEGRAL, 1.0)
+    names = [part.name for part, _ in job.made]
+    drawn = dict(zip(names, sheets(job)[1:], strict=False))
+    zone = next(row.zone_mm for row in inspection_plan(job) if row.feature.startswith("cylindricity of the rim"))
+    for name in ("disc_1", "disc_2"):
+        (label,) = (
+            label for label in drawn[name].labels if label.content == f"{zone:.4g}" and label.anchor == "middle"
+        )
+        leaning = [
+            mark
+            for mark in drawn[name].marks
+            if isinstance(mark, Line)
+            and len(mark.points) == 2
+            and abs(mark.points[0][1] - label.at[1]) < 5
+            and 0 < label.at[0] - mark.points[0][0] < 14
+            and 0.5 < abs(mark.points[1][0] - mark.points[0][0]) < 3
+            and abs(mark.points[1][1] - mark.points[0][1]) > 2
+        ]
+        assert len(leaning) == 2
+
+
+def test_the_mating_sheet_says_which_sums_exceed_their_bound_and_which_have_none():
+    """Would catch "no more than its bound" over a sum that is beyond it, or that the study gives no bound for."""
+    rows = tuple(
+        MatingRow("p", "f", "r", 1.0, None, feeds, takes, unit)
+        for feeds, takes, unit in (
+            ("wg_eccentricity", 0.008, "mm"),
+            ("wg_eccentricity", 0.004, "mm"),
+            ("wg_tilt", 0.5, "deg"),
+            ("axis_tilt", 0.05, "deg"),
+            ("axis_tilt", 0.05, "deg"),
+        )
+    )
+    said = sums(rows, {"wg_eccentricity": 0.009, "axis_tilt": 0.1})
+    assert [kept for _, kept in said] == [True, False, True]
+    beyond = next(line for line, kept in said if not kept)
+    assert beyond.startswith("e2") and beyond.endswith(": 0.012 mm, BEYOND the bound of 0.009 mm")
+    assert any(line.startswith("α2") and line.endswith("0.5 deg; the study gives no bound") for line, _ in said)
+    assert any(line.startswith("β2") and line.endswith("0.1 deg, within the bound of 0.1 deg") for line, _ in said)
+    job = make_job(drive("ellipse", Structure.AUTOMATIC), ExportOptions(), "x", {"wg_eccentricity_mm": 0.009} | AXIS)
+    assert allowed(job) == {"wg_eccentricity": 0.009, "axis_eccentricity": 0.015, "axis_tilt": 0.2}
+    drawn = Sheet(WIDTH, HEIGHT, "mating parts", "")
+    fill_mating_sheet(drawn, job)
+    assert not any("no more than its bound" in label.content for label in drawn.labels)
