@@ -157,7 +157,8 @@ def _fault(fault: ErrorDetails, document: Document, section: str) -> str:
         return f"{where}: is {value!r}; it must be {KINDS[kind]}"
     message = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     if isinstance(value, Mapping) or message[0].isupper():
-        return f"{where}: {message}"
+        # A value of --set stands in the table that was given as one.
+        return f"{where}: {message}" if where.endswith(path[-1]) else f"{where}, {path[-1]}: {message}"
     return f"{where}: is {value!r}; it must be {message}"
 
 
@@ -168,6 +169,8 @@ def _tag(fault: ErrorDetails) -> str:
 
 def _as_table(path: Keys) -> str:
     """How a table is written where something else stands."""
+    if path[:2] == ("search", "limits") and len(path) == 3:
+        return "give its bound as a table, such as { max = 60 }"
     if path[0] == "tolerances" and len(path) == 2:
         return 'give its distribution, as in { distribution = "normal", std = 0.03, lower = -0.1, upper = 0.1 }'
     return f"write it as a table, [{'.'.join(path)}]"

@@ -54,6 +54,14 @@ def test_effects_are_left_out_one_by_one_as_long_as_that_is_better():
     assert [term.effect for term in state.leader.fit.terms] == ["a", TOLD]
 
 
+def test_where_each_is_missed_no_more_are_left_out():
+    """Fault caught: three effects left out one after the other though each carries its part."""
+    before = of(20.0, "a", "b", "c", gain=1.0)
+    beside = Told(50.0, (Effect("a"), Effect("b"), Effect("c"), Effect(TOLD)), gain=2.0)
+    state = in_place_of_others(state_of(before), before, beside)
+    assert sets_of(state) == {("a", "b", "c"), (TOLD, "a", "b"), (TOLD, "a", "c"), (TOLD, "b", "c")}
+
+
 def test_what_does_not_show_beside_them_is_not_tried_in_their_place():
     """Faults caught: three more fits for each thing that is told, in every search; a lone effect left out, as a look
     about the base alone does."""

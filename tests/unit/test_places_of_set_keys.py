@@ -8,6 +8,7 @@ from hdopt.errors import HdoptError
 from hdopt.study import study_document, study_of, with_values
 from hdopt.study.document import parse_document
 from hdopt.study.schema import ANY_NAME, known_paths
+from hdopt.workflow.search import search
 
 FILE = study_document()
 NAMES = {"errors": "axis_tilt_y_deg", "tolerances": "axis_tilt_y_deg"}
@@ -70,3 +71,30 @@ def test_what_a_table_that_was_set_replaces_is_not_pointed_to():
 )
 def test_a_key_that_needs_others_says_so_itself(values, said):
     assert refusal(values).startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("search.limits", {"peak_to_peek": 1}, "--set search.limits.peak_to_peek: is 1; give its bound as a table"),
+        (
+            "search.limits",
+            {"flank_pressure_mpa": {"max": 60, "min": 90}},
+            "--set search.limits, flank_pressure_mpa: needs exactly one of max, min",
+        ),
+        (
+            "search.limits.flank_pressure_mpa",
+            {"max": 60, "min": 90},
+            "--set search.limits.flank_pressure_mpa: needs exactly one of max, min",
+        ),
+        ("search.limits", {"flank_presure_mpa": {"max": 60}}, "--set search.limits: [search] limits: unknown quantity"),
+        ("search.objective", "peak_to_peek", "--set search.objective: [search] objective: unknown quantity"),
+    ],
+)
+def test_a_limit_is_refused_at_its_quantity(key, value, said):
+    """Faults caught: a key that does not exist proposed as a table; two bounds without the quantity that has them; an
+    unknown quantity said to stand in the shipped file."""
+    document, name, folder = FILE
+    with pytest.raises(HdoptError) as caught:
+        search(study_of(with_values(document, [(key, value)]), name, folder))
+    assert str(caught.value).startswith(said), str(caught.value)
