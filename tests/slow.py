@@ -16,7 +16,7 @@ from pathlib import Path
 
 LIST = Path(__file__).with_name("slow.txt")
 SECONDS = 0.12
-"""Time from which a test is on the list: 4,670 quicker ones fit 80 of the 90 s of `make check` on two cores."""
+"""Time from which a test is on the list: 7,337 quicker ones took 79 s of one core together, beside other work."""
 
 
 def slow_tests() -> frozenset[str]:
