@@ -68,8 +68,7 @@ def command(cam: str, study: str | None, drive: str | None, overrides: tuple[str
 
     CAM.csv has the columns angle_deg,radius_mm (clockwise from the major axis) or x_mm,y_mm: the cam's surface, or the
     centre of a ball with --probe-radius-mm. Between semicolons or tabs, numbers may have decimal commas. Exit status 1
-    says that a point lies outside the profile's tolerance zone, or the cam farther off its axis than the study's
-    tolerance of wg_eccentricity_mm. The study that --write-study writes goes to `hdopt ke`
+    says that a point lies outside the profile's tolerance zone. The study that --write-study writes goes to `hdopt ke`
     and `hdopt stack`.
     """
     from hdopt.workflow.compare import compare, write_comparison
@@ -94,7 +93,7 @@ def _lines(result: CompareResult, study: Path | None, table: Path | None) -> Ite
     yield f"  deviation: {deviation['largest']:.3f} um at most, {deviation['rms']:.3f} um rms"
     yield f"  least zone that holds every point: {values['minimum_zone_um']:.3f} um"
     yield f"  scatter of a single point: {values['noise_um']:.3f} um"
-    word = "within" if result.form_met else "OUTSIDE"
+    word = "within" if result.met else "OUTSIDE"
     yield f"  form: {word} the profile's zone of {values['zone_um']:.4g} um (half of it to either side)"
     off = f"  location: off the axis by {values['eccentricity_um']:.3f} um"
     if values["eccentricity_allowed_um"] is not None:
@@ -102,7 +101,9 @@ def _lines(result: CompareResult, study: Path | None, table: Path | None) -> Ite
         yield f"{off}, {word} the {values['eccentricity_allowed_um']:.4g} um of the tolerances"
     else:
         yield f"{off}, which no tolerance of the study bounds"
-    kept = [name for name, met in (("form", result.form_met), ("location", result.eccentricity_met)) if met is False]
+    kept = [name for name, met in (("form", result.met), ("location", result.eccentricity_met)) if met is False]
     yield f"  not kept: {' and '.join(kept)}" if kept else "  kept: all that the study asks of the cam"
+    if result.met and kept:
+        yield "  the verdict is on the form: the location counts where the table's zero is the bore's axis"
     if study is not None:
         yield f"  next: hdopt ke {study}, which reads the cam from {table}"
