@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as MatplotlibFigure
 
 
+NOT_VERIFIED = "not verified"
+"""Status of an allocation whose verification does not confirm what its rule promises."""
+
+
 @dataclass(frozen=True)
 class AllocatedError:
     """One tolerance: before and after, its grade where grades are used, and why that grade's standard does not reach
@@ -79,7 +83,7 @@ class AllocateResult(ShownAsTable):
     @property
     def accepted(self) -> bool:
         """Whether the verification confirms what the rule promises."""
-        return self.status != "not verified"
+        return self.status != NOT_VERIFIED
 
     def to_dict(self) -> dict[str, Any]:
         return {

@@ -102,12 +102,12 @@ def _doubts(values: Array, kind: str) -> tuple[str, ...]:
             "neighbouring single deviations are alike, as cumulative ones are, and add up to as much as "
             f'{1000 * span:.3g} um. If they are cumulative, say so: deviation = "cumulative"'
         )
-    if kind == "cumulative" and total < largest / 4 and values[0] != 0 and values[-1] != 0:
-        if likeness < ALIKE:
-            doubts.append(
-                "the cumulative deviations add up to nothing, begin and end off 0, and neighbours are unlike, as "
-                'those of single ones are. If they are single, say so: deviation = "single"'
-            )
+    off_zero = total < largest / 4 and values[0] != 0 and values[-1] != 0
+    if kind == "cumulative" and off_zero and likeness < ALIKE:
+        doubts.append(
+            "the cumulative deviations add up to nothing, begin and end off 0, and neighbours are unlike, as "
+            'those of single ones are. If they are single, say so: deviation = "single"'
+        )
     return tuple(doubts)
 
 

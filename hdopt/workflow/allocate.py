@@ -131,6 +131,7 @@ def _drive_result(
     beside: tuple[tuple[RuleOutcome, ...], tuple[tuple[float, float], ...]],
 ) -> AllocateResult:
     from hdopt.allocation.results import (
+        NOT_VERIFIED,
         AllocateResult,
         allocated_errors,
         cost_of,
@@ -141,10 +142,10 @@ def _drive_result(
 
     chosen, sources, at = decided
     outcomes, points = beside
-    status = "verified" if verified.low >= stated.required_yield else "not verified"
+    status = "verified" if verified.low >= stated.required_yield else NOT_VERIFIED
     allocated = replace(stated, space=stated.space.with_tolerances(chosen.tolerances))
     notes = [*stated.notes, *words_on_model(allocated, request.seed)]
-    if status == "not verified":
+    if status == NOT_VERIFIED:
         notes.append(not_reached(request.rule, verified, stated.required_yield))
     present = problem.by_name(problem.current)
     notes += [*bound_notes(at, problem.items), *present_notes(problem.items, present)]

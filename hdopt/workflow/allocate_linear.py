@@ -19,6 +19,7 @@ from hdopt.allocation.convex import (
 )
 from hdopt.allocation.request import AllocationRequest
 from hdopt.allocation.results import (
+    NOT_VERIFIED,
     AllocateResult,
     RuleOutcome,
     allocated_errors,
@@ -107,7 +108,7 @@ def allocate_linear(study: Study, request: AllocationRequest) -> AllocateResult:
         unit=section.unit,
         limit=section.gap_tolerance,
         required_yield=section.required_yield,
-        status="not verified" if missed else "optimal",
+        status=NOT_VERIFIED if missed else "optimal",
         errors=allocated_errors(items, sources, solution, problem.present, section.unit, at),
         total_cost=solution.total_cost,
         present_cost=cost_of(items, problem.present),

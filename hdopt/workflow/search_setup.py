@@ -10,10 +10,10 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import Structure
-from hdopt.errors import HdoptError, MissingValue, unknown_name
+from hdopt.errors import HdoptError, MissingValue
 from hdopt.mechanics.bearing_life import BearingConstants
 from hdopt.optimize.design_space import SIZE_RULES, Combination, DesignSpace, Variable
-from hdopt.optimize.objectives import QUANTITIES, DesignConditions
+from hdopt.optimize.objectives import DesignConditions, find_quantity
 from hdopt.optimize.setup import LimitRule, SearchSettings, Setup
 from hdopt.study import Study
 from hdopt.study.drive import WaveGeneratorSection
@@ -76,8 +76,11 @@ def setup_of(study: Study, seed: int) -> Setup:
     limits = DEFAULT_LIMITS if section.limits is None else section.limits
     asked = [("objective", section.objective), ("second_objective", section.second_objective)]
     for name, key in (*asked, *(("limits", key) for key in limits)):
-        if key is not None and key not in QUANTITIES:
-            raise HdoptError(f"[search] {name}: {unknown_name('quantity', key, QUANTITIES)}")
+        try:
+            if key is not None:
+                find_quantity(key)
+        except HdoptError as error:
+            raise HdoptError(f"[search] {name}: {error}") from error
     rules = {key: _rule(limit) for key, limit in limits.items()}
     return Setup(_settings(section), space, _trade(study, section, seed), rules)
 
