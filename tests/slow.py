@@ -44,4 +44,6 @@ def write(reports: Sequence[Path]) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        sys.exit("give the JUnit reports that the list is to be written from")
     write([Path(report) for report in sys.argv[1:]])
