@@ -19,7 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdopt.arrays import Array, Mask
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate
 from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut, hidden_samples, shares_of_samples, without_samples
 from hdopt.diagnosis.inference.read_angle import where_it_stood
 from hdopt.diagnosis.orientation import turn_round

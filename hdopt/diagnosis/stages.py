@@ -20,7 +20,8 @@ from hdopt.diagnosis.inference.clean_base import (
     power_beside_smooth,
 )
 from hdopt.diagnosis.inference.common_slope import TakenSlope, common_slope, input_is_off
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate
 from hdopt.diagnosis.inference.generic_basis import generic_columns
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.normal_equations import least_squares

@@ -24,6 +24,14 @@ def sine_columns(phase: Array, harmonics: Sequence[float] | Array) -> Array:
     return _whole_sines(phase, place, run[0], len(multiples)).T
 
 
+def multiples(sine: Array, cosine: Array, orders: Index) -> Array:
+    """The columns of `sine_columns` at angles whose `sine` and `cosine` (n,) are known, for whole `orders` (k,) from 1
+    on, (n, 2 k)."""
+    place = np.full(orders.max(), -1)
+    place[orders - 1] = np.arange(len(orders))
+    return _multiples(np.ascontiguousarray(sine), np.ascontiguousarray(cosine), place, len(orders)).T
+
+
 STEPS = 4
 """Whole multiples gone through for each that is wanted up to which the addition theorems are quicker than its sine."""
 FEW_STEPS = 16
@@ -81,6 +89,28 @@ def _whole_sines(phase: Array, place: Index, before: int, count: int) -> Array:
             else:
                 for i in range(here):
                     s[i], c[i] = _one_further(s[i], c[i], sine[i], cosine[i])
+    return columns
+
+
+@late(calls=0)
+def _multiples(sine: Array, cosine: Array, place: Index, count: int) -> Array:
+    """The same at angles whose `sine` and `cosine` (n,) are known: `place` (h,) from the multiple 1 on."""
+    rows = len(sine)
+    columns = np.empty((2 * count, rows))
+    s, c = np.empty(PIECE), np.empty(PIECE)
+    for start in range(0, rows, PIECE):
+        here = min(PIECE, rows - start)
+        once, beside_once = sine[start : start + here], cosine[start : start + here]
+        s[:], c[:] = 0.0, 1.0
+        for at in place:
+            if at >= 0:
+                own, beside = columns[2 * at, start : start + here], columns[2 * at + 1, start : start + here]
+                for i in range(here):
+                    s[i], c[i] = _one_further(s[i], c[i], once[i], beside_once[i])
+                    own[i], beside[i] = s[i], c[i]
+            else:
+                for i in range(here):
+                    s[i], c[i] = _one_further(s[i], c[i], once[i], beside_once[i])
     return columns
 
 

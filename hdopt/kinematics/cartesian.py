@@ -17,7 +17,7 @@ import numpy as np
 from hdopt.arrays import Array, Index
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
-from hdopt.kinematics.cartesian_kernel import beyond, evaluated
+from hdopt.kinematics.cartesian_kernel import OnSplines, beyond, evaluated
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
 from hdopt.kinematics.load_sharing import NO_TABLE, mesh_tables
 
@@ -36,6 +36,12 @@ CARTESIAN_NAMES = (
     "FS tooth cosine",
 )
 PARAMETERS = len(CARTESIAN_NAMES)
+ONCE_ROUND = (CARTESIAN_NAMES.index("CS tooth sine"), CARTESIAN_NAMES.index("FS tooth sine"))
+"""The place of the errors that are a sine and, after it, a cosine once round either spline."""
+MOST_WAVES = 64
+"""Waves round a spline up to which `evaluate_at` is a quick way to add them: it goes through all that are fewer."""
+NO_WAVES = np.empty((2, 0))
+"""Nothing that stands on a spline besides its own teeth."""
 
 Evaluated: TypeAlias = tuple[Array, Index, Array]
 """KE (arcmin, n), the driving zone (0 or 1, n) and dKE/derrors (arcmin/mm, n x 12)."""
@@ -135,14 +141,20 @@ class CartesianModel:
         return beyond(rotation, self.tip, np.asarray(errors, float))
 
     def evaluate_at(
-        self, rotation: Array, errors: Array, extra: Array | None = None, rises: Array | None = None
+        self,
+        rotation: Array,
+        errors: Array,
+        extra: Array | None = None,
+        rises: Array | None = None,
+        waves: tuple[Array, Array] = (NO_WAVES, NO_WAVES),
     ) -> Evaluated:
         """KE (arcmin, n), the driving zone (0 or 1, n) and dKE/derrors (arcmin/mm, n x 12) at a `rotation` (4, n).
 
         `errors` (12,) mm. `extra` (2, n) in mm is added to the deviation of each zone before the
         larger one is taken, and `rises` (2, 2, n) is its slope over the angle at which each spline (CS, FS) is met,
-        mm/rad: the errors move that angle. The slope is that of the branch that drives: it jumps where the zone or the
-        rim changes.
+        mm/rad: the errors move that angle. `waves` stand on CS and FS besides, (2, h) mm of arc for sine and cosine of
+        1 to h times the angle at which the spline is met. The slope is that of the branch that drives: it jumps where
+        the zone or the rim changes.
         """
         if extra is None:
             extra = np.zeros((2, 1))
@@ -156,6 +168,6 @@ class CartesianModel:
             np.asarray(errors, float),
             np.ascontiguousarray(extra),
             np.ascontiguousarray(rises),
-            (self.cs_table, self.fs_table),
+            OnSplines(self.cs_table, self.fs_table, *waves),
         )
         return value, zone, slopes.T

@@ -7,6 +7,7 @@ the processor's vectors: first both zones, then the teeth that were measured, th
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,7 +40,20 @@ VALUE = ZONE + 2 * ZONE_ROWS
 DRIVES = VALUE + BLOCK
 SLOPES = DRIVES + BLOCK
 PARAMETERS = 12
-WORK = SLOPES + PARAMETERS * BLOCK
+SINE = SLOPES + PARAMETERS * BLOCK
+COSINE, MULTIPLE_SINE, MULTIPLE_COSINE = SINE + BLOCK, SINE + 2 * BLOCK, SINE + 3 * BLOCK
+WORK = SINE + 4 * BLOCK
+
+
+class OnSplines(NamedTuple):
+    """Deviations that stand on the splines, mm of arc: over one turn of CS and FS as their measured teeth have them
+    (empty where they were not measured), and, (2, h), of sine and cosine of 1 to h times the angle at which CS and FS
+    are met (of no columns where there are none)."""
+
+    cs_table: Array
+    fs_table: Array
+    cs_waves: Array
+    fs_waves: Array
 
 
 @inlined
@@ -122,6 +136,27 @@ def _add_measured(work: Array, table: Array, cos: int, sin: int, offset: int, ri
 
 
 @compiled
+def _add_waves(work: Array, waves: Array, cos: int, sin: int, cos_o: int, sin_o: int, rise: int) -> None:
+    """Adds `waves` round a spline (2, h), mm of arc, of sine and cosine of 1 to h times the angle at which it is met,
+    to the deviation of either zone in `work`, and their slope (mm/rad) to the row `rise`; `cos`, `sin` are the rows of
+    the teeth's angle, `cos_o`, `sin_o` those of what lies beyond."""
+    for number in range(2):
+        z, at = 1.0 - 2.0 * number, ZONE + number * ZONE_ROWS
+        for i in range(BLOCK):
+            c, s, co, so = work[cos + i], work[sin + i], work[at + cos_o + i], work[at + sin_o + i]
+            work[SINE + i] = work[MULTIPLE_SINE + i] = z * s * co + c * so
+            work[COSINE + i] = work[MULTIPLE_COSINE + i] = z * c * co - s * so
+        for h in range(waves.shape[1]):
+            a, b, multiple = waves[0, h], waves[1, h], h + 1.0
+            for i in range(BLOCK):
+                s, c = work[MULTIPLE_SINE + i], work[MULTIPLE_COSINE + i]
+                work[at + TAU + i] += a * s + b * c
+                work[at + rise + i] += multiple * (a * c - b * s)
+                work[MULTIPLE_SINE + i] = s * work[COSINE + i] + c * work[SINE + i]
+                work[MULTIPLE_COSINE + i] = c * work[COSINE + i] - s * work[SINE + i]
+
+
+@compiled
 def _driving(
     work: Array,
     tip: TipGeometry,
@@ -185,16 +220,16 @@ def evaluated(
     p: Array,
     extra: Array,
     rises: Array,
-    tables: tuple[Array, Array],
+    teeth: OnSplines,
 ) -> tuple[Array, Index, Array]:
     """The error (arcmin, n), the driving zone (0 or 1, n) and the slopes (arcmin/mm, 12 x n) at a `rotation` (4, n).
 
     `tip` has the wave generator's constants, `tan_alpha` is that of the pressure angle, `scale` arcmin per mm of arc,
     `p` the errors (12,) mm, `extra` what is added to either zone, (2, n) or (2, 1), mm of arc, and `rises` its slope
-    over the angle at which CS and FS are met, (2, 2, n) or (2, 2, 1), mm/rad; `tables` those of the measured teeth of
-    CS and FS, mm of arc, empty where they were not measured.
+    over the angle at which CS and FS are met, (2, 2, n) or (2, 2, 1), mm/rad; `teeth` is what stands on the
+    splines besides the errors' sines.
     """
-    cs, fs = tables
+    cs, fs, waves_cs, waves_fs = teeth
     n = rotation.shape[1]
     value, zone, slopes = np.empty(n), np.empty(n, np.int64), np.empty((PARAMETERS, n))
     work = np.zeros(WORK)
@@ -221,6 +256,10 @@ def evaluated(
             _add_measured(work, cs, COS, SIN, OFFSET, RISE_CS)
         if len(fs) > 0:
             _add_measured(work, fs, COS_FS, SIN_FS, OFFSET_FS, RISE_FS)
+        if waves_cs.shape[1] > 0:
+            _add_waves(work, waves_cs, COS, SIN, COS_O, SIN_O, RISE_CS)
+        if waves_fs.shape[1] > 0:
+            _add_waves(work, waves_fs, COS_FS, SIN_FS, COS_OF, SIN_OF, RISE_FS)
         _driving(work, tip, rim, motion, p, tan_alpha, scale)
         _copy(work[VALUE : VALUE + rows], value, start)
         for i in range(rows):

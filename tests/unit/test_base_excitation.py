@@ -8,7 +8,8 @@ import pytest
 from scipy.signal import lsim
 
 from hdopt.diagnosis.inference.base_excitation import excites, is_driven
-from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.nuisance import nuisances_for
 from hdopt.diagnosis.inference.residual_gains import FitProbe

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from hdopt.kinematics.cartesian import CartesianModel, to_cartesian, to_drive_errors
+from hdopt.effects.met import met_angles
+from hdopt.kinematics.cartesian import PARAMETERS, CartesianModel, to_cartesian, to_drive_errors
 from hdopt.kinematics.waveform import kinematic_error_arcmin
 from hdopt.study import load_study
 
@@ -74,3 +75,24 @@ def test_far_tips_are_met_at_their_sine(drive):
     np.testing.assert_allclose(
         value, kinematic_error_arcmin(drive, errors, theta, "closed form"), rtol=1e-11, atol=1e-8
     )
+
+
+@pytest.mark.parametrize("rows", [1, 129, 300])
+def test_waves_are_met_where_the_zone_is(drive, rows):
+    """Against the waves at the angles that `met_angles` gives, added to both zones from outside. Faults caught: a wave
+    met at its zone's end, one spline's waves on the other, a slope that forgets how many waves there are."""
+    model = CartesianModel.of(drive)
+    rng = np.random.default_rng(2)
+    theta = rng.uniform(0, 500, rows)
+    errors = 0.01 * rng.normal(size=PARAMETERS)
+    on_cs, on_fs = 1e-3 * rng.normal(size=(2, 5)), 1e-3 * rng.normal(size=(2, 12))
+    angles = met_angles(theta, model.advance, model.beyond_at(model.rotation(theta), errors))
+    extra, rises = np.zeros((2, rows)), np.zeros((2, 2, rows))
+    for spline, waves in enumerate((on_cs, on_fs)):
+        for k, (a, b) in enumerate(waves.T, start=1):
+            extra += a * np.sin(k * angles[spline]) + b * np.cos(k * angles[spline])
+            rises[spline] += k * (a * np.cos(k * angles[spline]) - b * np.sin(k * angles[spline]))
+    expected = model.evaluate_at(model.rotation(theta), errors, extra, rises)
+    found = model.evaluate_at(model.rotation(theta), errors, waves=(on_cs, on_fs))
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-9 * np.abs(other).max(), rtol=0)

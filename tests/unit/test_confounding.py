@@ -14,7 +14,8 @@ from hdopt.diagnosis.checks.confounding import (
     share_in_span,
     smallest_angle_deg,
 )
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.nuisance import nuisances_for
 from hdopt.diagnosis.inference.residual_gains import FitProbe

@@ -15,7 +15,8 @@ import pytest
 from hdopt.cli import main
 from hdopt.diagnosis import diagnose
 from hdopt.diagnosis.inference.base_fit import base_estimate, fit_base
-from hdopt.diagnosis.inference.fit import FitProblem, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import FitProblem
 from hdopt.diagnosis.inference.noise import Noise, estimate
 from hdopt.diagnosis.inference.nuisance import nuisances_for
 from hdopt.effects import EFFECTS

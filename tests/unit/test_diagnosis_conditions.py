@@ -7,7 +7,8 @@ import pytest
 
 from hdopt.diagnosis import diagnose
 from hdopt.diagnosis.inference.conditions import across_conditions, find_conditions, number_levels
-from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.nuisance import nuisances_for
 from hdopt.diagnosis.search.candidates import joint_fit

@@ -10,7 +10,8 @@ import pytest
 from hdopt.diagnosis import diagnose
 from hdopt.diagnosis.inference import hidden_turns
 from hdopt.diagnosis.inference.cross_validation import held_out, turn_folds
-from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.hidden_turns import hidden_samples, uncut_blocks, without_samples
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.residual_gains import FitProbe

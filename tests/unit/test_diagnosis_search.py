@@ -9,7 +9,8 @@ import pytest
 from hdopt.diagnosis import diagnose
 from hdopt.diagnosis.inference.base_fit import fit_base
 from hdopt.diagnosis.inference.catalogue import explanations
-from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise, estimate, without_lines
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.search import zone_high_order

@@ -12,7 +12,8 @@ import pytest
 from test_effect_physics import GEAR, RATE, RATIO, TURN, moving
 from test_windup_curves import fit_of
 
-from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.settings import DEFAULT

@@ -9,7 +9,8 @@ from test_cross_validation import RATE, noisy, rows_of, without_base
 
 from hdopt.diagnosis.inference import fit as fits
 from hdopt.diagnosis.inference.catalogue import properties_of
-from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine, term_columns
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate, term_columns
 from hdopt.diagnosis.inference.noise import Noise, weights_with_a_past
 from hdopt.diagnosis.inference.normal_equations import bordered
 from hdopt.effects.met import Spline, ToothForms

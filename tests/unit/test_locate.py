@@ -6,7 +6,8 @@ import pytest
 from test_cross_validation import RATE, noisy, rows_of, without_base
 
 from hdopt.diagnosis.checks.localization import locate
-from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.nuisance import nuisances_for
 from hdopt.diagnosis.inference.residual_gains import FitProbe

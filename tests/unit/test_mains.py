@@ -12,7 +12,7 @@ from test_effect_physics import RATE, RATIO, TURN, moving
 from test_windup_curves import fit_of
 
 from hdopt.diagnosis import diagnose
-from hdopt.diagnosis.inference.fit import refine
+from hdopt.diagnosis.inference.descent import refine
 from hdopt.diagnosis.inference.nonphysical_alternatives import AnyFrequency, Mains
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.search.penalty import Scale, penalty

@@ -14,7 +14,7 @@ from test_windup_curves import fit_of
 from hdopt.diagnosis.inference import nonphysical_alternatives
 from hdopt.diagnosis.inference.base_excitation import motion_of
 from hdopt.diagnosis.inference.change_points import find_steps
-from hdopt.diagnosis.inference.fit import refine
+from hdopt.diagnosis.inference.descent import refine
 from hdopt.diagnosis.inference.generic_basis import generic_columns
 from hdopt.diagnosis.inference.nonphysical_alternatives import alternatives, smoothed, strongest_frequencies
 from hdopt.diagnosis.inference.residual_gains import FitProbe

@@ -10,7 +10,8 @@ from test_cross_validation import TURN, noisy
 
 from hdopt.diagnosis import diagnose
 from hdopt.diagnosis.inference.catalogue import explanations
-from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine, term_columns
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate, term_columns
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.read_angle import read_ahead, reads_input, where_it_stood
 from hdopt.diagnosis.inference.residual_gains import FitProbe

@@ -23,7 +23,7 @@ def probe_of(design, precision, residual, weights=None):
     problem = SimpleNamespace(settings=DEFAULT, rows=SimpleNamespace(highest_order=9.0), noise=noise)
     fit = SimpleNamespace(terms=(), problem=problem, motion=None, residual=residual)
     fit.white_design = lambda keep: fit.problem.noise.whiten(design)
-    fit.prior_precision = lambda width: precision
+    problem.prior_precision = lambda width: precision
     fit.columns_of = lambda term, keep: term.columns
     problem.whitened = {}
     return FitProbe(fit)

@@ -8,7 +8,8 @@ import pytest
 from scipy.signal import lfilter
 
 from hdopt.diagnosis import diagnose
-from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.settled_shapes import estimates_by_profile, profile_sigma, settled
 from hdopt.effects import EFFECTS

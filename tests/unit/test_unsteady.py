@@ -13,7 +13,8 @@ from hdopt.diagnosis.checks.slow_wander import lost_in_wander, slow_wave
 from hdopt.diagnosis.checks.step_detection import sudden_steps
 from hdopt.diagnosis.inference import noise as noise_model
 from hdopt.diagnosis.inference.change_points import find_steps
-from hdopt.diagnosis.inference.fit import FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.search.candidates import joint_fit
 from hdopt.diagnosis.settings import DEFAULT

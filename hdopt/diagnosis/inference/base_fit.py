@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdopt.arrays import Array, Mask
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate
 from hdopt.diagnosis.inference.normal_equations import least_squares
 from hdopt.diagnosis.numerical import HALF, NORMAL_95, SMALLEST_POWER
 from hdopt.diagnosis.settings import DEFAULT, BaseSettings

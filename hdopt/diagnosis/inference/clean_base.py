@@ -15,7 +15,8 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.diagnosis.inference.base_fit import fit_base
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate
 from hdopt.diagnosis.inference.generic_basis import generic_columns
 from hdopt.diagnosis.inference.normal_equations import least_squares
 from hdopt.effects.sines import sine_columns

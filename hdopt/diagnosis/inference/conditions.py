@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdopt.arrays import Array, Index
-from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit, evaluate
 from hdopt.diagnosis.settings import DEFAULT, ConditionSettings
 from hdopt.recordings.read import TURN
 from hdopt.recordings.rows import Rows

@@ -49,7 +49,8 @@ def held_out(fit: Fit, extra: Array | None, groups: Index) -> HeldOut:
     linear = fit.design()
     target = fit.residual
     white, white_target = noise.whiten(design), noise.whiten(target)
-    prior = noise.sigma**2 * np.r_[fit.prior_precision(linear.shape[1]), np.zeros(design.shape[1] - linear.shape[1])]
+    precision = np.r_[fit.problem.prior_precision(linear.shape[1]), np.zeros(design.shape[1] - linear.shape[1])]
+    prior = noise.sigma**2 * precision
     scale = np.sqrt(np.maximum((white**2).sum(0), TINY))
     # The small ridge (1e-3 of each column's own power) keeps a column
     # that lives in the held-out turns alone from running off.

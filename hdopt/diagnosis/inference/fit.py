@@ -1,6 +1,6 @@
 """Joint fit: the base model's errors, offsets, and the terms of any effects, all at once.
 
-Levenberg-Marquardt on whitened rows. The base enters through its Cartesian errors with a wide prior (it keeps
+Generalized least squares on whitened rows. The base enters through its Cartesian errors with a wide prior (it keeps
 combinations that the recording cannot tell apart from running off); effects that act inside the meshing zones take
 part in the choice of the driving zone.
 """
@@ -26,7 +26,7 @@ from hdopt.diagnosis.inference.base_excitation import (
 from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.newey_west import newey_west, reach_95
 from hdopt.diagnosis.inference.noise import Noise
-from hdopt.diagnosis.inference.normal_equations import GroupedColumns, bordered, solved, sums_of_groups
+from hdopt.diagnosis.inference.normal_equations import GroupedColumns, bordered, sums_of_groups
 from hdopt.diagnosis.inference.read_angle import read_ahead, reads_input, where_it_stood
 from hdopt.diagnosis.inference.whitened_terms import WhitenedTerms
 from hdopt.diagnosis.numerical import NORMAL_95, TINY
@@ -96,12 +96,18 @@ class FitProblem:
         """Rows that the noise gives a weight."""
         return float((self.noise.root_weight > 0).sum())
 
-    @property
+    @cached_property
     def prior(self) -> Array:
         """Standard deviations of the base's Cartesian errors, (12,) mm."""
         return np.array(self.settings.base.prior_mm) * self.prior_scale
 
-    @property
+    def prior_precision(self, width: int) -> Array:
+        """What the prior knows of each of so many parameters (`width`), 1/mm^2: of the base's errors alone."""
+        precision = np.zeros(width)
+        precision[: self.base_width] = 1 / self.prior[: self.base_width] ** 2
+        return precision
+
+    @cached_property
     def box(self) -> Array:
         """Bounds of the base's Cartesian errors, (12,) mm."""
         return np.array(self.settings.base.box_mm) * self.prior_scale
@@ -247,12 +253,6 @@ class Fit:
         size = base.arcmin_per_mm * self.seen(form[:, None])[:, 0]
         return GroupedColumns(tooth, noise.whiten(size), term.met.heights)
 
-    def prior_precision(self, width: int) -> Array:
-        precision = np.zeros(width)
-        if self.problem.base is not None:
-            precision[:PARAMETERS] = 1 / self.problem.prior**2
-        return precision
-
     @cached_property
     def _curvature(self) -> tuple[Array, Array, float, Array]:
         """Whitened design (n, q) and residual (n,), the variance of the latter, arcmin^2, and the covariance (q, q)
@@ -261,7 +261,7 @@ class Fit:
         residual = self.problem.noise.whiten(self.residual)
         freedom = max(len(residual) - design.shape[1], 1)
         sigma2 = max(float(residual @ residual) / freedom, self.problem.settings.fit.variance_floor)
-        normal = design.T @ design / sigma2 + np.diag(self.prior_precision(design.shape[1]))
+        normal = design.T @ design / sigma2 + np.diag(self.problem.prior_precision(design.shape[1]))
         return design, residual, sigma2, np.linalg.pinv(normal, hermitian=True)
 
     def expected_rises(self) -> Array:
@@ -278,7 +278,7 @@ class Fit:
         at += sum(term.freedom for term in self.terms[:index])
         at += self.terms[index].width + list(self.terms[index].steps).index(name)
         *_, inverse = self._curvature
-        return _moved(self, inverse[:, at] * (change / max(float(inverse[at, at]), TINY)), True)
+        return moved(self, inverse[:, at] * (change / max(float(inverse[at, at]), TINY)), True)
 
     def covariance(self) -> Array:
         """`_robust_covariance`, worked out once."""
@@ -423,52 +423,9 @@ def _in_zones(
     return extra, rises
 
 
-def refine(fit: Fit, iterations: int | None = None, tolerance: float | None = None, move_shapes: bool = True) -> Fit:
-    """Levenberg-Marquardt from `fit` on (Marquardt, J. SIAM 11, 1963): at most so many `iterations`, until the
-    objective drops by less than `tolerance` of itself (None: as set); the shapes of terms stay where not `move_shapes`.
-    """
-    settings = fit.problem.settings.fit
-    tolerance = settings.tolerance if tolerance is None else tolerance
-    damping = settings.damping
-    for _ in range(settings.iterations if iterations is None else iterations):
-        trial, damping = _improved(fit, damping, move_shapes)
-        if trial is None:
-            break
-        drop = fit.objective - trial.objective
-        fit, damping = trial, max(damping / settings.damping_down, settings.damping_least)
-        if drop < tolerance * fit.objective:
-            break
-    return fit
-
-
-def _improved(fit: Fit, damping: float, move_shapes: bool) -> tuple[Fit | None, float]:
-    """A better fit one damped step away, None where none was found, and the damping that it took."""
-    problem, settings = fit.problem, fit.problem.settings.fit
-    wb = problem.base_width
-    normal, gradient = fit.normal_equations(move_shapes)
-    precision = problem.noise.sigma**2 * fit.prior_precision(len(normal))
-    gradient[:wb] -= precision[:wb] * fit.errors
-    diagonal = slice(None, None, len(normal) + 1)
-    normal.flat[diagonal] += precision
-    scale = np.sqrt(np.maximum(normal.flat[diagonal], settings.scale_floor))
-    scaled = normal / (scale[:, None] * scale)
-    for _ in range(settings.damping_tries):
-        damped = scaled.copy()
-        damped.flat[diagonal] += damping
-        try:
-            step = solved(damped, gradient / scale) / scale
-        except np.linalg.LinAlgError:
-            damping *= settings.damping_singular
-            continue
-        trial = _moved(fit, step, move_shapes)
-        if trial.objective < fit.objective:
-            return trial, damping
-        damping = max(damping * settings.damping_up, settings.damping_least_up)
-    return None, damping
-
-
-def _moved(fit: Fit, step: Array, move_shapes: bool) -> Fit:
-    """`fit` with all its parameters moved by `step`, the base's errors kept in their box."""
+def moved(fit: Fit, step: Array, move_shapes: bool) -> Fit:
+    """`fit` with all its parameters moved by `step` (q,), in the order of `Fit.design`, the base's errors kept in their
+    box; the shapes of terms stay where not `move_shapes`."""
     problem, settings = fit.problem, fit.problem.settings.fit
     wb, position = problem.base_width, problem.base_width + problem.nuisance.shape[1]
     terms, coefficients = [], []

@@ -47,7 +47,11 @@ class Noise:
 
     def whiten(self, values: Array) -> Array:
         """`values` (n,) or (n, q), filtered and weighted along the first axis."""
-        return self.whitened([values[:, None]])[:, 0] if values.ndim == 1 else self.whitened([values])
+        if values.ndim > 1:
+            return self.whitened([values])
+        white = np.empty(len(values))
+        self.whiten_rows(values[None], white[None])
+        return white
 
     def whitened(self, blocks: Sequence[Array]) -> Array:
         """`blocks` of columns, each (n, k), filtered and weighted, beside each other, (n, q); every column lies in one
@@ -56,11 +60,15 @@ class Noise:
         ends = list(accumulate((block.shape[1] for block in blocks), initial=0))
         rows = np.empty((ends[-1], len(self.root_weight)))
         for block, (start, end) in zip(blocks, pairwise(ends), strict=True):
-            if len(self.ar):
-                _filter(np.ascontiguousarray(block.T), self.ar, self.root_weight, rows[start:end])
-            else:
-                np.multiply(block.T, self.root_weight, out=rows[start:end])
+            self.whiten_rows(block.T, rows[start:end])
         return rows.T
+
+    def whiten_rows(self, columns: Array, result: Array) -> None:
+        """`columns`, each a row (q, n), filtered and weighted into `result` (q, n), another array."""
+        if len(self.ar):
+            _filter(np.ascontiguousarray(columns), self.ar, self.root_weight, result)
+        else:
+            np.multiply(columns, self.root_weight, out=result)
 
 
 GROUP = 4

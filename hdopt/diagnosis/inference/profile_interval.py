@@ -15,7 +15,8 @@ import numpy as np
 from scipy import optimize
 
 from hdopt.arrays import Array
-from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit, evaluate
 from hdopt.diagnosis.numerical import NORMAL_95
 from hdopt.diagnosis.settings import ProfileSettings
 from hdopt.effects.estimate import FitEstimate

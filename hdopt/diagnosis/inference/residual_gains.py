@@ -42,7 +42,7 @@ class FitProbe:
                 self.residual = self.residual + (fit.seen(own, self.keep) if excites(term) else own)[:, 0]
         white = fit.white_design(self.keep)
         # The prior on the base keeps directions the data leave open from swallowing an effect.
-        prior = np.sqrt(fit.prior_precision(white.shape[1])) * self.noise.sigma
+        prior = np.sqrt(fit.problem.prior_precision(white.shape[1])) * self.noise.sigma
         augmented = np.vstack([white, np.diag(prior)])
         scale = np.sqrt((augmented**2).sum(0))
         basis = orthonormal(augmented / np.where(scale > 0, scale, 1))

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hdopt.diagnosis.inference.fit import Fit, in_shape, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit, in_shape
 from hdopt.diagnosis.numerical import NORMAL_95
 from hdopt.effects.estimate import FitEstimate
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from hdopt.diagnosis.inference.base_fit import fit_base, is_far
 from hdopt.diagnosis.inference.catalogue import is_outside
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, extend, refine, with_terms
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, extend, with_terms
 from hdopt.diagnosis.inference.normal_equations import gains_of_subsets, solved
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import SMALL_RIDGE, TINY

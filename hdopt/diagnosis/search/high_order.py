@@ -11,7 +11,8 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.diagnosis.inference import noise as noise_model
 from hdopt.diagnosis.inference.catalogue import explanations
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine, with_terms
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, with_terms
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.nonphysical_alternatives import AnyOrder, Mains
 from hdopt.diagnosis.inference.nuisance import Nuisances

@@ -18,7 +18,8 @@ import numpy as np
 from hdopt.diagnosis.inference.base_fit import is_far
 from hdopt.diagnosis.inference.catalogue import is_outside
 from hdopt.diagnosis.inference.clean_base import drive_alone
-from hdopt.diagnosis.inference.fit import Fit, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.search.acceptance import is_acceptable
 from hdopt.diagnosis.search.candidates import (
     Candidate,

@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from hdopt.arrays import Array, Index
-from hdopt.diagnosis.inference.fit import Fit, evaluate, refine
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit, evaluate
 from hdopt.diagnosis.numerical import HALF, TINY
 from hdopt.effects.met import ToothForms
 from hdopt.effects.sines import sine_columns

@@ -21,7 +21,8 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.diagnosis.inference.base_fit import thinned
 from hdopt.diagnosis.inference.catalogue import is_outside
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, refine, term_columns, with_terms
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, term_columns, with_terms
 from hdopt.diagnosis.inference.noise import predictable_share
 from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.search.guess import Guess
