@@ -121,10 +121,11 @@ def test_what_bends_besides_is_no_such_fit(base):
     problem = replace(problem, rows=rows)
     (columns,) = terms_of(rows, ("columns",))
     motion = base.evaluate_at(problem.rotation, problem.prior)[0]
+    swings = {"frequency_hz": 20.0, "damping_ratio": 0.05}
     eccentric = {"shaft": Shaft.INPUT, "orders": (1,)}
     bent = {
         "shape": replace(columns, shape={"phase": 1.0}, steps={"phase": 0.1}),
-        "driven": properties_of("resonance").term(rows, {"frequency_hz": 20.0, "damping_ratio": 0.05}, motion),
+        "driven": replace(properties_of("resonance").term(rows, swings, motion), steps={}),
         "reads the input": properties_of("encoder_input_eccentricity").term(rows, eccentric),
         "pulse": Term("local_tooth_defect", {}, met=Pulse(Spline.CIRCULAR, 1.0, 0.05)),
         "many waves": Term("cs_tooth_harmonics", {}, met=Waves(Spline.CIRCULAR, (2, MOST_WAVES + 1))),
