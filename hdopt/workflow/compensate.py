@@ -27,6 +27,7 @@ from hdopt.workflow.compensation_samples import Samples, samples_of
 from hdopt.workflow.compensation_speeds import TERMS as OWN_TERMS
 from hdopt.workflow.compensation_speeds import lag_in, of_each_speed, own_of_each_speed, speeds_rpm
 from hdopt.workflow.compensation_trials import (
+    HARMONICS,
     STRETCHES,
     candidates,
     centred,
@@ -54,6 +55,8 @@ GROUPS_PER_BEAT = 8
 """Stretches an output turn over which held-out squares are taken together: neighbouring turns hang together."""
 FEWEST_STRETCHES = 3
 """Of which a standard error of the fall is taken."""
+LEAVES_MORE = 1.2
+"""What the model leaves over what harmonics alone leave from which it is said not to be the drive's."""
 NONE = "none"
 EACH_SPEED = ", and what each speed has of its own"
 
@@ -312,12 +315,29 @@ def compensation_of(recordings: Sequence[Recording], drive: Drive | None, terms:
         (
             *_warnings(rows, held_out, moving),
             *(_too_few(len(common), terms, off, float(np.ptp(again))) if worth else ()),
+            *_without_the_model(method, trials),
         ),
         stretches,
         _by_way(each, left, rng),
         _by_speed(rows, of_each),
         drive is not None,
         how_counted(moving),
+    )
+
+
+def _without_the_model(method: str, trials: Mapping[str, Array]) -> tuple[str, ...]:
+    """A warning where harmonics alone are the `method`, though the model of the drive was among the `trials` (what each
+    leaves, (n,) arcmin): a drive that is the one recorded leaves no more than they."""
+    ways = [name for name in trials if "model" in name]
+    if "model" in method or not ways:
+        return ()
+    alone, best = float(np.std(trials[HARMONICS])), min(float(np.std(trials[name])) for name in ways)
+    if best < LEAVES_MORE * alone:
+        return ()
+    return (
+        f"the model of the drive is not in it: with it {best:.3g} arcmin rms are left of what the fit did not see, "
+        f"with harmonics alone {alone:.3g}; check --drive, and zero, direction and sign of measured teeth "
+        "(hdopt inspect), or leave --drive out",
     )
 
 

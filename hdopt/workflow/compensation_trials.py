@@ -40,6 +40,7 @@ FALLS = 0.9
 """Part of what the model leaves that may be left beside those waves for a fit with them: less is no reason for one."""
 MEETS_AGAIN = 0.8
 """Share of the stretches that a pass back, or another recording, must reach over to have met them too."""
+HARMONICS = "harmonics"
 TEETH = "model, teeth and harmonics"
 BOTH_WAYS = "stretches of either direction"
 STRETCHES = "stretches of the one output turn"
@@ -199,7 +200,7 @@ def candidates(
     alone = alone.sharpened(rows.ratio, width, count)
     held, lost = alone.for_table(COARSE)
     table = surface_of([held], None, alone.back, crossing)
-    made: dict[str, tuple[Angular, float]] = {"harmonics": (table, lost.reach) if terms == 0 else (alone, 0.0)}
+    made: dict[str, tuple[Angular, float]] = {HARMONICS: (table, lost.reach) if terms == 0 else (alone, 0.0)}
     if fit is None:
         return made
     free = zeros if path is None else np.column_stack([zeros, path])
