@@ -6,11 +6,12 @@ import math
 
 from hdopt.drive.geometry import Drive
 from hdopt.drive.profiles import MeasuredProfile
+from hdopt.workflow.rough_profile import words_on_a_rough_profile
 
 
 def words_on_measured_parts(drive: Drive) -> list[str]:
-    """That a table of `drive` was re-centred, and by how much, or that it was not: a sentence each, [] where no part
-    was measured."""
+    """That a table of `drive` was re-centred, and by how much, or that it was not, and that a cam's points scatter: a
+    sentence each, [] where no part was measured."""
     found = []
     for name, teeth in (("cs_teeth", drive.cs_teeth), ("fs_teeth", drive.fs_teeth)):
         if teeth is None:
@@ -33,6 +34,7 @@ def words_on_measured_parts(drive: Drive) -> list[str]:
             f"wave_generator: the measured profile lies {1000 * profile.off_centre:.2f} um off its table's centre, "
             "which is kept as part of its shape, beside wg_eccentricity_mm"
         )
+        found += words_on_a_rough_profile(drive)
     ring = drive.cs_roundness
     if ring is not None:
         size = f"cs_roundness: {1000 * ring.peak_to_valley:.2f} um from peak to valley up to {ring.cutoff} UPR;"

@@ -15,6 +15,7 @@ from hdopt.drive.profiles import MeasuredProfile, curvature, parallel_profile
 from hdopt.drive.scatter import differences, scatter_of_points
 from hdopt.errors import HdoptError
 from hdopt.geometry.contour import ParallelCurve
+from hdopt.workflow.measured_parts import words_on_measured_parts
 from hdopt.workflow.rough_profile import words_on_a_rough_profile
 
 TURN = np.arange(720) * (2 * math.pi / 720)
@@ -98,3 +99,15 @@ def test_a_contour_that_scatter_makes_cross_itself_names_the_noise():
     with pytest.raises(HdoptError) as of_an_ellipse:
         ParallelCurve(TABLE_1_ELLIPSE, 31.0)
     assert "noise_um" not in str(of_an_ellipse.value)
+
+
+def test_scatter_is_said_wherever_the_cam_counts():
+    """With `ke`, stacks, searches and what is recorded, once. Would catch words that only `hdopt ke --profile` prints,
+    and the same twice."""
+    noise = np.random.default_rng(4).normal(0, 1e-3, len(TURN))
+    profile = parallel_profile(MeasuredProfile(TURN, CAM + noise, source="cam.csv"), 3.0)
+    rough = replace(drive(), wave_generator=replace(drive().wave_generator, profile=profile))
+    words = words_on_measured_parts(rough)
+    assert [word for word in words if "scatter by" in word] == words_on_a_rough_profile(rough)
+    assert len(words_on_a_rough_profile(rough)) == 1
+    assert not any("scatter" in word for word in words_on_measured_parts(drive()))
