@@ -135,7 +135,7 @@ class BaseSettings:
         "leave nearly none of what teeth, and nearly all of what foreign orders and lines make",
     )
     starts_joint: int = threshold(10, "1", "choice: starts beside a set of effects")
-    rows_for_starts: int = threshold(800, "rows", "choice: effort; the twelve errors live below order 6")
+    rows_for_starts: int = threshold(1750, "rows", "choice: effort; the twelve errors live below order 6")
     smallest_start: float = threshold(0.15, "1", "choice: size of a random drive over the prior")
     largest_start: float = threshold(0.7, "1", "choice: size of a random drive over the prior")
     fewest_starts: int = threshold(8, "1", "choice: starts before agreement may end them")

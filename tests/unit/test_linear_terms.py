@@ -1,4 +1,4 @@
-"""Fits of which nothing but the base bends: the same numbers as any fit's, in a quarter of the time."""
+"""Fits of which nothing but the base bends: the same numbers as any fit has."""
 
 from dataclasses import replace
 
