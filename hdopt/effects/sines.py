@@ -21,7 +21,8 @@ def sine_columns(phase: Array, harmonics: Sequence[float] | Array) -> Array:
         return _sines(phase, multiples).T
     place = np.full(run[-1] - run[0], -1)
     place[multiples.astype(np.int64) - run[0] - 1] = np.arange(len(multiples))
-    return _whole_sines(phase, place, run[0], len(multiples)).T
+    once, before = _sines(phase, np.ones(1)), _sines(phase, np.array([float(run[0])]))
+    return _multiples(once, before, place, len(multiples)).T
 
 
 def multiples(sine: Array, cosine: Array, orders: Index) -> Array:
@@ -29,7 +30,8 @@ def multiples(sine: Array, cosine: Array, orders: Index) -> Array:
     on, (n, 2 k)."""
     place = np.full(orders.max(), -1)
     place[orders - 1] = np.arange(len(orders))
-    return _multiples(np.ascontiguousarray(sine), np.ascontiguousarray(cosine), place, len(orders)).T
+    before = np.repeat([[0.0], [1.0]], len(sine), axis=1)
+    return _multiples(np.stack([sine, cosine]), before, place, len(orders)).T
 
 
 STEPS = 4
@@ -68,49 +70,28 @@ def _sines(phase: Array, harmonics: Array) -> Array:
 
 
 @late(calls=0)
-def _whole_sines(phase: Array, place: Index, before: int, count: int) -> Array:
-    """The same for `count` whole multiples, by the sine's and cosine's addition theorems from the multiple `before`
-    on: `place` (h,) says which of them each of the next h is, -1 for none.
+def _multiples(once: Array, before: Array, place: Index, count: int) -> Array:
+    """The same for `count` whole multiples, by the sine's and cosine's addition theorems, from those of the angles
+    (`once`) and of the multiple `before`, (2, n) each: `place` (h,) says which of them each of the next h is, -1 for
+    none.
     """
-    rows = len(phase)
-    columns = np.empty((2 * count, rows))
-    sine, cosine, s, c = np.empty(PIECE), np.empty(PIECE), np.empty(PIECE), np.empty(PIECE)
-    for start in range(0, rows, PIECE):
-        here = min(PIECE, rows - start)
-        for i in range(here):
-            sine[i], cosine[i] = sine_cosine(phase[start + i])
-        _begin(phase, start, here, before, s, c)
-        for at in place:
-            if at >= 0:
-                own, beside = columns[2 * at, start : start + here], columns[2 * at + 1, start : start + here]
-                for i in range(here):
-                    s[i], c[i] = _one_further(s[i], c[i], sine[i], cosine[i])
-                    own[i], beside[i] = s[i], c[i]
-            else:
-                for i in range(here):
-                    s[i], c[i] = _one_further(s[i], c[i], sine[i], cosine[i])
-    return columns
-
-
-@late(calls=0)
-def _multiples(sine: Array, cosine: Array, place: Index, count: int) -> Array:
-    """The same at angles whose `sine` and `cosine` (n,) are known: `place` (h,) from the multiple 1 on."""
-    rows = len(sine)
+    rows = once.shape[1]
     columns = np.empty((2 * count, rows))
     s, c = np.empty(PIECE), np.empty(PIECE)
     for start in range(0, rows, PIECE):
         here = min(PIECE, rows - start)
-        once, beside_once = sine[start : start + here], cosine[start : start + here]
-        s[:], c[:] = 0.0, 1.0
+        sine, cosine = once[0, start : start + here], once[1, start : start + here]
+        for i in range(here):
+            s[i], c[i] = before[0, start + i], before[1, start + i]
         for at in place:
             if at >= 0:
                 own, beside = columns[2 * at, start : start + here], columns[2 * at + 1, start : start + here]
                 for i in range(here):
-                    s[i], c[i] = _one_further(s[i], c[i], once[i], beside_once[i])
+                    s[i], c[i] = _one_further(s[i], c[i], sine[i], cosine[i])
                     own[i], beside[i] = s[i], c[i]
             else:
                 for i in range(here):
-                    s[i], c[i] = _one_further(s[i], c[i], once[i], beside_once[i])
+                    s[i], c[i] = _one_further(s[i], c[i], sine[i], cosine[i])
     return columns
 
 

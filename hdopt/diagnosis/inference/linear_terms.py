@@ -46,15 +46,12 @@ def _kind(term: Term, move_shapes: bool) -> Kind | None:
 @dataclass(frozen=True)
 class _Prepared:
     """What the points of a descent share: the fit that it `begun` at, its `base`, the parameters (q,) of each of its
-    terms (`places`), the numbers of those `round_splines` and `in_zones`, the whitened record `target` (n,), and the
-    whitened columns of all parameters as the rows of `design` (q, n): those in `steady` stay, the others are those of
-    the point that was asked last."""
+    terms (`places`), the whitened record `target` (n,), and the whitened columns of all parameters as the rows of
+    `design` (q, n): those in `steady` stay, the others are those of the point that was asked last."""
 
     begun: Fit
     base: CartesianModel
     places: tuple[slice, ...]
-    round_splines: tuple[int, ...]
-    in_zones: tuple[int, ...]
     target: Array
     design: Array
     steady: slice
@@ -74,16 +71,13 @@ class _Prepared:
         white = problem.noise.whitened(fixed).T
         design, steady = np.empty((end, white.shape[1])), slice(PARAMETERS, PARAMETERS + len(white))
         design[steady] = white
-        round_splines, in_zones = (
-            tuple(i for i, one in enumerate(kinds) if one is kind) for kind in (Kind.SPLINE, Kind.ZONE)
-        )
         target = problem.noise.whiten(problem.rows.error)
-        return cls(fit, base, tuple(places), round_splines, in_zones, target, design, steady)
+        return cls(fit, base, tuple(places), target, design, steady)
 
     @cached_property
     def waves(self) -> list[tuple[slice, Spline, Index]]:
         """Of each term round a spline its parameters, the spline, and its waves less one."""
-        met = [(self.places[i], self.begun.terms[i].met) for i in self.round_splines]
+        met = zip(self.places, (term.met for term in self.begun.terms), strict=True)
         return [(at, one.spline, np.array(one.harmonics) - 1) for at, one in met if isinstance(one, Waves)]
 
     @cached_property
@@ -94,7 +88,7 @@ class _Prepared:
     @cached_property
     def zones(self) -> list[tuple[slice, Array]]:
         """Of each term in the zones its parameters and what either zone sees of them, mm, (2, n, p)."""
-        seen = [(self.places[i], self.begun.terms[i].zones) for i in self.in_zones]
+        seen = zip(self.places, (term.zones for term in self.begun.terms), strict=True)
         return [(at, zones) for at, zones in seen if zones is not None]
 
     def at(self, parameters: Array) -> LinearTermsFit:
