@@ -16,6 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from hdopt.arrays import Array, Singles
+from hdopt.kinematics.inner import inner
 from hdopt.kinematics.lanes.single import narrowed, unsigned
 
 Function = TypeVar("Function", bound=Callable[..., object])
@@ -28,17 +29,22 @@ _UNCOUNTED: dict[str, Any] = _OPTIONS | {"_nrt": False}
 
 def allocating(function: Function) -> Function:
     """`function` compiled for kernels of the beat; it makes arrays, or gives such back as it was given."""
-    return cast("Function", njit(**_OPTIONS)(function))
+    return inner(**_OPTIONS)(function)
+
+
+def entry(function: Function) -> Function:
+    """`function` compiled for Python to call, kept on disk; it may make arrays."""
+    return cast("Function", njit(cache=True, nogil=True, **_OPTIONS)(function))
 
 
 def compiled(function: Function) -> Function:
     """`function` compiled for kernels of the beat; it does neither."""
-    return cast("Function", njit(**_UNCOUNTED)(function))
+    return inner(**_UNCOUNTED)(function)
 
 
 def inlined(function: Function) -> Function:
     """The same of a `function` that is compiled into each of its callers."""
-    return cast("Function", njit(forceinline=True, **_UNCOUNTED)(function))
+    return inner(forceinline=True, **_UNCOUNTED)(function)
 
 
 whole_of = cast("Callable[[float], int]", np.int32)
@@ -200,7 +206,7 @@ def with_sine(table: Array, amplitude: float, phase: float, circle: Array, out: 
         out[i] = table[i] + (along * cos[i] + across * sin[i])
 
 
-@allocating
+@entry
 def second_difference(table: Array, stride: int) -> float:
     """Largest second difference of a periodic `table` over so many of its places (`stride`), in its unit."""
     return differences(table, stride)[0]

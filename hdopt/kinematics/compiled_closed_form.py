@@ -11,6 +11,7 @@ from numba import njit
 from hdopt.arrays import Array
 from hdopt.kinematics import closed_form
 from hdopt.kinematics.closed_form import ErrorComponents, RigidMotion, TipGeometry
+from hdopt.kinematics.inner import inner
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -40,12 +41,12 @@ def compiled(function: Function) -> Function:
     arrays, and sort none (`allocating` may). Those it is given are its caller's, so that their users need not be
     counted, which would cost some 20 cycles wherever an array is named.
     """
-    return cast("Function", njit(forceinline=True, **UNCOUNTED)(function))
+    return inner(forceinline=True, **UNCOUNTED)(function)
 
 
 def allocating(function: Function) -> Function:
     """The same of a `function` that makes arrays."""
-    return cast("Function", njit(forceinline=True, **OPTIONS)(function))
+    return inner(forceinline=True, **OPTIONS)(function)
 
 
 rigid_motion = inlined(closed_form.rigid_motion)

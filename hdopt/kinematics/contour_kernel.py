@@ -20,6 +20,7 @@ from hdopt.kinematics.beat_grid import grid_angles, new_work, walk_of
 from hdopt.kinematics.beat_lanes import extremes_in_lanes
 from hdopt.kinematics.beat_tables import WRAPPED, circle, differences, fill_comb, new_teeth, with_sine, wrap
 from hdopt.kinematics.exact import GRID_POINTS, LONGEST_STEP, NEWTON_STEPS, ZONE_HALF_WIDTH
+from hdopt.kinematics.inner import inner
 from hdopt.kinematics.load_sharing import PLACES_PER_TOOTH
 
 CONTOUR_PLACES = 8192
@@ -36,7 +37,7 @@ STEPS = 2
 FEWEST_ANGLES, ANGLES_PER_TOOTH = 240, 1.5
 """Grid angles of one input turn at least, and for each tooth of the circular spline: twice those of smooth tips."""
 
-compiled = njit(error_model="numpy", fastmath=False)
+compiled = inner(error_model="numpy", fastmath=False)
 
 
 class ContourConstants(NamedTuple):
@@ -155,7 +156,7 @@ def _searched(points: Array, zone: int, rim: Rim, every: int) -> float:
     return best
 
 
-@compiled
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=False)
 def _fill_starts(points: Array, starts: Array) -> None:
     """Fill `starts` (2, K) with the place in each zone that lies farthest out of a contour that is moved across only,
     for even motions from -`ACROSS_REACH` to `ACROSS_REACH`."""

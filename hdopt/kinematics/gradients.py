@@ -28,6 +28,7 @@ from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
 from hdopt.kinematics.closed_form import RigidMotion, TipGeometry, tip_geometry
 from hdopt.kinematics.compiled_closed_form import motion_at, motion_of_row, rim_constants, rim_depth, tooth_deviation
+from hdopt.kinematics.inner import inner
 from hdopt.parallel.shared_memory import in_parts
 
 HIGHS, LOWS = 4, 8
@@ -48,6 +49,8 @@ second order in them but for their tangents, so that the difference is exact but
 # Columns: value, then slopes over theta, L_W, rho0, b/2, tan(alpha), and along the direction of the errors.
 VALUE, THETA, MAJOR, RHO, HALF, TAN, ALONG = range(7)
 COLUMNS = 7
+
+compiled = inner(fastmath=False)
 
 
 class Extremes(NamedTuple):
@@ -75,7 +78,7 @@ class ZoneTerms(NamedTuple):
     ahead: RigidMotion[float]
 
 
-@njit(cache=True, nogil=True, fastmath=False)
+@compiled
 def _depth(terms: ZoneTerms, cos: float, sin: float, s: float, k: float) -> tuple[float, float, float]:
     """Depth (mm) and offsets o and o' (rad) of zone s and rim k at the angle of this cosine and sine."""
     e_a, e_l, t_a, t_l = motion_at(terms.motion, cos, sin)
@@ -83,7 +86,7 @@ def _depth(terms: ZoneTerms, cos: float, sin: float, s: float, k: float) -> tupl
     return depth, o, o_fs
 
 
-@njit(cache=True, nogil=True, fastmath=False)
+@compiled
 def _apart(terms: ZoneTerms, theta: float, s: float) -> float:
     """How much deeper the upper rim of zone s lies than the lower one at `theta`, mm."""
     cos, sin = math.cos(theta), math.sin(theta)
@@ -91,7 +94,7 @@ def _apart(terms: ZoneTerms, theta: float, s: float) -> float:
     return apart
 
 
-@njit(cache=True, nogil=True, fastmath=False)
+@compiled
 def _deepest(terms: ZoneTerms, cos: float, sin: float, s: float, side: float) -> tuple[float, float, bool]:
     """tau without FS term and o' of the rim `side` (+-1) of zone s, or (0) of its deepest one; whether the upper one is
     it."""
@@ -106,7 +109,7 @@ def _deepest(terms: ZoneTerms, cos: float, sin: float, s: float, side: float) ->
     return terms.tan_alpha * depth + turned, o_fs, upper
 
 
-@njit(cache=True, nogil=True, fastmath=False)
+@compiled
 def _level(terms: ZoneTerms, theta: float, first: float, second: float) -> tuple[float, bool, bool]:
     """l at `theta` with the rims `first` and `second` of the zones (+-1, or 0 for the deepest), and whether they are
     the upper ones. The same to the bit as what `_lowest` finds with slopes."""
@@ -122,7 +125,7 @@ def _level(terms: ZoneTerms, theta: float, first: float, second: float) -> tuple
     return (one + two) / 2 - a_fs * abs(math.sin(h)) * c, upper_one, upper_two
 
 
-@njit(cache=True, nogil=True, fastmath=False)
+@compiled
 def _branch(terms: ZoneTerms, theta: float, s: float, k: float, out: Array) -> None:
     """Fill `out` (3, 7): tau without FS term, offset o' and depth of zone s and rim k, with all slopes."""
     tip, motion, cs_cos, cs_sin, tan_alpha = terms.tip, terms.motion, terms.cs_cos, terms.cs_sin, terms.tan_alpha
@@ -170,7 +173,7 @@ def _branch(terms: ZoneTerms, theta: float, s: float, k: float, out: Array) -> N
     tau[TAN] += depth[VALUE]
 
 
-@njit(cache=True, nogil=True, fastmath=False)
+@compiled
 def _lowest(work: Array, a_fs: float, out: Array) -> None:
     """l and its slopes from both zones' rows of `work` into `out` (7,)."""
     first, second = work[0, 0], work[1, 0]
@@ -194,7 +197,7 @@ def _lowest(work: Array, a_fs: float, out: Array) -> None:
         out[j] = (0.5 + lean) * first[j] + (0.5 - lean) * second[j] + over_h * slope_h
 
 
-@njit(cache=True, nogil=True, fastmath=False)
+@compiled
 def _maxima(terms: ZoneTerms, work: Array, values: Array, slopes: Array) -> None:
     """Four smooth maxima, one a zone and rim: Newton from the first-order peak. A branch that is not the deeper rim
     at its own peak lies below another branch there, so it never wins and does no harm."""
@@ -226,7 +229,7 @@ def _maxima(terms: ZoneTerms, work: Array, values: Array, slopes: Array) -> None
             index += 1
 
 
-@njit(cache=True, nogil=True, fastmath=False)
+@compiled
 def _rim_change(terms: ZoneTerms, s: float, low: float, high: float) -> float:
     """Angle between `low` and `high` where the deepest rim of zone s changes, by bisection."""
     start = _apart(terms, low, s) >= 0
@@ -239,7 +242,7 @@ def _rim_change(terms: ZoneTerms, s: float, low: float, high: float) -> float:
     return (low + high) / 2
 
 
-@njit(cache=True, nogil=True, fastmath=False)
+@compiled
 def _fill(terms: ZoneTerms, theta: float, sides: tuple[float, float], work: Array, out: Array) -> None:
     """Fill `out` (7,) with l and its slopes at `theta`, with these rims of both zones."""
     _branch(terms, theta, 1.0, sides[0], work[0])
@@ -247,7 +250,7 @@ def _fill(terms: ZoneTerms, theta: float, sides: tuple[float, float], work: Arra
     _lowest(work, terms.a_fs, out)
 
 
-@njit(cache=True, nogil=True, fastmath=False)
+@compiled
 def _move_with_change(terms: ZoneTerms, theta: float, zone: int, work: Array, out: Array) -> None:
     """Add to the slopes of l at the angle where a zone's rim changes what that angle's own motion does."""
     for rim in range(2):
@@ -258,7 +261,7 @@ def _move_with_change(terms: ZoneTerms, theta: float, zone: int, work: Array, ou
             out[j] -= out[THETA] * apart[j] / apart[THETA]
 
 
-@njit(cache=True, nogil=True, fastmath=False)
+@compiled
 def _minimum_between(
     terms: ZoneTerms, low: float, high: float, ends: Index, work: Array, out: Array, other: Array
 ) -> None:
@@ -315,7 +318,7 @@ def _minimum_between(
     out[VALUE] = best
 
 
-@njit(cache=True, nogil=True, fastmath=False)
+@compiled
 def _scan(terms: ZoneTerms, marks: Array, level: Array, upper: Mask) -> None:
     """Fill `marks` (SCAN + 1,) with even angles of one turn, `level` with l there, and `upper` (SCAN + 1, 2) with
     whether the upper rim is the deepest one of each zone."""
@@ -325,7 +328,7 @@ def _scan(terms: ZoneTerms, marks: Array, level: Array, upper: Mask) -> None:
         level[i], upper[i, 0], upper[i, 1] = _level(terms, marks[i], 0.0, 0.0)
 
 
-@njit(cache=True, nogil=True, fastmath=False)
+@compiled
 def _minima(terms: ZoneTerms, work: Array, values: Array, slopes: Array) -> None:
     """The lowest local minima of l, at most as many as `values` holds, sorted upward."""
     marks, level, upper = np.empty(SCAN + 1), np.empty(SCAN + 1), np.empty((SCAN + 1, 2), np.bool_)
@@ -377,7 +380,7 @@ def _minima(terms: ZoneTerms, work: Array, values: Array, slopes: Array) -> None
             slopes[i] = slopes[last]
 
 
-@njit(cache=True, nogil=True, fastmath=False)
+@compiled
 def _insert(values: Array, slopes: Array, found: Array) -> None:
     """Keep `found` among the lowest, sorted."""
     place = len(values)

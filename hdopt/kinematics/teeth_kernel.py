@@ -28,6 +28,7 @@ from hdopt.kinematics.beat_tables import (
 )
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
 from hdopt.kinematics.compiled_closed_form import motion_at, motion_of_row, rim_constants, rim_depth
+from hdopt.kinematics.inner import inner
 from hdopt.kinematics.load_sharing import PLACES_PER_TOOTH
 
 FEWEST_ANGLES, ANGLES_PER_TOOTH = 120, 0.75
@@ -36,7 +37,7 @@ what a cell may hide is computed, and followed."""
 ABREAST = 16
 """Angles that the processor takes at once: grids are multiples of it, since what is left over goes one by one."""
 
-compiled = njit(error_model="numpy", fastmath=False)
+compiled = inner(error_model="numpy", fastmath=False)
 
 
 class BeatConstants(NamedTuple):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cases import BASE_ERRORS, PROFILES, TABLE_1_ELLIPSE, TURN, drive, random_errors
+from numba import njit
 
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import DriveGeometry, Structure
@@ -37,6 +38,12 @@ def test_the_exact_geometry_of_the_contour(structure):
     assert beat_extremes_arcmin(design, matrix) == pytest.approx(searched(design, matrix), abs=ARCMIN)
 
 
+@njit
+def place_of(constants, zone, rim):
+    start, steps = contour_kernel._start(constants, zone, rim)
+    return contour_kernel._polished(constants.points, start, rim, steps)
+
+
 def test_errors_beyond_what_is_tabulated():
     """Ten times the shipped tolerances; and a motion across beyond the table, whose place is searched: would catch a
     start from the end of the table."""
@@ -46,8 +53,7 @@ def test_errors_beyond_what_is_tabulated():
     rim = contour_kernel.Rim(0.0, 1.0, 0.0, 1.0, 0.0, 1.5 * contour_kernel.ACROSS_REACH)
     constants = contour_kernel.contour_constants(design)
     for zone in range(2):
-        start, steps = contour_kernel._start(constants, zone, rim)
-        place = contour_kernel._polished(constants.points, start, rim, steps)
+        place = place_of(constants, zone, rim)
         x, y = constants.points[:2]
         far = np.argmax(np.where((y > 0) == (zone == 0), np.hypot(x + rim.v_0, y), 0.0))
         assert (place - far + 4096) % 8192 - 4096 == pytest.approx(0, abs=1)

@@ -15,6 +15,7 @@ from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Structure
 from hdopt.kinematics import essential, extremes
 from hdopt.kinematics.extremes import periodic_spline
+from hdopt.kinematics.inner import Inner
 from hdopt.late import Late, late
 from hdopt.mechanics import tooth_gap, tooth_path
 from hdopt.mechanics.tooth_path import Mesh
@@ -85,7 +86,7 @@ def test_every_compiled_function_says_how_exact_its_sums_are():
         if module.name.endswith("__main__"):
             continue
         for name, value in vars(importlib.import_module(module.name)).items():
-            compiled = value.compiled if isinstance(value, Late) else value
+            compiled = value.compiled if isinstance(value, Late | Inner) else value
             if isinstance(compiled, Dispatcher) and "fastmath" not in compiled.targetoptions:
                 silent.append(f"{module.name}.{name}")
     assert not silent
