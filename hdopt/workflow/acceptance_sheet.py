@@ -11,6 +11,7 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.drive.geometry import Drive
+from hdopt.effects.met import Spline
 from hdopt.errors import HdoptError
 from hdopt.recordings import figures
 from hdopt.recordings.capability import Gauge, gauge
@@ -21,14 +22,21 @@ from hdopt.recordings.recording import TURN, Recording, turns_with_ends
 from hdopt.recordings.sheet import Beat, Inspection, OrderLine
 from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
 from hdopt.words import counted
+from hdopt.workflow.lying_teeth import fit_with_teeth_as_they_lie
 from hdopt.workflow.waveform_fit import WaveformFit, fit_waveform
 
 MODEL_LEAVES = 3.0
 """A model whose residual is below so many times the scatter of neighbouring samples explains the waveform: noise that
 hangs together over some samples shows a half or a third of itself between neighbours."""
 TEETH_SHOW = 0.9
-"""What a model leaves with measured teeth over what it leaves without them from which they hardly show: fitted to
-162 teeth of 3 um, a table that stands 40 teeth off leaves 0.95 of it, one with the other sign 0.99."""
+"""What a model leaves with measured teeth over what it leaves without them, or with them as they were given, from which
+they hardly show: fitted to 162 teeth of 3 um, a table that stands 40 teeth off leaves 0.95 of what none leaves, one
+with the other sign 0.99."""
+LIE_OTHERWISE = 0.5
+"""What a model leaves with measured teeth laid otherwise, over the least that it leaves with them as they were given or
+without them, from which they are said to lie so: right ones leave 0.1 to 0.2 of it, wrong ones 0.7 in 30 turns."""
+SPLINES = {Spline.CIRCULAR: "cs_teeth", Spline.FLEX: "fs_teeth"}
+"""The table of a study that tells of a spline's teeth."""
 LEAST_OF_A_BEAT = 0.25
 """Share of the beat that a record must cover for the model to extrapolate the rest: at 20 of 80 turns the errors of its
 orders are 10 times those of the whole beat, at 10 turns 44 times."""
@@ -277,21 +285,35 @@ def _how_to_decide(recordings: Sequence[Recording]) -> str:
 def _warnings(
     recordings: Sequence[Recording], parts: Sequence[Cells], drive: Drive | None, fit: WaveformFit | None, seed: int
 ) -> list[str]:
-    """What the model's `fit` leaves of `recordings` of the `drive`, whose cells are `parts`, and whether teeth that
-    were measured hardly show in them: at another zero or with the other sign they leave about as much as a drive of
-    which none are known. Nothing is said where the model leaves no more than noise."""
+    """What the model's `fit` leaves of `recordings` of the `drive`, whose cells are `parts`, and what to look at in
+    teeth that were measured. Nothing is said where the model leaves no more than noise."""
     left = _model_warnings(parts, fit)
     if not left or drive is None or fit is None or (drive.cs_teeth is None and drive.fs_teeth is None):
         return left
+    return [*left, *_words_on_teeth(recordings, drive, fit, max(cells.noise_arcmin for cells in parts), seed)]
+
+
+def _words_on_teeth(
+    recordings: Sequence[Recording], drive: Drive, fit: WaveformFit, noise: float, seed: int
+) -> list[str]:
+    """What to look at in the measured teeth of `drive`, if another place, direction or sign of theirs would leave far
+    less of the `recordings`, whose neighbouring samples scatter by `noise`, arcmin, than the `fit` with them does and
+    than one without them, or if they hardly show."""
     without = fit_waveform(recordings, replace(drive, cs_teeth=None, fs_teeth=None), seed)
+    other, lies = fit_with_teeth_as_they_lie(recordings, drive, noise, seed)
+    left = f"as the drive has them {fit.rms_arcmin:.3g}, without them {without.rms_arcmin:.3g}"
+    if other.rms_arcmin < LIE_OTHERWISE * min(fit.rms_arcmin, without.rms_arcmin):
+        how = "; ".join(f"{SPLINES[spline]}: {lie}" for spline, lie in lies.items())
+        return [
+            f"the measured teeth lie otherwise in the record: with {how} the model leaves {other.rms_arcmin:.3g} "
+            f"arcmin rms, {left} (or all half a turn on, which looks alike; the orientation may have come out wrong)"
+        ]
     if fit.rms_arcmin < TEETH_SHOW * without.rms_arcmin:
-        return left
+        return []
     return [
-        *left,
-        f"the measured teeth hardly show in the record: with them the model leaves {fit.rms_arcmin:.3g} arcmin rms, "
-        f"without them {without.rms_arcmin:.3g}; check first_tooth_deg, the direction in which teeth are numbered, "
-        "the sign of the deviations and which part was measured (of teeth that are not these the orientation may come "
-        "out wrong too)",
+        f"the measured teeth hardly show in the record: the model leaves, {left} arcmin rms, and with tooth 1 anywhere "
+        "else, numbered either way, of either sign, not half of that; check that these teeth and these alone are those "
+        "of the drive (of others the orientation may come out wrong too)",
     ]
 
 
