@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +41,10 @@ class MeasuredTeeth:
     source: str = "array"
     doubts: tuple[str, ...] = ()
     """What makes one ask whether kind and unit of the table are those that were said, a sentence each."""
+    backwards: bool = False
+    """Whether the table that they come from numbers them counterclockwise."""
+    negated: bool = False
+    """Whether the table's deviations have the other sign."""
 
     @classmethod
     def of(
@@ -64,6 +68,20 @@ class MeasuredTeeth:
         if recentre:
             values = values - np.real(wave * np.exp(1j * angles))
         return cls(tuple(map(float, values)), first_angle, float(abs(wave)), recentre, source or "array", doubts)
+
+    def laid(self, first_angle: float, backwards: bool = False, negated: bool = False) -> MeasuredTeeth:
+        """The same teeth with tooth 1 at `first_angle`, rad; in place of clockwise numbered counterclockwise, or the
+        other way about, where `backwards`; each deviation with the other sign where `negated`."""
+        values = np.array(self.deviations)
+        if backwards:
+            values = np.roll(values[::-1], 1)
+        return replace(
+            self,
+            deviations=tuple((-values if negated else values).tolist()),
+            first_angle=first_angle,
+            backwards=self.backwards != backwards,
+            negated=self.negated != negated,
+        )
 
     @property
     def total_cumulative(self) -> float:

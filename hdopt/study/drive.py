@@ -180,6 +180,10 @@ class TeethSection(Section):
     """Of XML only: the unit of its deviations."""
     first_tooth_deg: float = 0.0
     """Where tooth 1 lies, clockwise from the major axis at input angle 0."""
+    numbered: Literal["clockwise", "counterclockwise"] = "clockwise"
+    """Which way the file numbers the teeth, seen as input angles are."""
+    sign: Literal[1, -1] = 1
+    """-1 where a positive deviation of the file holds the output back."""
     recentre: bool = True
     """Take the first harmonic out, which a part held off-centre shows; false keeps it, where centring is trusted."""
     sine: Literal["instead", "beside"] = "instead"
@@ -190,6 +194,7 @@ class TeethSection(Section):
         path = folder / self.file
         first = math.radians(self.first_tooth_deg)
         measured = MeasuredTeeth.of(self._values(teeth, path), self.deviation, first, self.recentre, source=self.file)
+        measured = measured.laid(first, self.numbered == "counterclockwise", self.sign < 0)
         pitch = math.pi * module
         if measured.largest_single > pitch / 2:
             raise HdoptError(

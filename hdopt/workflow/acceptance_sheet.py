@@ -22,7 +22,7 @@ from hdopt.recordings.recording import TURN, Recording, turns_with_ends
 from hdopt.recordings.sheet import Beat, Inspection, OrderLine
 from hdopt.recordings.stiffness import starting_torque_nm, torsion_of
 from hdopt.words import counted
-from hdopt.workflow.lying_teeth import fit_with_teeth_as_they_lie
+from hdopt.workflow.lying_teeth import fit_with_teeth_as_they_lie, keys_of
 from hdopt.workflow.waveform_fit import WaveformFit, fit_waveform
 
 MODEL_LEAVES = 3.0
@@ -300,13 +300,13 @@ def _words_on_teeth(
     less of the `recordings`, whose neighbouring samples scatter by `noise`, arcmin, than the `fit` with them does and
     than one without them, or if they hardly show."""
     without = fit_waveform(recordings, replace(drive, cs_teeth=None, fs_teeth=None), seed)
-    other, lies = fit_with_teeth_as_they_lie(recordings, drive, noise, seed)
+    other, laid = fit_with_teeth_as_they_lie(recordings, drive, noise, seed)
     left = f"as the drive has them {fit.rms_arcmin:.3g}, without them {without.rms_arcmin:.3g}"
     if other.rms_arcmin < LIE_OTHERWISE * min(fit.rms_arcmin, without.rms_arcmin):
-        how = "; ".join(f"{SPLINES[spline]}: {lie}" for spline, lie in lies.items())
+        how = "; ".join(f"[{SPLINES[spline]}] {keys_of(teeth)}" for spline, teeth in laid.items())
         return [
-            f"the measured teeth lie otherwise in the record: with {how} the model leaves {other.rms_arcmin:.3g} "
-            f"arcmin rms, {left} (or all half a turn on, which looks alike; the orientation may have come out wrong)"
+            f"the measured teeth lie otherwise in the record: {how}. So the model leaves {other.rms_arcmin:.3g} arcmin "
+            f"rms, {left}. All half a turn on looks alike. The orientation may have come out wrong"
         ]
     if fit.rms_arcmin < TEETH_SHOW * without.rms_arcmin:
         return []

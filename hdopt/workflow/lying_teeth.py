@@ -51,7 +51,7 @@ MOST_ROWS = 4000
 @dataclass(frozen=True)
 class Lie:
     """How measured teeth lie: tooth 1 at `first_angle` (rad, clockwise from the major axis at input angle 0), numbered
-    the other way round where `backwards`, with deviations of the other sign where `negated`."""
+    the other way round than they were given where `backwards`, of the other sign where `negated`."""
 
     first_angle: float
     backwards: bool = False
@@ -59,11 +59,7 @@ class Lie:
 
     def of(self, teeth: MeasuredTeeth) -> MeasuredTeeth:
         """`teeth` as they lie so."""
-        values = np.array(teeth.deviations)
-        if self.backwards:
-            values = np.roll(values[::-1], 1)
-        values = -values if self.negated else values
-        return replace(teeth, deviations=tuple(values.tolist()), first_angle=self.first_angle)
+        return teeth.laid(self.first_angle, self.backwards, self.negated)
 
     def is_beside(self, other: Lie, pitch: float) -> bool:
         """Whether the `other` lie is like this one but for a `pitch` (rad) or less."""
@@ -71,12 +67,13 @@ class Lie:
         alike = (self.backwards, self.negated) == (other.backwards, other.negated)
         return alike and abs(apart) <= pitch * (1 + 1e-9)
 
-    def __str__(self) -> str:
-        """'first_tooth_deg = 88.9, teeth numbered the other way round'."""
-        said = [f"first_tooth_deg = {math.degrees(self.first_angle) % 360.0:.1f}"]
-        said += ["teeth numbered the other way round"] * self.backwards
-        said += ["deviations of the other sign"] * self.negated
-        return ", ".join(said)
+
+def keys_of(teeth: MeasuredTeeth) -> str:
+    """How `teeth` lie by the keys of a study: 'first_tooth_deg = 88.9, numbered = "counterclockwise"'."""
+    said = [f"first_tooth_deg = {math.degrees(teeth.first_angle) % 360.0:.1f}"]
+    said += ['numbered = "counterclockwise"'] * teeth.backwards
+    said += ["sign = -1"] * teeth.negated
+    return ", ".join(said)
 
 
 Lies = dict[Spline, Lie]
@@ -85,10 +82,10 @@ Lies = dict[Spline, Lie]
 
 def fit_with_teeth_as_they_lie(
     recordings: Sequence[Recording], drive: Drive, enough: float, seed: int
-) -> tuple[WaveformFit, Lies]:
-    """`drive` fitted to `recordings` with its measured teeth as they lie in them best, and how that is on each spline
-    whose teeth were measured, one at least: the first in the first half turn. The search ends where no more than
-    `enough` is left, arcmin rms. The same `seed` gives the same fit."""
+) -> tuple[WaveformFit, dict[Spline, MeasuredTeeth]]:
+    """`drive` fitted to `recordings` with its measured teeth as they lie in them best, and those teeth, of one spline
+    at least; tooth 1 of the first stands in the first half turn. The search ends where no more than `enough` is left,
+    arcmin rms. The same `seed` gives the same fit."""
     rows = gather(recordings, neighbours_for(recordings))
     search = _Search.of(rows, drive)
     tries: list[_Try] = []
@@ -104,8 +101,8 @@ def fit_with_teeth_as_they_lie(
         opened += closed
         tries += search.further(closed)
     best = search.finer(_least(tries))
-    lies = _in_the_first_half(best.lies)
-    return fit_rows(rows, _with(drive, search.laid(lies)), seed, (best.sign,)), lies
+    laid = search.laid(_in_the_first_half(best.lies))
+    return fit_rows(rows, _with(drive, laid), seed, (best.sign,)), laid
 
 
 def _in_the_first_half(lies: Lies) -> Lies:

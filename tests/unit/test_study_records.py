@@ -160,6 +160,25 @@ def test_measured_teeth_have_their_place_and_their_centre(tmp_path):
             assert built == MeasuredTeeth.of(values, kind, math.pi / 6, recentre, source="teeth.csv")
 
 
+def test_measured_teeth_are_numbered_either_way_and_have_either_sign(tmp_path):
+    """Seen from the other face an inspector numbers counterclockwise: after tooth 1 comes his last. Faults caught: a
+    key that does nothing, a table that is turned with its first tooth."""
+    rows = [f"{i},left,{value}" for i, value in enumerate((8, 1, 2, 0, 5, 3, -4, -15), 1)]
+    (tmp_path / "teeth.csv").write_text("tooth,flank,fp_um\n" + "\n".join(rows) + "\n")
+    keys = {"file": "teeth.csv", "deviation": "cumulative", "first_tooth_deg": 90.0, "recentre": False}
+    built = {
+        (numbered, sign): TeethSection(**keys, numbered=numbered, sign=sign).build(8, 0.4, tmp_path)
+        for numbered in ("clockwise", "counterclockwise")
+        for sign in (1, -1)
+    }
+    clockwise, counter = [8, 1, 2, 0, 5, 3, -4, -15], [8, -15, -4, 3, 5, 0, 2, 1]
+    for (numbered, sign), teeth in built.items():
+        expected = [0.001 * sign * um for um in (clockwise if numbered == "clockwise" else counter)]
+        assert teeth.deviations == pytest.approx(expected, abs=1e-12)
+        assert teeth.first_angle == math.pi / 2
+    assert TeethSection(**keys).build(8, 0.4, tmp_path) == built["clockwise", 1]
+
+
 def test_a_measured_ring_has_its_filter_its_zero_and_its_sense(tmp_path):
     angle = 2 * math.pi * np.arange(360) / 360
     radii = 32 + 0.004 * np.cos(angle - 0.3) + 0.002 * np.cos(3 * angle)

@@ -23,7 +23,7 @@ from hdopt.workflow.acceptance_sheet import TEETH_SHOW
 from hdopt.workflow.compensate import LEAVES_MORE, _without_the_model
 from hdopt.workflow.compensation_trials import HARMONICS, TEETH
 from hdopt.workflow.inspect import inspect
-from hdopt.workflow.lying_teeth import Lie
+from hdopt.workflow.lying_teeth import Lie, keys_of
 from hdopt.workflow.waveform_fit import fit_waveform
 
 GIVEN = {"as they are": (0, 1.0), "40 teeth off": (40, 1.0), "the other sign": (0, -1.0)}
@@ -46,7 +46,7 @@ def words_on_teeth(recordings, drive):
 
 
 def first_tooth_deg(words, spline="cs_teeth"):
-    return float(re.search(rf"{spline}: first_tooth_deg = ([\d.]+)", words).group(1))
+    return float(re.search(rf"\[{spline}\] first_tooth_deg = (\d+\.\d)", words).group(1))
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,8 @@ def test_teeth_that_lie_otherwise_are_told_how(turns, sign, backwards, negated, 
     """As the drive's own table is given, so it must be laid back. Faults caught: a table mirrored about another tooth,
     an angle counted the other way, one orientation tried alone (without teeth, the wrong one looks clear)."""
     own = toothed().cs_teeth
-    given = Lie(math.radians(first_deg), backwards, negated).of(own)
+    # As a file gives them that says neither.
+    given = replace(Lie(math.radians(first_deg), backwards, negated).of(own), backwards=False, negated=False)
     words = words_on_teeth([record(turns, sign)], replace(toothed(), cs_teeth=given))
     if not (backwards or negated or first_deg):
         assert not words
@@ -73,10 +74,18 @@ def test_teeth_that_lie_otherwise_are_told_how(turns, sign, backwards, negated, 
     # Half a turn on, both zones change their names.
     assert 0 <= first_tooth_deg(told) <= 180
     assert abs((first_tooth_deg(told) + 90) % 180 - 90) < PITCH_DEG / 3
-    assert ("numbered the other way round" in told) == backwards
-    assert ("of the other sign" in told) == negated
+    assert ('numbered = "counterclockwise"' in told) == backwards
+    assert ("sign = -1" in told) == negated
     least = float(re.search("the model leaves ([0-9.]+) arcmin", told).group(1))
     assert least < 0.011  # the record's noise is 0.01
+
+
+def test_what_is_told_goes_into_the_study_as_it_stands():
+    """A drive that has the keys already is told those that it must have. Would catch what is told beside the keys."""
+    laid = toothed().cs_teeth.laid(1.0, backwards=True, negated=True)
+    assert keys_of(laid) == 'first_tooth_deg = 57.3, numbered = "counterclockwise", sign = -1'
+    assert keys_of(Lie(-0.5, backwards=True).of(laid)) == "first_tooth_deg = 331.4, sign = -1"
+    assert Lie(laid.first_angle, backwards=True, negated=True).of(laid).deviations == toothed().cs_teeth.deviations
 
 
 def test_teeth_of_both_splines_are_laid_one_beside_the_other():
@@ -85,13 +94,13 @@ def test_teeth_of_both_splines_are_laid_one_beside_the_other():
     fs = MeasuredTeeth.of(np.random.default_rng(3).normal(0, 0.003, 160), "single", math.radians(200.0))
     drive = replace(drive, fs_teeth=fs)
     given = replace(
-        drive, cs_teeth=toothed(40).cs_teeth, fs_teeth=replace(Lie(0.0, negated=True).of(fs), first_angle=0.0)
+        drive, cs_teeth=toothed(40).cs_teeth, fs_teeth=replace(Lie(0.0, negated=True).of(fs), negated=False)
     )
     (told,) = words_on_teeth([recorded(lambda theta: error_of(drive, theta), 82)], given)
     cs, fs = first_tooth_deg(told), first_tooth_deg(told, "fs_teeth")
     assert cs == pytest.approx(180 - 40 * PITCH_DEG, abs=PITCH_DEG)
     assert fs == pytest.approx(20.0, abs=PITCH_DEG)
-    assert told.count("other sign") == 1
+    assert told.count("sign = -1") == 1
 
 
 @pytest.mark.parametrize("turns", [82, 30])
