@@ -113,6 +113,15 @@ def _in_the_first_half(lies: Lies) -> Lies:
     return {spline: replace(lie, first_angle=(lie.first_angle + on) % TURN) for spline, lie in lies.items()}
 
 
+def stride_of(rows: int, rows_per_turn: float) -> int:
+    """The stride that leaves no more than `MOST_ROWS` of so many `rows`, and in time each of the `rows_per_turn`: one
+    that divides a turn would look at the same teeth of the circular spline turn after turn."""
+    stride = -(-rows // MOST_ROWS)
+    while math.gcd(stride, max(round(rows_per_turn), 1)) > 1:
+        stride += 1
+    return stride
+
+
 def _with(drive: Drive, teeth: Mapping[Spline, MeasuredTeeth]) -> Drive:
     """`drive` with these `teeth` on the splines, and no others."""
     return replace(drive, cs_teeth=teeth.get(Spline.CIRCULAR), fs_teeth=teeth.get(Spline.FLEX))
@@ -150,7 +159,7 @@ class _Search:
     def of(cls, rows: Rows, drive: Drive) -> _Search:
         """Of all `rows` of the `drive`."""
         some = np.zeros(len(rows), bool)
-        some[:: -(-len(rows) // MOST_ROWS)] = True
+        some[:: stride_of(len(rows), rows.rows_per_turn)] = True
         both = {Spline.CIRCULAR: drive.cs_teeth, Spline.FLEX: drive.fs_teeth}
         given = {spline: teeth for spline, teeth in both.items() if teeth is not None}
         return cls(rows.rows(some), drive, given, {spline: _ways(teeth) for spline, teeth in given.items()})

@@ -23,7 +23,7 @@ from hdopt.workflow.acceptance_sheet import TEETH_SHOW
 from hdopt.workflow.compensate import LEAVES_MORE, _without_the_model
 from hdopt.workflow.compensation_trials import HARMONICS, TEETH
 from hdopt.workflow.inspect import inspect
-from hdopt.workflow.lying_teeth import Lie, keys_of
+from hdopt.workflow.lying_teeth import MOST_ROWS, Lie, keys_of, stride_of
 from hdopt.workflow.waveform_fit import fit_waveform
 
 GIVEN = {"as they are": (0, 1.0), "40 teeth off": (40, 1.0), "the other sign": (0, -1.0)}
@@ -112,6 +112,16 @@ def test_teeth_of_another_spline_hardly_show(turns):
     assert told.startswith("the measured teeth hardly show in the record: ")
     assert "orientation" in told
     assert not words_on_teeth([record(turns)], replace(toothed(), cs_teeth=None))
+
+
+@pytest.mark.parametrize(
+    ("rows", "per_turn"), [(80_000, 400.0), (6560, 80.0), (3000, 80.0), (100_000, 360.2), (90_000, 1.0), (20_000, 0.3)]
+)
+def test_few_rows_of_a_long_record_see_all_of_a_turn(rows, per_turn):
+    """Would catch 20 rows a turn of 400, always the same: an eighth of 162 teeth."""
+    taken = np.arange(0, rows, stride_of(rows, per_turn))
+    assert min(rows, MOST_ROWS) / 2 < len(taken) <= MOST_ROWS
+    assert len(np.unique(taken % max(round(per_turn), 1))) == max(round(per_turn), 1)
 
 
 @hypothesis.settings(max_examples=30)
