@@ -12,10 +12,10 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias, TypeVar, cast  # Any: numba's options are of several kinds
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from hdopt.arrays import Array, Singles
+from hdopt.kinematics.compiled_closed_form import entry
 from hdopt.kinematics.inner import inner
 from hdopt.kinematics.lanes.single import narrowed, unsigned
 
@@ -30,11 +30,6 @@ _UNCOUNTED: dict[str, Any] = _OPTIONS | {"_nrt": False}
 def allocating(function: Function) -> Function:
     """`function` compiled for kernels of the beat; it makes arrays, or gives such back as it was given."""
     return inner(**_OPTIONS)(function)
-
-
-def entry(function: Function) -> Function:
-    """`function` compiled for Python to call, kept on disk; it may make arrays."""
-    return cast("Function", njit(cache=True, nogil=True, **_OPTIONS)(function))
 
 
 def compiled(function: Function) -> Function:

@@ -29,9 +29,8 @@ MODEL_LEAVES = 3.0
 """A model whose residual is below so many times the scatter of neighbouring samples explains the waveform: noise that
 hangs together over some samples shows a half or a third of itself between neighbours."""
 TEETH_SHOW = 0.9
-"""What a model leaves with measured teeth over what it leaves without them, or with them as they were given, from which
-they hardly show: fitted to 162 teeth of 3 um, a table that stands 40 teeth off leaves 0.95 of what none leaves, one
-with the other sign 0.99."""
+"""What a model leaves with measured teeth over what it leaves without them from which they hardly show: fitted to
+162 teeth of 3 um, a table that stands 40 teeth off leaves 0.95 of it, one with the other sign 0.99."""
 LIE_OTHERWISE = 0.5
 """What a model leaves with measured teeth laid otherwise, over the least that it leaves with them as they were given or
 without them, from which they are said to lie so: right ones leave 0.1 to 0.2 of it, wrong ones 0.7 in 30 turns."""
@@ -145,7 +144,7 @@ def _uncertainty(recordings: Sequence[Recording], parts: Sequence[Cells], fit: W
     if not parts:
         return 0.0
     cell = max(float(np.median(cells.sigma)) for cells in parts)
-    noise = max(cells.noise_arcmin for cells in parts)
+    noise = _noise(parts)
     if fit is not None and noise > 0:
         cell *= max(1.0, min(fit.rms_arcmin / noise, MODEL_LEAVES))
     sensor = max(r.sensor_arcmin for r in recordings)
@@ -262,10 +261,15 @@ def _checks(recordings: Sequence[Recording], parts: Sequence[Cells], fit: Wavefo
     return found
 
 
+def _noise(parts: Sequence[Cells]) -> float:
+    """How far neighbouring samples scatter in the worst of `parts`, arcmin."""
+    return max(cells.noise_arcmin for cells in parts)
+
+
 def _model_warnings(parts: Sequence[Cells], fit: WaveformFit | None) -> list[str]:
     if fit is None:
         return []
-    noise = max(cells.noise_arcmin for cells in parts)
+    noise = _noise(parts)
     found = []
     if fit.rms_arcmin > MODEL_LEAVES * noise:
         found.append(
@@ -290,7 +294,7 @@ def _warnings(
     left = _model_warnings(parts, fit)
     if not left or drive is None or fit is None or (drive.cs_teeth is None and drive.fs_teeth is None):
         return left
-    return [*left, *_words_on_teeth(recordings, drive, fit, max(cells.noise_arcmin for cells in parts), seed)]
+    return [*left, *_words_on_teeth(recordings, drive, fit, _noise(parts), seed)]
 
 
 def _words_on_teeth(

@@ -93,14 +93,15 @@ def fit_with_teeth_as_they_lie(
         tries += search.first(*start, seed)
         if _least(tries).left <= enough:
             break
-    opened: list[_Try] = []
+    best = _least(tries)
     for _ in range(ROUNDS):
-        if _least(tries).left <= enough:
+        if best.left <= enough:
             break
-        closed = [one for one in sorted(tries, key=_left) if not any(one is other for other in opened)][:KEPT]
-        opened += closed
-        tries += search.further(closed)
-    best = search.finer(_least(tries))
+        tries.sort(key=_left)
+        found = search.further(tries[:KEPT])
+        tries = tries[KEPT:] + found
+        best = _least([best, *found])
+    best = search.finer(best)
     laid = search.laid(_in_the_first_half(best.lies))
     return fit_rows(rows, _with(drive, laid), seed, (best.sign,)), laid
 
@@ -193,7 +194,8 @@ class _Search:
     def _about(self, sign: float, errors: Array, sigma: float) -> list[_Try]:
         """The likeliest beside a drive with `errors` (12,), refined from there; no two of them neighbours."""
         chosen: list[Lies] = []
-        for _, lies in self._beside(sign, errors, sigma).likeliest(self.everywhere):
+        beside = _Beside.of(self.rows, self.drive, self.given, sign, errors, sigma)
+        for lies in beside.likeliest(self.everywhere):
             if len(chosen) < LIKELIEST and not any(self._neighbours(lies, other) for other in chosen):
                 chosen.append(lies)
         return [self._tried(lies, sign, errors) for lies in chosen]
@@ -217,9 +219,6 @@ class _Search:
         count = apart * max(self.rows.span_turns, 1.0)
         sigma = scale * math.sqrt(len(mine) / count) if apart else 0.3 * scale
         return FitProblem(mine, model, offset_columns(mine), Noise.white(mine, sigma), max(1.0, scale / 0.3))
-
-    def _beside(self, sign: float, errors: Array, sigma: float) -> _Beside:
-        return _Beside.of(self.rows, self.drive, self.given, sign, errors, sigma)
 
 
 def _ways(teeth: MeasuredTeeth) -> list[Lie]:
@@ -281,25 +280,24 @@ class _Beside:
         """Inner products of columns (n, k) and (n, m) with what is free taken out, (k, m)."""
         return np.asarray(first.T @ second - (first.T @ self.free) @ self.inverse @ (self.free.T @ second), float)
 
-    def lessened(self, columns: Array) -> Array:
+    def raised(self, columns: Array) -> Array:
         """By how much each of `columns` (n, k), taken from what is seen, makes its square larger, (k,)."""
         crossed = columns.T @ self.free
         itself = np.sum(columns**2, axis=0) - np.sum((crossed @ self.inverse) * crossed, axis=1)
         return np.asarray(itself - 2 * self.inner(columns, self.seen[:, None])[:, 0], float)
 
-    def likeliest(self, lies: Mapping[Spline, Sequence[Lie]]) -> list[tuple[float, Lies]]:
-        """The best of all `lies` of one spline, or of both together, with by how much they make the square of what is
-        seen larger, the best first."""
+    def likeliest(self, lies: Mapping[Spline, Sequence[Lie]]) -> list[Lies]:
+        """Those of all `lies` of one spline, or of both together, that leave least of what is seen, the best first."""
         best: dict[Spline, tuple[list[Lie], Array, Array]] = {}
         for spline, ways in lies.items():
             columns = self.columns(spline, ways)
-            lessened = self.lessened(columns)
-            some = np.argsort(lessened)[:LIKELY]
-            best[spline] = [ways[k] for k in some], columns[:, some], lessened[some]
+            raised = self.raised(columns)
+            some = np.argsort(raised)[:LIKELY]
+            best[spline] = [ways[k] for k in some], columns[:, some], raised[some]
         if len(best) == 1:
-            ((spline, (those, _, lessened)),) = best.items()
-            return [(float(less), {spline: lie}) for lie, less in zip(those, lessened, strict=True)]
-        (one, (ones, columns, lessened)), (other, (others, more, less)) = best.items()
-        both = lessened[:, None] + less + 2 * self.inner(columns, more)
+            ((spline, (those, _, _)),) = best.items()
+            return [{spline: lie} for lie in those]
+        (one, (ones, columns, of_one)), (other, (others, more, of_other)) = best.items()
+        both = of_one[:, None] + of_other + 2 * self.inner(columns, more)
         places = zip(*np.unravel_index(np.argsort(both, axis=None), both.shape), strict=True)
-        return [(float(both[i, k]), {one: ones[i], other: others[k]}) for i, k in places]
+        return [{one: ones[i], other: others[k]} for i, k in places]
