@@ -409,6 +409,11 @@ class SearchSettings:
     leaves_more: float = threshold(
         0.05, "1", "choice: power left above the noise over it from which one plain effect more is tried"
     )
+    home_within: float = threshold(
+        16.0,
+        "noise variances",
+        "choice: what a drive within tolerances may leave more than one outside them: odds of 3,000 to 1",
+    )
     lost_by_trimming: float = threshold(0.005, "1", "choice: share of the gain that parts which do not show may take")
     known: int = threshold(5, "1", "choice: candidates from which a later search goes on")
     tie_of_variants: float = threshold(10.0, "1", "choice: log evidence by which a wider variant must be better")

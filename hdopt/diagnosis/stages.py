@@ -29,6 +29,7 @@ from hdopt.diagnosis.inference.nuisance import nuisances_for, with_time_warp
 from hdopt.diagnosis.inference.residual_noise import measure_noise
 from hdopt.diagnosis.inference.settled_shapes import settled
 from hdopt.diagnosis.orientation import Orientation, is_decisive, preference, turn_round
+from hdopt.diagnosis.search.at_home import brought_home
 from hdopt.diagnosis.search.candidates import Candidate, paid_for_freedom, penalty_scale
 from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.high_order import find_ripple, strong_ripple, subtract, subtracted_terms
@@ -36,6 +37,7 @@ from hdopt.diagnosis.search.search_state import SearchPlan
 from hdopt.diagnosis.search.subset_search import Selection, first_look, most_explained, select, select_from
 from hdopt.diagnosis.settings import DiagnosisSettings
 from hdopt.diagnosis.state import State
+from hdopt.effects.sines import sine_columns
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import Recording
 from hdopt.recordings.rows import gather, neighbours_for
@@ -113,18 +115,26 @@ def set_strong_ripple_aside(state: State) -> State:
 
 
 def fit_time_warp(state: State) -> State:
-    """Where one was asked for: the base with a time warp beside it, linearised anew where each fit stands. `state`
-    is where the work stands.
+    """Where one was asked for: the base with a time warp beside it, linearised anew where each fit stands. A sine once
+    a turn is free meanwhile: that of an eccentric encoder, which is not known yet, would bend the drive and the warp.
+    `state` is where the work stands.
     """
     if not state.nuisances.warps:
         return state
-    nuisances, fit, settings = state.nuisances, state.base, state.settings.nuisance
+    rows, nuisances, fit, settings = state.problem.rows, state.nuisances, state.base, state.settings.nuisance
+    once_a_turn = sine_columns(rows.theta, [1])
+
+    def beside(columns: Array) -> Fit:
+        """The fit's way down with these columns (n, q) free, from what it knows of the first of them."""
+        known = fit.offsets[: nuisances.columns(rows).shape[1]]
+        free = np.r_[known, np.zeros(columns.shape[1] - len(known))]
+        problem = replace(state.problem, nuisance=columns)
+        return refine(evaluate(problem, fit.errors, free, (), ()), settings.warp_iterations)
+
     for _ in range(settings.warp_rounds):
         nuisances = with_time_warp(nuisances, fit)
-        problem = replace(state.problem, nuisance=nuisances.columns(state.problem.rows))
-        free = np.r_[fit.offsets, np.zeros(problem.nuisance.shape[1] - len(fit.offsets))]
-        fit = refine(evaluate(problem, fit.errors, free, (), ()), settings.warp_iterations)
-    return replace(state, base=fit, nuisances=nuisances)
+        fit = beside(np.column_stack([nuisances.columns(rows), once_a_turn]))
+    return replace(state, base=beside(nuisances.columns(rows)), nuisances=nuisances)
 
 
 def fit_base_in_noise(state: State) -> State:
@@ -410,6 +420,15 @@ def settle_shapes(state: State) -> State:
     return state if fit is best else replace(state, selection=state.selection.with_best_fit(fit))
 
 
+def bring_drive_home(state: State) -> State:
+    """What is named beside a drive outside the tolerances of its kind is told beside one within them that leaves hardly
+    more, where there is one. `state` is where the work stands.
+    """
+    best, rng = state.selection.best.fit, state.draws()
+    home = brought_home(best, state.selection.inflation, rng) if best.terms else best
+    return state if home is best else replace(state, selection=state.selection.with_best_fit(home), rng=rng)
+
+
 def on_problem(fit: Fit, problem: FitProblem) -> Fit:
     """The parameters of `fit` on another problem's rows and noise."""
     terms = [
@@ -436,10 +455,15 @@ STAGES: tuple[Callable[[State], State], ...] = (
     search_high_orders,
     search_without_ripple,
     settle_shapes,
+    bring_drive_home,
 )
 """A diagnosis, in the order of its work, after `begin`; `checks.assessment.assess` takes the last state."""
 
-STAGES_OF_A_PART = tuple(choose_orientation_at_first_look if stage is choose_orientation else stage for stage in STAGES)
+STAGES_OF_A_PART = tuple(
+    choose_orientation_at_first_look if stage is choose_orientation else stage
+    for stage in STAGES
+    if stage is not bring_drive_home
+)
 """The same on a part of the turns, whose error on the others is asked for and not its verdict: no second search where
-the base leaves the orientation open.
+the base leaves the orientation open, and the drive that explains best.
 """

@@ -34,6 +34,7 @@ def _stages() -> dict[CodeType, str]:
         stages.search_high_orders: "tooth mesh and encoder lines",
         stages.search_without_ripple: "search without the ripple",
         stages.settle_shapes: "shapes and their intervals",
+        stages.bring_drive_home: "the drive within its tolerances",
         assessment.assess: "sign flips, unseen turns and rivals",
     }
     return {work.__code__: words for work, words in says.items()}

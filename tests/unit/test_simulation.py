@@ -432,7 +432,8 @@ def test_a_recording_comes_back_as_a_study_that_ke_computes(tmp_path, name):
     from test_diagnosis import HIDDEN, bench
 
     truth = load_study(drive="csf-25-80")
-    diagnosis = diagnose(bench(truth, HIDDEN[name], turns=20, rate=80, speeds=(1.0, 2.0)), truth.drive)
+    # A seed whose starts come to a drive with its axis 0.053 mm off, before it is brought home.
+    diagnosis = diagnose(bench(truth, HIDDEN[name], turns=20, rate=80, speeds=(1.0, 2.0)), truth.drive, seed=0)
     write_study(diagnosis, "csf-25-80", tmp_path / "fitted.toml")
     study = load_study(tmp_path / "fitted.toml")
     assert [effect.id for effect in study.effects] == [name]

@@ -1,0 +1,40 @@
+"""The drive within the tolerances of its kind, in place of one outside them that explains hardly more.
+
+How an eccentricity is shared between the axis and the CS teeth, and what lies along the minor axis, shows little: fits
+that leave the same have drives that are far apart. One outside its tolerances stands for physics that is left out only
+where none within them would do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hdopt.diagnosis.inference.base_fit import fit_base
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit, evaluate
+from hdopt.diagnosis.search.completion import is_outside_tolerances
+
+
+def brought_home(fit: Fit, inflation: float, rng: np.random.Generator) -> Fit:
+    """`fit`, or where its drive lies outside the tolerances of its kind the best one of its terms beside a drive within
+    them, if that leaves hardly more. `inflation` says how much rougher the noise is than its model; drives are drawn by
+    `rng`.
+    """
+    if not is_outside_tolerances(fit):
+        return fit
+    home = _within(fit, rng)
+    if (free := refine(home)).objective < home.objective and not is_outside_tolerances(free):
+        home = free
+    more = (home.objective - fit.objective) / home.problem.noise.sigma**2 / inflation
+    return fit if more > fit.problem.settings.search.home_within or is_outside_tolerances(home) else home
+
+
+def _within(fit: Fit, rng: np.random.Generator) -> Fit:
+    """The best fit of the terms of `fit` beside a drive within the tolerances of its kind, on the same problem, from
+    drives drawn by `rng`."""
+    problem = fit.problem
+    narrow = replace(problem, prior_scale=problem.prior_scale / problem.settings.base.box_over_tolerance)
+    home = refine(fit_base(narrow, rng, problem.settings.base.starts_joint, terms=fit.terms))
+    return evaluate(problem, home.errors, home.offsets, home.terms, home.coefficients)
