@@ -124,17 +124,19 @@ def fit_time_warp(state: State) -> State:
     rows, nuisances, fit, settings = state.problem.rows, state.nuisances, state.base, state.settings.nuisance
     once_a_turn = sine_columns(rows.theta, [1])
 
-    def beside(columns: Array) -> Fit:
-        """The fit's way down with these columns (n, q) free, from what it knows of the first of them."""
-        known = fit.offsets[: nuisances.columns(rows).shape[1]]
-        free = np.r_[known, np.zeros(columns.shape[1] - len(known))]
-        problem = replace(state.problem, nuisance=columns)
+    def beside(own: Array, *others: Array) -> Fit:
+        """The fit's way down with the nuisances' `own` columns (n, q) and `others` free, from what it knows of these
+        own."""
+        problem = replace(state.problem, nuisance=np.column_stack([own, *others]))
+        known = fit.offsets[: own.shape[1]]
+        free = np.r_[known, np.zeros(problem.nuisance.shape[1] - len(known))]
         return refine(evaluate(problem, fit.errors, free, (), ()), settings.warp_iterations)
 
     for _ in range(settings.warp_rounds):
         nuisances = with_time_warp(nuisances, fit)
-        fit = beside(np.column_stack([nuisances.columns(rows), once_a_turn]))
-    return replace(state, base=beside(nuisances.columns(rows)), nuisances=nuisances)
+        own = nuisances.columns(rows)
+        fit = beside(own, once_a_turn)
+    return replace(state, base=beside(own), nuisances=nuisances)
 
 
 def fit_base_in_noise(state: State) -> State:
