@@ -25,15 +25,6 @@ def sine_columns(phase: Array, harmonics: Sequence[float] | Array) -> Array:
     return _multiples(once, before, place, len(multiples)).T
 
 
-def multiples(sine: Array, cosine: Array, orders: Index) -> Array:
-    """The columns of `sine_columns` at angles whose `sine` and `cosine` (n,) are known, for whole `orders` (k,) from 1
-    on, (n, 2 k)."""
-    place = np.full(orders.max(), -1)
-    place[orders - 1] = np.arange(len(orders))
-    before = np.repeat([[0.0], [1.0]], len(sine), axis=1)
-    return _multiples(np.stack([sine, cosine]), before, place, len(orders)).T
-
-
 STEPS = 4
 """Whole multiples gone through for each that is wanted up to which the addition theorems are quicker than its sine."""
 FEW_STEPS = 16

@@ -17,7 +17,7 @@ import numpy as np
 from hdopt.arrays import Array, Index
 from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive
-from hdopt.kinematics.cartesian_kernel import OnSplines, beyond, evaluated
+from hdopt.kinematics.cartesian_kernel import Gear, OnSplines, beyond, evaluated
 from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
 from hdopt.kinematics.load_sharing import NO_TABLE, mesh_tables
 
@@ -119,6 +119,11 @@ class CartesianModel:
         )
 
     @property
+    def gear(self) -> Gear:
+        """The constants that the compiled pass takes."""
+        return Gear(self.tip, self.tan_alpha, self.arcmin_per_mm)
+
+    @property
     def half_width(self) -> float:
         """b/2 of the wave generator, mm."""
         return self.tip.half_width
@@ -162,9 +167,7 @@ class CartesianModel:
             rises = np.zeros((2, 2, 1))
         value, zone, slopes = evaluated(
             rotation,
-            self.tip,
-            self.tan_alpha,
-            self.arcmin_per_mm,
+            self.gear,
             np.asarray(errors, float),
             np.ascontiguousarray(extra),
             np.ascontiguousarray(rises),

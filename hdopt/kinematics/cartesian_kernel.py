@@ -14,6 +14,7 @@ import numpy as np
 from hdopt.arrays import Array, Index
 from hdopt.kinematics.closed_form import ErrorComponents, RigidMotion, RimConstants, TipGeometry
 from hdopt.kinematics.compiled_closed_form import (
+    allocating,
     compiled,
     entry,
     inlined,
@@ -54,6 +55,22 @@ class OnSplines(NamedTuple):
     fs_table: Array
     cs_waves: Array
     fs_waves: Array
+
+
+class Gear(NamedTuple):
+    """Constants of a gear's wave generator, tan of its pressure angle, and arcmin per mm of arc (`scale`)."""
+
+    tip: TipGeometry
+    tan_alpha: float
+    scale: float
+
+
+class Found(NamedTuple):
+    """The error (arcmin, n), the driving zone (0 or 1, n) and the slopes (arcmin/mm, 12 x n)."""
+
+    value: Array
+    zone: Index
+    slopes: Array
 
 
 @inlined
@@ -211,27 +228,15 @@ def _driving(
         work[SLOPES + 11 * BLOCK + i] = scale * z * cof
 
 
-@entry
-def evaluated(
-    rotation: Array,
-    tip: TipGeometry,
-    tan_alpha: float,
-    scale: float,
-    p: Array,
-    extra: Array,
-    rises: Array,
-    teeth: OnSplines,
-) -> tuple[Array, Index, Array]:
-    """The error (arcmin, n), the driving zone (0 or 1, n) and the slopes (arcmin/mm, 12 x n) at a `rotation` (4, n).
-
-    `tip` has the wave generator's constants, `tan_alpha` is that of the pressure angle, `scale` arcmin per mm of arc,
-    `p` the errors (12,) mm, `extra` what is added to either zone, (2, n) or (2, 1), mm of arc, and `rises` its slope
-    over the angle at which CS and FS are met, (2, 2, n) or (2, 2, 1), mm/rad; `teeth` is what stands on the
-    splines besides the errors' sines.
-    """
+@allocating
+def evaluated_into(
+    rotation: Array, gear: Gear, p: Array, extra: Array, rises: Array, teeth: OnSplines, found: Found
+) -> None:
+    """As `evaluated`, into the arrays of `found`; `rotation`, `gear`, `p`, `extra`, `rises` and `teeth` as there."""
     cs, fs, waves_cs, waves_fs = teeth
+    tip, tan_alpha, scale = gear
+    value, zone, slopes = found
     n = rotation.shape[1]
-    value, zone, slopes = np.empty(n), np.empty(n, np.int64), np.empty((PARAMETERS, n))
     work = np.zeros(WORK)
     rim, motion = rim_constants(tip), _motion_of(tip, p)
     has_rises = rises.shape[2] == n and n > 1
@@ -267,7 +272,23 @@ def evaluated(
         for row in range(PARAMETERS):
             at = SLOPES + row * BLOCK
             _copy(work[at : at + rows], slopes[row], start)
-    return value, zone, slopes
+
+
+@entry
+def evaluated(
+    rotation: Array, gear: Gear, p: Array, extra: Array, rises: Array, teeth: OnSplines
+) -> tuple[Array, Index, Array]:
+    """The error (arcmin, n), the driving zone (0 or 1, n) and the slopes (arcmin/mm, 12 x n) of a `gear` at a
+    `rotation` (4, n).
+
+    `p` are the errors (12,) mm, `extra` what is added to either zone, (2, n) or (2, 1), mm of arc, and `rises` its
+    slope over the angle at which CS and FS are met, (2, 2, n) or (2, 2, 1), mm/rad; `teeth` is what stands on the
+    splines besides the errors' sines.
+    """
+    n = rotation.shape[1]
+    found = Found(np.empty(n), np.empty(n, np.int64), np.empty((PARAMETERS, n)))
+    evaluated_into(rotation, gear, p, extra, rises, teeth, found)
+    return found.value, found.zone, found.slopes
 
 
 @entry

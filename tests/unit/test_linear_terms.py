@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from test_cross_validation import noisy
 
+from hdopt.diagnosis.inference import descent
 from hdopt.diagnosis.inference.catalogue import properties_of
-from hdopt.diagnosis.inference.descent import FitPoint, refine
+from hdopt.diagnosis.inference.compiled_descent import _solve, descended
+from hdopt.diagnosis.inference.descent import refine
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.linear_terms import LinearTermsFit
 from hdopt.diagnosis.inference.noise import Noise, weights_with_a_past
@@ -28,9 +30,13 @@ LINEAR = {
 }
 
 
-@pytest.fixture(scope="module")
-def base():
-    return CartesianModel.of(load_study(drive="csf-25-80").drive)
+@pytest.fixture(scope="module", params=["no teeth measured", "measured teeth"])
+def base(request):
+    base = CartesianModel.of(load_study(drive="csf-25-80").drive)
+    if request.param == "no teeth measured":
+        return base
+    rng = np.random.default_rng(2)
+    return replace(base, cs_table=1e-3 * rng.normal(size=162), fs_table=1e-3 * rng.normal(size=160))
 
 
 def problem_of(base, ar=()):
@@ -62,54 +68,96 @@ def fit_of(problem, terms):
     return evaluate(problem, errors, np.array([0.02, -0.01]), terms, coefficients)
 
 
-def order_of(fit):
-    """Where each parameter of `Fit.design` stands among those of `LinearTermsFit`."""
-    first = PARAMETERS + fit.problem.nuisance.shape[1]
-    places = LinearTermsFit.of(fit, True).prepared.places
-    return np.r_[np.arange(first), *(np.arange(place.start, place.stop) for place in places)].astype(int)
+def slowly(fit, iterations, tolerance):
+    """`refine` as any other fit goes."""
+    return descent._descended(fit, iterations, tolerance, True)
 
 
 @pytest.mark.parametrize("ar", [(), (0.5, 0.2)])
 @pytest.mark.parametrize("kinds", LINEAR.values(), ids=LINEAR)
 def test_it_has_the_numbers_of_any_fit(base, kinds, ar):
-    """Objective, normal equations and a step from there. Faults caught: a wave in another's place, a spline's waves met
-    where the other's are, a zone's columns where the other drives, no weights, a column whitened twice, a prior left
-    out, coefficients handed back in the order of the parameters."""
+    """Objective, and a step from there. Faults caught: a wave in another's place, a spline's waves met where the
+    other's are, a zone's columns where the other drives, no weights, a column whitened twice, a prior left out,
+    coefficients handed back in the order of the parameters."""
     problem = problem_of(base, ar)
     fit = fit_of(problem, terms_of(problem.rows, kinds))
-    quick, order = LinearTermsFit.of(fit, True), order_of(fit)
-    assert quick.objective == pytest.approx(fit.objective, rel=1e-11)
-    gram, moment = fit.normal_equations()
-    gram_quick, moment_quick = quick.normal_equations()
-    scale = np.sqrt(np.diag(gram))
-    size = np.linalg.norm(problem.noise.whiten(fit.residual))
-    np.testing.assert_allclose(
-        gram_quick[np.ix_(order, order)] / np.outer(scale, scale), gram / np.outer(scale, scale), atol=1e-11
-    )
-    np.testing.assert_allclose(moment_quick[order] / scale / size, moment / scale / size, atol=1e-11)
-    step = 0.1 * np.random.default_rng(6).normal(size=len(moment)) * np.r_[problem.prior, np.ones(len(moment) - 12)]
-    step[0] = 10.0  # far out of its box
-    quick_step = np.empty_like(step)
-    quick_step[order] = step
-    there, quick_there = FitPoint(fit, True).moved(step).fit, quick.moved(quick_step)
-    assert quick_there.objective == pytest.approx(there.objective, rel=1e-11)
-    back = quick_there.fit
-    np.testing.assert_allclose(back.prediction, there.prediction, atol=1e-11)
-    for one, other in zip(back.coefficients, there.coefficients, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-12)
+    quick = LinearTermsFit.of(fit, True)
+    here, objective = descended(quick.base, quick.problem, quick.start, quick.effort(0, 0.0))
+    assert objective == pytest.approx(fit.objective, rel=1e-11)
+    np.testing.assert_array_equal(here, quick.start)
+    step, expected = refine(fit, 1, 0.0), slowly(fit, 1, 0.0)
+    assert expected.objective < 0.95 * fit.objective
+    assert step.objective == pytest.approx(expected.objective, rel=1e-9)
+    np.testing.assert_allclose(step.errors, expected.errors, atol=1e-9 * problem.prior.max())
+    np.testing.assert_allclose(step.offsets, expected.offsets, atol=1e-9)
+    for one, other in zip(step.coefficients, expected.coefficients, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-9 * np.abs(other).max())
 
 
-def test_a_descent_comes_to_the_same_end(base, monkeypatch):
-    """Step by step as `Fit` goes: faults caught are those of a point that is moved or asked out of turn, such as a
-    design that another point has written since."""
+@pytest.mark.parametrize("tolerance", [0.0, 1e-2, 0.3])
+def test_a_descent_comes_to_the_same_end(base, tolerance):
+    """Step by step as any fit goes, and as far: faults caught are those of a damping that does not fall or grow, or of
+    a descent that stops for a drop that is not small."""
     problem = problem_of(base)
     fit = fit_of(problem, terms_of(problem.rows, LINEAR["all"]))
-    quick = refine(fit, 6, 0.0)
-    with monkeypatch.context() as patched:
-        patched.setattr(LinearTermsFit, "of", lambda fit, move_shapes: None)
-        slow = refine(fit, 6, 0.0)
+    quick, slow = refine(fit, 6, tolerance), slowly(fit, 6, tolerance)
     assert quick.objective < 0.9 * fit.objective
     assert quick.objective == pytest.approx(slow.objective, rel=1e-8)
+
+
+def test_a_step_that_does_not_help_is_damped(base):
+    """From far away, where full steps overshoot. Faults caught: a worse point that is taken, a damping that does not
+    grow, normal equations of the point that was left."""
+    problem = problem_of(base)
+    far = evaluate(problem, 2.5 * problem.prior * np.sign(np.arange(PARAMETERS) % 3 - 0.5), np.zeros(2), (), ())
+    settings, at, grew = problem.settings.fit, far, False
+    damping = settings.damping
+    for _ in range(8):
+        better, used = descent._improved(at, damping, True)
+        grew = grew or used > damping
+        if better is None:
+            break
+        at, damping = better, used / settings.damping_down
+    assert grew
+    quick, slow = refine(far, 8, 0.0), slowly(far, 8, 0.0)
+    assert quick.objective == pytest.approx(slow.objective, rel=1e-7)
+
+
+def test_it_stays_in_its_box(base):
+    """A record of ten times the largest error that is allowed: faults caught are a box left, or kept to one side."""
+    problem = problem_of(base)
+    errors = np.zeros(PARAMETERS)
+    errors[[4, 8]] = 10 * problem.box[4], -10 * problem.box[8]
+    loud = base.evaluate_at(problem.rotation, errors)[0]
+    problem = replace(problem, rows=replace(problem.rows, error=loud))
+    fit = evaluate(problem, np.zeros(PARAMETERS), np.zeros(2), (), ())
+    quick, slow = refine(fit, 12, 0.0), slowly(fit, 12, 0.0)
+    assert np.all(np.abs(quick.errors) <= problem.box)
+    assert {-1.0, 1.0} <= set(quick.errors / problem.box)
+    assert quick.objective == pytest.approx(slow.objective, rel=1e-7)
+
+
+def test_columns_alike_do_not_stop_it(base):
+    """The same nuisance twice: the damping alone tells the two apart. Faults caught: a matrix that is not positive
+    taken for solved, or the end of the way."""
+    problem = problem_of(base)
+    twice = replace(problem, nuisance=np.repeat(problem.nuisance, 2, axis=1))
+    fit = evaluate(twice, 0.3 * problem.prior, np.zeros(4), (), ())
+    assert refine(fit, 8, 0.0).objective == pytest.approx(slowly(fit, 8, 0.0).objective, rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 40])
+def test_small_systems_are_solved(size):
+    """By their upper triangle alone, and told where they are not positive. Faults caught: a row left out of the sums, a
+    square root of what is negative."""
+    rng = np.random.default_rng(size)
+    root = rng.normal(size=(size, size + 3))
+    matrix, moment = root @ root.T, rng.normal(size=size)
+    upper, solution = np.triu(matrix), moment.copy()
+    assert _solve.py_func(upper, solution)
+    np.testing.assert_allclose(solution, np.linalg.solve(matrix, moment), rtol=1e-9)
+    matrix[-1, -1] = -1.0
+    assert not _solve.py_func(matrix, moment)
 
 
 def test_what_bends_besides_is_no_such_fit(base):

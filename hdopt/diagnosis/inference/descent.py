@@ -2,67 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol, Self, TypeVar
-
 import numpy as np
 
-from hdopt.arrays import Array
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, moved
+from hdopt.diagnosis.inference.fit import Fit, moved
 from hdopt.diagnosis.inference.linear_terms import LinearTermsFit
 from hdopt.diagnosis.inference.normal_equations import solved
-
-
-class Point(Protocol):
-    """Where a descent stands: parameters of a `problem`, of which the first are the base's `errors`, mm, and the
-    `objective` there."""
-
-    @property
-    def problem(self) -> FitProblem: ...
-
-    @property
-    def errors(self) -> Array: ...
-
-    @property
-    def objective(self) -> float: ...
-
-    def normal_equations(self) -> tuple[Array, Array]:
-        """Inner products of the whitened columns of all parameters with each other, (q, q), and with the whitened
-        residual, (q,)."""
-
-    def moved(self, step: Array) -> Self:
-        """The point a `step` (q,) away, the base's errors kept in their box."""
-
-
-P = TypeVar("P", bound=Point)
-
-
-@dataclass(frozen=True)
-class FitPoint:
-    """Any `fit` as a point; `move_shapes`: whether the shapes of its terms move too."""
-
-    fit: Fit
-    move_shapes: bool
-
-    @property
-    def problem(self) -> FitProblem:
-        return self.fit.problem
-
-    @property
-    def errors(self) -> Array:
-        return self.fit.errors
-
-    @property
-    def objective(self) -> float:
-        return self.fit.objective
-
-    def normal_equations(self) -> tuple[Array, Array]:
-        """`Fit.normal_equations`."""
-        return self.fit.normal_equations(self.move_shapes)
-
-    def moved(self, step: Array) -> FitPoint:
-        """The fit moved by `step` (q,)."""
-        return FitPoint(moved(self.fit, step, self.move_shapes), self.move_shapes)
 
 
 def refine(fit: Fit, iterations: int | None = None, tolerance: float | None = None, move_shapes: bool = True) -> Fit:
@@ -72,34 +16,32 @@ def refine(fit: Fit, iterations: int | None = None, tolerance: float | None = No
     settings = fit.problem.settings.fit
     most = settings.iterations if iterations is None else iterations
     least = settings.tolerance if tolerance is None else tolerance
-    start = LinearTermsFit.of(fit, move_shapes)
-    if start is None:
-        return _descended(FitPoint(fit, move_shapes), most, least).fit
-    return _descended(start, most, least).fit
+    linear = LinearTermsFit.of(fit, move_shapes)
+    return _descended(fit, most, least, move_shapes) if linear is None else linear.refined(most, least)
 
 
-def _descended(point: P, iterations: int, tolerance: float) -> P:
-    """The last of the points that `refine` comes through from `point` on."""
-    settings = point.problem.settings.fit
+def _descended(fit: Fit, iterations: int, tolerance: float, move_shapes: bool) -> Fit:
+    """The last of the fits that `refine` comes through from `fit` on."""
+    settings = fit.problem.settings.fit
     damping = settings.damping
     for _ in range(iterations):
-        better, damping = _improved(point, damping)
+        better, damping = _improved(fit, damping, move_shapes)
         if better is None:
             break
-        drop = point.objective - better.objective
-        point, damping = better, max(damping / settings.damping_down, settings.damping_least)
-        if drop < tolerance * point.objective:
+        drop = fit.objective - better.objective
+        fit, damping = better, max(damping / settings.damping_down, settings.damping_least)
+        if drop < tolerance * fit.objective:
             break
-    return point
+    return fit
 
 
-def _improved(point: P, damping: float) -> tuple[P | None, float]:
-    """A better point one damped step away, None where none was found, and the damping that it took."""
-    problem, settings = point.problem, point.problem.settings.fit
+def _improved(fit: Fit, damping: float, move_shapes: bool) -> tuple[Fit | None, float]:
+    """A better fit one damped step away, None where none was found, and the damping that it took."""
+    problem, settings = fit.problem, fit.problem.settings.fit
     wb = problem.base_width
-    normal, gradient = point.normal_equations()
+    normal, gradient = fit.normal_equations(move_shapes)
     precision = problem.noise.sigma**2 * problem.prior_precision(len(normal))
-    gradient[:wb] -= precision[:wb] * point.errors
+    gradient[:wb] -= precision[:wb] * fit.errors
     diagonal = slice(None, None, len(normal) + 1)
     normal.flat[diagonal] += precision
     scale = np.sqrt(np.maximum(normal.flat[diagonal], settings.scale_floor))
@@ -112,8 +54,8 @@ def _improved(point: P, damping: float) -> tuple[P | None, float]:
         except np.linalg.LinAlgError:
             damping *= settings.damping_singular
             continue
-        trial = point.moved(step)
-        if trial.objective < point.objective:
+        trial = moved(fit, step, move_shapes)
+        if trial.objective < fit.objective:
             return trial, damping
         damping = max(damping * settings.damping_up, settings.damping_least_up)
     return None, damping

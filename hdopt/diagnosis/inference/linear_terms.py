@@ -1,6 +1,5 @@
-"""A fit of which nothing but the base bends: all its terms are linear, and are prepared once for many steps.
+"""A fit of which nothing but the base bends: all its terms are linear, and it goes down inside a compiled pass.
 
-Columns that no parameter moves are whitened once; waves round the splines are worked out in the base's compiled pass.
 The numbers are those of `Fit` but for rounding. A start of a base fit takes some thirty looks, and a diagnosis a
 thousand starts.
 """
@@ -9,163 +8,115 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import IntEnum
-from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from hdopt.arrays import Array, Index
 from hdopt.diagnosis.inference.base_excitation import is_driven
+from hdopt.diagnosis.inference.compiled_descent import Base, Effort, Problem, descended
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate
 from hdopt.diagnosis.inference.read_angle import reads_input
-from hdopt.effects.met import Spline, Waves
-from hdopt.effects.sines import multiples
+from hdopt.effects.met import Waves
 from hdopt.effects.term import Term
-from hdopt.kinematics.cartesian import MOST_WAVES, ONCE_ROUND, PARAMETERS, CartesianModel
+from hdopt.kinematics.cartesian import MOST_WAVES, PARAMETERS
 
 
-class Kind(IntEnum):
-    """What the columns of a linear term follow, in the order of the parameters."""
-
-    ROWS = 0
-    SPLINE = 1
-    ZONE = 2
-
-
-def _kind(term: Term, move_shapes: bool) -> Kind | None:
-    """What the columns of `term` follow; None where it is not linear: a shape of its own moves, the drive's motion
-    makes its columns, or it moves the angles at which the drive stood, and for all that stands on a spline but waves.
+def _is_linear(term: Term, move_shapes: bool) -> bool:
+    """Whether `term` is linear: no shape of its own moves, the drive's motion does not make its columns, it moves no
+    angles at which the drive stood, and of all that stands on a spline it is waves.
     """
     if (move_shapes and term.steps) or is_driven(term) or reads_input(term):
-        return None
-    if term.met is not None:
-        return Kind.SPLINE if isinstance(term.met, Waves) and max(term.met.harmonics) <= MOST_WAVES else None
-    return Kind.ROWS if term.columns is not None else Kind.ZONE
-
-
-@dataclass(frozen=True)
-class _Prepared:
-    """What the points of a descent share: the fit that it `begun` at, its `base`, the parameters (q,) of each of its
-    terms (`places`), the whitened record `target` (n,), and the whitened columns of all parameters as the rows of
-    `design` (q, n): those in `steady` stay, the others are those of the point that was asked last."""
-
-    begun: Fit
-    base: CartesianModel
-    places: tuple[slice, ...]
-    target: Array
-    design: Array
-    steady: slice
-
-    @classmethod
-    def of(cls, fit: Fit, base: CartesianModel, kinds: Sequence[Kind]) -> _Prepared:
-        """What a descent from `fit` on needs, with its `base`, whose terms are of these `kinds`."""
-        problem = fit.problem
-        end = PARAMETERS + problem.nuisance.shape[1]
-        places, fixed = [slice(0)] * len(kinds), [problem.nuisance]
-        for i in sorted(range(len(kinds)), key=kinds.__getitem__):
-            term = fit.terms[i]
-            places[i] = slice(end, end + term.width)
-            end += term.width
-            if kinds[i] is Kind.ROWS and term.columns is not None:
-                fixed.append(term.columns)
-        white = problem.noise.whitened(fixed).T
-        design, steady = np.empty((end, white.shape[1])), slice(PARAMETERS, PARAMETERS + len(white))
-        design[steady] = white
-        target = problem.noise.whiten(problem.rows.error)
-        return cls(fit, base, tuple(places), target, design, steady)
-
-    @cached_property
-    def waves(self) -> list[tuple[slice, Spline, Index]]:
-        """Of each term round a spline its parameters, the spline, and its waves less one."""
-        met = zip(self.places, (term.met for term in self.begun.terms), strict=True)
-        return [(at, one.spline, np.array(one.harmonics) - 1) for at, one in met if isinstance(one, Waves)]
-
-    @cached_property
-    def most_waves(self) -> tuple[int, ...]:
-        """The most waves that stand on either spline."""
-        return tuple(max((int(w.max()) + 1 for _, at, w in self.waves if at is spline), default=0) for spline in Spline)
-
-    @cached_property
-    def zones(self) -> list[tuple[slice, Array]]:
-        """Of each term in the zones its parameters and what either zone sees of them, mm, (2, n, p)."""
-        seen = zip(self.places, (term.zones for term in self.begun.terms), strict=True)
-        return [(at, zones) for at, zones in seen if zones is not None]
-
-    def at(self, parameters: Array) -> LinearTermsFit:
-        """The fit at these `parameters` (q,)."""
-        problem, noise, errors = self.begun.problem, self.begun.problem.noise, parameters[:PARAMETERS]
-        on_cs, on_fs = (np.zeros((2, most)) for most in self.most_waves)
-        for place, spline, wave in self.waves:
-            (on_cs, on_fs)[spline][:, wave] += parameters[place].reshape(-1, 2).T
-        extra = None
-        for place, zones in self.zones:
-            added = zones @ parameters[place]
-            extra = added if extra is None else extra + added
-        value, zone, slopes = self.base.evaluate_at(problem.rotation, errors, extra, waves=(on_cs, on_fs))
-        residual = self.target - parameters[self.steady] @ self.design[self.steady] - noise.whiten(value)
-        objective = float(residual @ residual) + noise.sigma**2 * float(np.sum((errors / problem.prior) ** 2))
-        return LinearTermsFit(self, parameters, slopes.T, zone, residual, objective)
+        return False
+    return term.met is None or (isinstance(term.met, Waves) and max(term.met.harmonics) <= MOST_WAVES)
 
 
 @dataclass(frozen=True)
 class LinearTermsFit:
-    """Such a fit at its `parameters` (q,): first the base's errors, mm, and offsets. `slopes` (12, n) arcmin/mm and the
-    driving `zone` (n,) of the base there, the whitened `residual` (n,) and the `objective` as in `Fit`."""
+    """A fit of linear terms (`begun`): its `base` and `problem` as the compiled descent takes them, its parameters
+    there (`start`, (q,)), and which of them are the `offsets` and the coefficients of each of its terms (`places`)."""
 
-    prepared: _Prepared
-    parameters: Array
-    slopes: Array
-    zone: Index
-    residual: Array
-    objective: float
+    begun: Fit
+    base: Base
+    problem: Problem
+    start: Array
+    offsets: slice
+    places: tuple[Index, ...]
 
     @classmethod
     def of(cls, fit: Fit, move_shapes: bool) -> LinearTermsFit | None:
         """`fit` so, None where it has no base or terms that are not linear; `move_shapes`: whether shapes move too."""
-        kinds = [kind for term in fit.terms if (kind := _kind(term, move_shapes)) is not None]
-        if fit.problem.base is None or len(kinds) < len(fit.terms):
+        base = fit.problem.base
+        if base is None or not all(_is_linear(term, move_shapes) for term in fit.terms):
             return None
-        prepared = _Prepared.of(fit, fit.problem.base, kinds)
-        parameters = np.zeros(len(prepared.design))
-        parameters[:PARAMETERS] = fit.errors
-        parameters[PARAMETERS : PARAMETERS + len(fit.offsets)] = fit.offsets
-        for place, coefficients in zip(prepared.places, fit.coefficients, strict=True):
-            parameters[place] = coefficients
-        return prepared.at(parameters)
+        waves, places = _waves_of(fit.terms)
+        seen, fixed = [np.empty((2, len(fit.zone), 0))], [fit.problem.nuisance]
+        end = PARAMETERS + 2 * len(waves)
+        for i, term in enumerate(fit.terms):
+            if term.columns is None and term.zones is not None:
+                places[i], end = np.arange(end, end + term.width), end + term.width
+                seen.append(term.zones)
+        offsets = slice(end, end + len(fit.offsets))
+        end = offsets.stop
+        for i, term in enumerate(fit.terms):
+            if term.columns is not None:
+                places[i], end = np.arange(end, end + term.width), end + term.width
+                fixed.append(term.columns)
+        start = np.empty(end)
+        start[:PARAMETERS], start[offsets] = fit.errors, fit.offsets
+        for place, coefficients in zip(places, fit.coefficients, strict=True):
+            start[place] = coefficients
+        problem = _problem_of(fit.problem, waves, np.concatenate(seen, axis=2), fixed)
+        return cls(fit, Base(base.gear, base.cs_table, base.fs_table), problem, start, offsets, tuple(places))
 
-    @property
-    def problem(self) -> FitProblem:
-        return self.prepared.begun.problem
+    def refined(self, iterations: int, tolerance: float) -> Fit:
+        """The end of the way down: at most so many `iterations`, until the objective drops by less than `tolerance` of
+        itself."""
+        end, _ = descended(self.base, self.problem, self.start, self.effort(iterations, tolerance))
+        coefficients = [end[place] for place in self.places]
+        return evaluate(self.begun.problem, end[:PARAMETERS], end[self.offsets], self.begun.terms, coefficients)
 
-    @property
-    def errors(self) -> Array:
-        return self.parameters[:PARAMETERS]
+    def effort(self, iterations: int, tolerance: float) -> Effort:
+        """The rules of the way down, as set, for so many `iterations` and this `tolerance`."""
+        rules = self.begun.problem.settings.fit
+        return Effort(
+            iterations,
+            tolerance,
+            rules.damping,
+            rules.damping_tries,
+            rules.damping_singular,
+            rules.damping_up,
+            rules.damping_down,
+            rules.damping_least_up,
+            rules.damping_least,
+            rules.scale_floor,
+        )
 
-    @property
-    def fit(self) -> Fit:
-        """The same as any other fit."""
-        begun, parameters = self.prepared.begun, self.parameters
-        offsets = parameters[PARAMETERS : PARAMETERS + len(begun.offsets)]
-        coefficients = [parameters[place] for place in self.prepared.places]
-        return evaluate(self.problem, self.errors, offsets, begun.terms, coefficients)
 
-    def normal_equations(self) -> tuple[Array, Array]:
-        """Inner products of the whitened columns of all parameters with each other, (q, q), and with the whitened
-        residual, (q,)."""
-        prepared, design, noise = self.prepared, self.prepared.design, self.problem.noise
-        scale = prepared.base.arcmin_per_mm
-        noise.whiten_rows(self.slopes, design[:PARAMETERS])
-        for place, spline, wave in prepared.waves:
-            sine, cosine = self.slopes[ONCE_ROUND[spline] : ONCE_ROUND[spline] + 2] / scale
-            noise.whiten_rows(scale * multiples(sine, cosine, wave + 1).T, design[place])
-        for place, (first, second) in prepared.zones:
-            columns = scale * np.where((self.zone == 0)[:, None], first, second)
-            noise.whiten_rows(columns.T, design[place])
-        return design @ design.T, design @ self.residual
+def _waves_of(terms: Sequence[Term]) -> tuple[Index, list[Index]]:
+    """Spline and harmonic of each wave of the `terms`, (w, 2), those of a spline together and rising; and which of the
+    parameters are the coefficients of each term's waves, none of a term that has none."""
+    own = [[(m.spline, h) for h in m.harmonics] if isinstance(m := term.met, Waves) else [] for term in terms]
+    waves = np.array([wave for one in own for wave in one], np.int64).reshape(-1, 2)
+    order = np.lexsort((waves[:, 1], waves[:, 0]))
+    sine = PARAMETERS + 2 * np.argsort(order)
+    both, ends = np.stack([sine, sine + 1], axis=1), np.cumsum([0, *map(len, own)])
+    return waves[order], [both[a:b].ravel() for a, b in pairwise(ends)]
 
-    def moved(self, step: Array) -> LinearTermsFit:
-        """The fit a `step` (q,) away, the base's errors kept in their box."""
-        parameters = self.parameters + step
-        box = self.problem.box
-        parameters[:PARAMETERS] = np.clip(parameters[:PARAMETERS], -box, box)
-        return self.prepared.at(parameters)
+
+def _problem_of(problem: FitProblem, waves: Index, zones: Array, fixed: Sequence[Array]) -> Problem:
+    """`problem` as the compiled descent takes it: with `waves` round the splines, what stands in the
+    `zones` (2, n, z) and the columns that nothing moves (`fixed`)."""
+    noise = problem.noise
+    precision = (noise.sigma / problem.prior) ** 2
+    return Problem(
+        problem.rotation,
+        noise.whiten(problem.rows.error),
+        noise.ar,
+        noise.root_weight,
+        waves,
+        np.ascontiguousarray(zones.transpose(0, 2, 1)),
+        noise.whitened(fixed).T,
+        precision,
+        problem.box,
+    )

@@ -66,7 +66,7 @@ class Noise:
     def whiten_rows(self, columns: Array, result: Array) -> None:
         """`columns`, each a row (q, n), filtered and weighted into `result` (q, n), another array."""
         if len(self.ar):
-            _filter(np.ascontiguousarray(columns), self.ar, self.root_weight, result)
+            filtered(np.ascontiguousarray(columns), self.ar, self.root_weight, result)
         else:
             np.multiply(columns, self.root_weight, out=result)
 
@@ -78,9 +78,9 @@ ROUNDING = 1e-9
 
 
 @njit(cache=True, nogil=True, fastmath=False)
-def _filter(columns: Array, ar: Array, root_weight: Array, result: Array) -> None:
-    """(x_t - sum a_k x_{t-k}) times the weight of row t, for each of the `columns` (q, n), rows of which lie side by
-    side, into `result` (q, n)."""
+def filtered(columns: Array, ar: Array, root_weight: Array, result: Array) -> None:
+    """x_t - sum a_k x_{t-k} times the `root_weight` (n,) of row t, for each of the `columns` (q, n), rows of which lie
+    side by side, into `result` (q, n). `ar` (p,) are the a_k, none for white noise."""
     count, rows = columns.shape
     # Lags are taken in groups, by shifted views in place of shifted indices: several rows are worked on at once.
     groups = -(-len(ar) // GROUP)
@@ -89,6 +89,9 @@ def _filter(columns: Array, ar: Array, root_weight: Array, result: Array) -> Non
     lags = min(GROUP * groups, rows)
     for q in range(count):
         column, white = columns[q], result[q]
+        if groups == 0:
+            for t in range(rows):
+                white[t] = column[t] * root_weight[t]
         for t in range(lags):
             white[t] = column[t]
             for k in range(min(len(ar), t)):
