@@ -112,6 +112,11 @@ class Explanation(ABC):
         that explains as well says. None for most."""
         return ()
 
+    def at_the_same_orders(self, conditions: Conditions, term: Term) -> Sequence[Term]:
+        """Other terms of the same that stand at the orders of `term`: what tells them apart is how the drive moves
+        beside them, which no look at what is left shows. None for most."""
+        return ()
+
     def tooth_by_tooth(self, term: Term, coefficients: Array, ratio: float) -> Sequence[Shape]:
         """Shapes of the same with a height of every tooth's own, all alike, from which a fit of them begins: those of
         `term` in the zones with these `coefficients`, on a drive of this `ratio`. None for most."""

@@ -52,6 +52,8 @@ HARMONICS_OF_TEETH = 40
 """Waves round the splines, h and h (1 + 1/N) up to so many, and the mesh order are the teeth's."""
 OTHER = "lines_of_the_other"
 """Key of a term's shape: the lines of the other shaft's encoder at the same orders, 0 where it has none."""
+DOUBTFUL = "may_be_of_teeth"
+"""Key of the shape of lines that took the place of the other shaft's: whether those might have been the teeth's."""
 LOW = "of_low_order"
 """Key of the shape of lines below the lowest order at which one alone is taken for an encoder's."""
 FEW_LINES, FEW_LINES_ODDS = 17, -8.0
@@ -184,7 +186,7 @@ class EncoderInterpolation(Effect):
         columns = sine_columns(angle, [float(m * shape["lines"]) for m in shape["cycles"]])
         odds = FEW_LINES_ODDS if shape["lines"] < FEW_LINES else 0.0
         order = shape["lines"] / (conditions.ratio if output else 1.0)
-        doubtful = is_of_teeth(order, shape["cycles"], conditions.ratio, output)
+        doubtful = shape.get(DOUBTFUL, is_of_teeth(order, shape["cycles"], conditions.ratio, output))
         beside = (ToothMesh.id,) if is_where_the_mesh_reaches(order, shape["cycles"], conditions.ratio) else ()
         known = {OTHER: lines_of_the_other(int(shape["lines"]), conditions.ratio, output)}
         if order < LOWEST_ORDER and len(shape["cycles"]) > 1:
@@ -202,6 +204,16 @@ class EncoderInterpolation(Effect):
     def is_part_of(self, shape: Shape, other: Shape) -> bool:
         """Whether `shape` has the lines of an encoder of which `other` holds a multiple."""
         return bool(shape["shaft"] == other["shaft"] and other["lines"] % shape["lines"] == 0)
+
+    def at_the_same_orders(self, conditions: Conditions, term: Term) -> Sequence[Term]:
+        """The lines of the other shaft's encoder: as many more or fewer numbers of them were there to choose from as
+        there are lines. The teeth may stand for both or for neither."""
+        lines, other = term.shape["lines"], term.shape[OTHER]
+        if not other:
+            return ()
+        shaft = Shaft.INPUT if term.shape["shaft"] == Shaft.OUTPUT else Shaft.OUTPUT
+        shape = {"lines": other, "shaft": shaft, "cycles": term.shape["cycles"], DOUBTFUL: term.doubtful}
+        return [self.term(conditions, shape, trials=term.trials * other / lines)]
 
     def reads_input(self, shape: Shape) -> bool:
         return bool(shape.get("shaft") == Shaft.INPUT)

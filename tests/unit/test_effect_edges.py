@@ -324,6 +324,38 @@ def test_a_low_line_is_an_encoders_where_its_double_shows(shaft, lines, low, dou
     assert shows is (double > 0.1 or not low)
 
 
+@pytest.mark.parametrize(("effect", "example", "hidden"), OWN)
+def test_what_stands_at_the_same_orders_does(effect, example, hidden):
+    """And has what it was found for as its own. Faults caught: a variant at other orders, the same one once more, one
+    that does not lead back."""
+    term = effect.term(RECORD, effect.values(example, GEAR)[0], np.zeros(len(RECORD)))
+    for other in effect.at_the_same_orders(RECORD, term):
+        assert other.effect == effect.id
+        assert effect.orders(other.shape, RATIO) == pytest.approx(effect.orders(term.shape, RATIO))
+        assert effect.categories(other.shape) != effect.categories(term.shape)
+        (back,) = effect.at_the_same_orders(RECORD, other)
+        np.testing.assert_array_equal(back.columns, term.columns)
+
+
+@pytest.mark.parametrize(("shaft", "lines", "other"), [(Shaft.INPUT, 9, 450), (Shaft.OUTPUT, 450, 9)])
+def test_an_encoder_of_the_other_shaft_stands_at_the_same_orders(shaft, lines, other):
+    """For N = 50; of 4001 lines of the output the input has none. Whether they may be the teeth's is asked once: 9
+    lines of the input were preferred to 450 of the output that left 50 noise variances less, since order 9 is that of
+    waves of the teeth too, which was asked of the output's alone. Faults caught: that, and odds of a few lines or
+    numbers to choose from that are the other's."""
+    effect = EFFECTS["encoder_interpolation"]
+    term = effect.term(RECORD, {"lines": lines, "shaft": shaft, "cycles": (1, 2)}, trials=100.0)
+    assert term.doubtful == (shaft is Shaft.OUTPUT)
+    (found,) = effect.at_the_same_orders(RECORD, term)
+    assert (found.shape["lines"], found.shape["shaft"] is shaft) == (other, False)
+    assert found.doubtful == term.doubtful
+    assert effect.term(RECORD, found.shape).doubtful == term.doubtful
+    assert found.trials == pytest.approx(100.0 * other / lines)
+    assert (found.odds < 0) == (other == 9)
+    alone = effect.term(RECORD, {"lines": 4001, "shaft": Shaft.OUTPUT, "cycles": (1,)})
+    assert effect.at_the_same_orders(RECORD, alone) == ()
+
+
 def test_the_teeth_own_orders_about_the_mesh():
     """102 for N = 50 and its sidebands, up to 12 off, each 3.5 fiftieths wide."""
     orders = np.array([102.0, 102.06, 102.08, 110.0, 113.95, 114.05, 90.05, 89.95, 50.0])

@@ -654,6 +654,46 @@ def test_a_search_goes_on_about_a_new_leader_alone(beside):
     assert state.rng.bit_generator.seed_seq.n_children_spawned == 0
 
 
+class Shafts:
+    """An effect that may stand at another shaft's encoder, at the same orders."""
+
+    @staticmethod
+    def at_the_same_orders(rows, term):
+        assert rows is PROBLEM.rows
+        return [Effect(term.effect, doubtful=not term.doubtful)] if term.effect == "encoder" else []
+
+
+@pytest.mark.parametrize(("evidence", "kept"), [(150.0, True), (90.0, False)])
+def test_the_other_shafts_encoder_is_fitted_from_new_drives(beside, evidence, kept, monkeypatch):
+    """In the place of its term, the others as they are. Faults caught: it is looked for about the leader's drive, or
+    taken though it explains less."""
+    problem = SimpleNamespace(**vars(PROBLEM) | {"explanations": {"encoder": Shafts, "tooth": Shafts}})
+    fitted = []
+
+    def joint_fit(start, terms, rng):
+        assert rng is not None
+        fitted.append([(term.effect, term.doubtful) for term in terms])
+        return Told(evidence, tuple(terms), problem=problem)
+
+    monkeypatch.setattr(weighing, "joint_fit", joint_fit)
+    about = []
+    monkeypatch.setattr(subset_search, "search_about_leader", lambda state: about.append(state.leader) or state)
+    state = state_of(of(100.0, "tooth", "encoder", problem=problem))
+    after = subset_search.at_the_same_orders(state)
+    assert fitted == [[("tooth", False), ("encoder", True)]]
+    assert after.leader.fit.terms[1].doubtful == kept
+    assert about == ([after.leader] if kept else [])
+    assert state.rng.bit_generator.seed_seq.n_children_spawned == 0
+    alone = state_of(of(100.0, "tooth", problem=problem))
+    assert subset_search.at_the_same_orders(alone) is alone
+    assert subset_search.at_the_same_orders(state_of()).leader is None
+
+
+def test_the_other_shafts_encoder_is_tried_once_the_leader_stands():
+    stages = subset_search.STAGES
+    assert stages.index(subset_search.at_the_same_orders) == stages.index(subset_search.refit_close_rivals) + 1
+
+
 @pytest.fixture
 def gone_through(monkeypatch):
     """`of(state, after)`: which stages `select_from` goes through from `state` on, where those of a search that goes on

@@ -274,6 +274,24 @@ def beside_a_far_drive(state: SearchState) -> SearchState:
     return about_a_new_leader(state.taking(fits), before)
 
 
+def at_the_same_orders(state: SearchState) -> SearchState:
+    """The leader with what stands at the orders of its terms in their place, from new drives: beside an encoder of one
+    shaft the drive came to where that of the other does not show. `state` is where the work stands; the draws are its
+    own, so that a search in which nothing comes of it goes on as without it.
+    """
+    before = state.leader
+    if before is None:
+        return state
+    fit, problem = before.fit, before.fit.problem
+    sets = [
+        [*fit.terms[:i], other, *fit.terms[i + 1 :]]
+        for i, term in enumerate(fit.terms)
+        for other in problem.explanations[term.effect].at_the_same_orders(problem.rows, term)
+    ]
+    fits = from_new_drives(fit, sets, copy.deepcopy(state.rng)) if sets else []
+    return about_a_new_leader(state.taking(fits), before)
+
+
 def beside_what_is_told(state: SearchState) -> SearchState:
     """What a drive as built and its bench may do without a finding, in place of the leader, beside it and in place of
     some of its effects; where that leads, the search goes on about it. `state` is where the work stands.
@@ -359,6 +377,7 @@ STAGES: tuple[Callable[[SearchState], SearchState], ...] = (
     several_for_one,
     plain_for_waves,
     refit_close_rivals,
+    at_the_same_orders,
     beside_what_is_told,
     leave_out_hidden_parts,
     shorten_wide_terms,
