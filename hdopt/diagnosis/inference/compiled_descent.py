@@ -78,9 +78,13 @@ def _look(base: Base, problem: Problem, x: Array, found: Found) -> tuple[Array, 
                 extra[side, i] += x[first + k] * zones[side, k, i]
     errors, on_splines = x[:PARAMETERS], OnSplines(base.cs_table, base.fs_table, on_cs, on_fs)
     evaluated_into(problem.rotation, base.gear, errors, extra, np.zeros((2, 2, 1)), on_splines, found)
-    white = np.empty((1, rows))
-    filtered(found.value.reshape(1, -1), problem.ar, problem.root_weight, white)
-    residual = problem.target - np.dot(x[first + zones.shape[1] :], problem.steady) - white[0]
+    row, white = np.empty((1, rows)), np.empty((1, rows))
+    for i in range(rows):
+        row[0, i] = found.value[i]
+    filtered(row, problem.ar, problem.root_weight, white)
+    residual = np.dot(x[first + zones.shape[1] :], problem.steady)
+    for i in range(rows):
+        residual[i] = problem.target[i] - residual[i] - white[0, i]
     objective = np.dot(residual, residual)
     for i in range(PARAMETERS):
         objective += problem.precision[i] * errors[i] ** 2
@@ -150,6 +154,39 @@ def _solve(matrix: Array, moment: Array) -> bool:
     return True
 
 
+@compiled
+def _scale_alike(normal: Array, gradient: Array, least: float, scale: Array) -> None:
+    """Scales each parameter of the `normal` matrix (q, q), of which the upper triangle counts, and of the `gradient`
+    (q,) by the root of its own power, or the `least`: that is its `scale` (q,)."""
+    for i in range(len(scale)):
+        scale[i] = math.sqrt(max(normal[i, i], least))
+    for i in range(len(scale)):
+        for j in range(i, len(scale)):
+            normal[i, j] /= scale[i] * scale[j]
+        gradient[i] /= scale[i]
+
+
+@compiled
+def _damped_step(normal: Array, gradient: Array, damping: float, damped: Array, step: Array) -> bool:
+    """The `step` (q,) of scaled parameters by their `normal` matrix (q, q) and `gradient` (q,), with so much `damping`
+    on its diagonal, in the place of `damped` (q, q); False where that is not positive."""
+    for i in range(len(step)):
+        for j in range(i, len(step)):
+            damped[i, j] = normal[i, j]
+        damped[i, i] += damping
+        step[i] = gradient[i]
+    return _solve(damped, step)
+
+
+@compiled
+def _copy(given: Array, out: Array, row: int, column: int) -> None:
+    """Copy `given` (k, l) into `out` from `row` and `column` on. What an assignment of slices may raise takes seconds
+    to compile."""
+    for k in range(given.shape[0]):
+        for i in range(given.shape[1]):
+            out[row + k, column + i] = given[k, i]
+
+
 @entry
 def descended(base: Base, problem: Problem, start: Array, effort: Effort) -> tuple[Array, float]:
     """Where the way down from `start` (q,) ends and the objective there: as `descent.refine` goes, whose rules are the
@@ -158,9 +195,9 @@ def descended(base: Base, problem: Problem, start: Array, effort: Effort) -> tup
     m = q - len(problem.steady)
     found = Found(np.empty(n), np.empty(n, np.int64), np.empty((PARAMETERS, n)))
     columns, design = np.empty((m, n)), np.empty((q, n))
-    design[m:] = problem.steady
+    _copy(problem.steady, design, m, 0)
     normal, gradient, scale = np.empty((q, q)), np.empty(q), np.empty(q)
-    normal[m:, m:] = np.dot(problem.steady, problem.steady.T)
+    among_steady = np.dot(problem.steady, problem.steady.T)
     x, best, trial = start.copy(), np.inf, start.copy()
     damping, tries, taken = effort.damping, 0, -1
     damped = np.empty((q, q))
@@ -168,36 +205,32 @@ def descended(base: Base, problem: Problem, start: Array, effort: Effort) -> tup
         residual, objective = _look(base, problem, trial, found)
         if taken < 0 or objective < best:
             drop, best = best - objective, objective
-            x[:] = trial
+            for i in range(q):
+                x[i] = trial[i]
             taken += 1
             if taken > 0:
                 damping = max(damping / effort.down, effort.least)
             if taken == effort.iterations or (taken > 0 and drop < effort.tolerance * best):
                 break
-            columns[:PARAMETERS] = found.slopes
+            _copy(found.slopes, columns, 0, 0)
             _moving_columns(problem, base.gear.scale, found.zone, columns)
             filtered(columns, problem.ar, problem.root_weight, design)
             # Row by row of the upper triangle would be slow, all at once twice the work.
             for first in range(0, m, 2 * PARAMETERS):
                 last = min(first + 2 * PARAMETERS, m)
-                normal[first:last, first:] = np.dot(design[first:last], design[first:].T)
-            gradient[:] = np.dot(design, residual)
+                _copy(np.dot(design[first:last], design[first:].T), normal, first, first)
+            _copy(among_steady, normal, m, m)
+            gradient = np.dot(design, residual)
             for i in range(PARAMETERS):
                 gradient[i] -= problem.precision[i] * x[i]
                 normal[i, i] += problem.precision[i]
-            for i in range(q):
-                scale[i] = math.sqrt(max(normal[i, i], effort.scale_floor))
+            _scale_alike(normal, gradient, effort.scale_floor, scale)
             tries = 0
         else:
             damping, tries = max(damping * effort.up, effort.least_up), tries + 1
         solved = False
         while not solved and tries < effort.tries:
-            for i in range(q):
-                for j in range(i, q):
-                    damped[i, j] = normal[i, j] / (scale[i] * scale[j])
-                damped[i, i] += damping
-                trial[i] = gradient[i] / scale[i]
-            solved = _solve(damped, trial)
+            solved = _damped_step(normal, gradient, damping, damped, trial)
             if not solved:
                 damping, tries = damping * effort.singular, tries + 1
         if not solved:

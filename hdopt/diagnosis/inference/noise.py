@@ -85,7 +85,8 @@ def filtered(columns: Array, ar: Array, root_weight: Array, result: Array) -> No
     # Lags are taken in groups, by shifted views in place of shifted indices: several rows are worked on at once.
     groups = -(-len(ar) // GROUP)
     weights = np.zeros(GROUP * groups)
-    weights[: len(ar)] = ar
+    for k in range(len(ar)):  # One by one: of slices, what they may raise takes seconds to compile.
+        weights[k] = ar[k]
     lags = min(GROUP * groups, rows)
     for q in range(count):
         column, white = columns[q], result[q]
