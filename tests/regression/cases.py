@@ -93,14 +93,15 @@ def diagnosed(name: str, kept_in: Path | None = None) -> dict:
     return json.loads(kept.read_text())
 
 
-def answered(name: str) -> dict:
-    """The same, whatever was answered before."""
+def answered(name: str, options: tuple[str, ...] | None = None) -> dict:
+    """The same, whatever was answered before, with these `options` of the command (None: its own)."""
+    options = DRAWN_WITH.get(name, ()) if options is None else options
     with tempfile.TemporaryDirectory() as folder:
         files = []
         for rank, table in enumerate(simulate(SPECS[name]).tables):
             files.append(str(Path(folder) / f"recording-{rank}.csv"))
             table.to_csv(files[-1], index=False)
-        status, result = hdopt("diagnose", *files, *DRAWN_WITH.get(name, ()))
+        status, result = hdopt("diagnose", *files, *options)
     assert status == 0, f"{name}: exit status {status}"
     return result
 

@@ -52,8 +52,12 @@ def marks(name):
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks(name), id=name) for name in SPECS])
 def test_verdict_names_and_sizes(name, session_answers):
+    is_as_it_should_be(name, diagnosed(name, session_answers))
+
+
+def is_as_it_should_be(name, said):
+    """Asserts verdict, names and sizes of what was `said` of the case `name`."""
     spec = SPECS[name]
-    said = diagnosed(name, session_answers)
     named = {effect["id"] for effect in said["effects"]}
     if spec.family == "nothing":
         assert (said["verdict"], named) == ("adequate", set())
