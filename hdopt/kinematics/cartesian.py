@@ -39,7 +39,7 @@ PARAMETERS = len(CARTESIAN_NAMES)
 ONCE_ROUND = (CARTESIAN_NAMES.index("CS tooth sine"), CARTESIAN_NAMES.index("FS tooth sine"))
 """The place of the errors that are a sine and, after it, a cosine once round either spline."""
 MOST_WAVES = 64
-"""Waves round a spline up to which `evaluate_at` is a quick way to add them: it goes through all that are fewer."""
+"""Waves round a spline up to which the compiled pass is a quick way to add them: it goes through all that are fewer."""
 NO_WAVES = np.empty((2, 0))
 """Nothing that stands on a spline besides its own teeth."""
 

@@ -20,6 +20,8 @@ from hdopt.kinematics.cartesian import MOST_WAVES, PARAMETERS, CartesianModel
 from hdopt.study import load_study
 
 SIGMA = 0.02
+# Sums in another order: 1e-11 of a parameter after one step, 4e-13 of an objective after twelve.
+ROUNDING = 1e-10
 LINEAR = {
     "none": (),
     "columns": ("columns",),
@@ -87,11 +89,11 @@ def test_it_has_the_numbers_of_any_fit(base, kinds, ar):
     np.testing.assert_array_equal(here, quick.start)
     step, expected = refine(fit, 1, 0.0), slowly(fit, 1, 0.0)
     assert expected.objective < 0.95 * fit.objective
-    assert step.objective == pytest.approx(expected.objective, rel=1e-9)
-    np.testing.assert_allclose(step.errors, expected.errors, atol=1e-9 * problem.prior.max())
-    np.testing.assert_allclose(step.offsets, expected.offsets, atol=1e-9)
+    assert step.objective == pytest.approx(expected.objective, rel=ROUNDING)
+    np.testing.assert_allclose(step.errors, expected.errors, atol=ROUNDING * problem.prior.max())
+    np.testing.assert_allclose(step.offsets, expected.offsets, atol=ROUNDING)
     for one, other in zip(step.coefficients, expected.coefficients, strict=True):
-        np.testing.assert_allclose(one, other, atol=1e-9 * np.abs(other).max())
+        np.testing.assert_allclose(one, other, atol=ROUNDING * np.abs(other).max())
 
 
 @pytest.mark.parametrize("tolerance", [0.0, 1e-2, 0.3])
@@ -102,7 +104,7 @@ def test_a_descent_comes_to_the_same_end(base, tolerance):
     fit = fit_of(problem, terms_of(problem.rows, LINEAR["all"]))
     quick, slow = refine(fit, 6, tolerance), slowly(fit, 6, tolerance)
     assert quick.objective < 0.9 * fit.objective
-    assert quick.objective == pytest.approx(slow.objective, rel=1e-8)
+    assert quick.objective == pytest.approx(slow.objective, rel=ROUNDING)
 
 
 def test_a_step_that_does_not_help_is_damped(base):
@@ -120,7 +122,7 @@ def test_a_step_that_does_not_help_is_damped(base):
         at, damping = better, used / settings.damping_down
     assert grew
     quick, slow = refine(far, 8, 0.0), slowly(far, 8, 0.0)
-    assert quick.objective == pytest.approx(slow.objective, rel=1e-7)
+    assert quick.objective == pytest.approx(slow.objective, rel=ROUNDING)
 
 
 def test_it_stays_in_its_box(base):
@@ -134,7 +136,7 @@ def test_it_stays_in_its_box(base):
     quick, slow = refine(fit, 12, 0.0), slowly(fit, 12, 0.0)
     assert np.all(np.abs(quick.errors) <= problem.box)
     assert {-1.0, 1.0} <= set(quick.errors / problem.box)
-    assert quick.objective == pytest.approx(slow.objective, rel=1e-7)
+    assert quick.objective == pytest.approx(slow.objective, rel=ROUNDING)
 
 
 def test_columns_alike_do_not_stop_it(base):
@@ -143,7 +145,7 @@ def test_columns_alike_do_not_stop_it(base):
     problem = problem_of(base)
     twice = replace(problem, nuisance=np.repeat(problem.nuisance, 2, axis=1))
     fit = evaluate(twice, 0.3 * problem.prior, np.zeros(4), (), ())
-    assert refine(fit, 8, 0.0).objective == pytest.approx(slowly(fit, 8, 0.0).objective, rel=1e-6)
+    assert refine(fit, 8, 0.0).objective == pytest.approx(slowly(fit, 8, 0.0).objective, rel=ROUNDING)
 
 
 @pytest.mark.parametrize("size", [1, 2, 7, 40])

@@ -108,7 +108,6 @@ def _problem_of(problem: FitProblem, waves: Index, zones: Array, fixed: Sequence
     """`problem` as the compiled descent takes it: with `waves` round the splines, what stands in the
     `zones` (2, n, z) and the columns that nothing moves (`fixed`)."""
     noise = problem.noise
-    precision = (noise.sigma / problem.prior) ** 2
     return Problem(
         problem.rotation,
         noise.whiten(problem.rows.error),
@@ -117,6 +116,6 @@ def _problem_of(problem: FitProblem, waves: Index, zones: Array, fixed: Sequence
         waves,
         np.ascontiguousarray(zones.transpose(0, 2, 1)),
         noise.whitened(fixed).T,
-        precision,
+        noise.sigma**2 * problem.prior_precision(PARAMETERS),
         problem.box,
     )
