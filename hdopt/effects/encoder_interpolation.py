@@ -82,6 +82,17 @@ def are_of_the_mesh(orders: Array, ratio: float) -> Mask:
     return np.asarray(np.any([np.abs(m * orders - mesh_order(ratio)) < WHOLE * orders for m in MESH_CYCLES], axis=0))
 
 
+def may_be_told(orders: Array, samples: Conditions, output: bool) -> Mask:
+    """Which `orders` (n,) a turn of the input may be told as lines of the `output` encoder or the input's: none of
+    the teeth's, and of the output's none where `samples` span too little of its turn.
+    """
+    told = ~are_of_the_mesh(orders, samples.ratio)
+    if not output:
+        return told
+    enough = samples.span_turns >= LEAST_OUTPUT_TURNS * samples.ratio
+    return np.asarray(told & ~beside_the_mesh(orders, samples.ratio) & enough)
+
+
 def is_of_teeth(order: float, multiples: Sequence[int], ratio: float, output: bool) -> bool:
     """Whether an encoder's line, at an `order` a turn of the input of a drive of `ratio` N, is where a wave round one
     of the splines shows (asked of the `output` encoder only), or any of its `multiples` at the mesh of the teeth.
@@ -166,11 +177,7 @@ class EncoderInterpolation(Effect):
         per = samples.ratio if output else 1.0
         lowest = max(probe.order_range[0], LOWEST_PAIR)
         lines = np.arange(np.ceil(lowest * per), np.floor(highest * per) + 1)
-        if output:
-            if samples.span_turns < LEAST_OUTPUT_TURNS * samples.ratio:
-                return []
-            lines = lines[~beside_the_mesh(lines / per, samples.ratio)]
-        lines = lines[~are_of_the_mesh(lines / per, samples.ratio)]
+        lines = lines[may_be_told(lines / per, samples, output)]
         if not len(lines):
             return []
         return [
@@ -206,12 +213,14 @@ class EncoderInterpolation(Effect):
         return bool(shape["shaft"] == other["shaft"] and other["lines"] % shape["lines"] == 0)
 
     def at_the_same_orders(self, conditions: Conditions, term: Term) -> Sequence[Term]:
-        """The lines of the other shaft's encoder: as many more or fewer numbers of them were there to choose from as
-        there are lines. The teeth may stand for both or for neither."""
+        """The lines of the other shaft's encoder, where they are looked for at all: as many more or fewer numbers of
+        them were there to choose from as there are lines. The teeth may stand for both or for neither.
+        """
         lines, other = term.shape["lines"], term.shape[OTHER]
-        if not other:
-            return ()
         shaft = Shaft.INPUT if term.shape["shaft"] == Shaft.OUTPUT else Shaft.OUTPUT
+        order = np.array(self.orders(term.shape, conditions.ratio)[:1])
+        if not other or not may_be_told(order / term.shape["cycles"][0], conditions, shaft == Shaft.OUTPUT).all():
+            return ()
         shape = {"lines": other, "shaft": shaft, "cycles": term.shape["cycles"], DOUBTFUL: term.doubtful}
         return [self.term(conditions, shape, trials=term.trials * other / lines)]
 

@@ -356,6 +356,20 @@ def test_an_encoder_of_the_other_shaft_stands_at_the_same_orders(shaft, lines, o
     assert effect.at_the_same_orders(RECORD, alone) == ()
 
 
+@pytest.mark.parametrize(("shaft", "lines", "turns", "tried"), [
+    (Shaft.INPUT, 9, 4, False), (Shaft.INPUT, 9, 6, True), (Shaft.OUTPUT, 450, 4, True),
+    (Shaft.INPUT, 95, 60, False), (Shaft.INPUT, 85, 60, True), (Shaft.OUTPUT, 51 * 50, 60, False),
+])  # fmt: skip
+def test_lines_are_tried_on_the_other_shaft_where_they_are_looked_for(shaft, lines, turns, tried):
+    """For N = 50, of which a tenth of an output turn is 5 of the input's; about its mesh, order 102, no lines of the
+    output are looked for, and none at half of it on either. Faults caught: lines that no search would tell come in by
+    the other shaft's."""
+    effect = EFFECTS["encoder_interpolation"]
+    record = moving((turns,))
+    term = effect.term(record, {"lines": lines, "shaft": shaft, "cycles": (1,)})
+    assert bool(effect.at_the_same_orders(record, term)) == tried
+
+
 def test_the_teeth_own_orders_about_the_mesh():
     """102 for N = 50 and its sidebands, up to 12 off, each 3.5 fiftieths wide."""
     orders = np.array([102.0, 102.06, 102.08, 110.0, 113.95, 114.05, 90.05, 89.95, 50.0])

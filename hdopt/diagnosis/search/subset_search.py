@@ -275,9 +275,9 @@ def beside_a_far_drive(state: SearchState) -> SearchState:
 
 
 def at_the_same_orders(state: SearchState) -> SearchState:
-    """The leader with what stands at the orders of its terms in their place, from new drives: beside an encoder of one
-    shaft the drive came to where that of the other does not show. `state` is where the work stands; the draws are its
-    own, so that a search in which nothing comes of it goes on as without it.
+    """The leader with what stands at the orders of its terms in their place, from new drives, and it too: beside an
+    encoder of one shaft the drive came to where that of the other does not show. `state` is where the work stands; the
+    draws are its own, so that a search in which nothing comes of it goes on as without it.
     """
     before = state.leader
     if before is None:
@@ -288,8 +288,9 @@ def at_the_same_orders(state: SearchState) -> SearchState:
         for i, term in enumerate(fit.terms)
         for other in problem.explanations[term.effect].at_the_same_orders(problem.rows, term)
     ]
-    fits = from_new_drives(fit, sets, copy.deepcopy(state.rng)) if sets else []
-    return about_a_new_leader(state.taking(fits), before)
+    if not sets:
+        return state
+    return about_a_new_leader(state.taking(from_new_drives(fit, [fit.terms, *sets], copy.deepcopy(state.rng))), before)
 
 
 def beside_what_is_told(state: SearchState) -> SearchState:
