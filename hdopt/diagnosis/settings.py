@@ -455,6 +455,13 @@ class HighOrderSettings:
     )
     height_rounds: int = threshold(2, "1", "choice: steps with every tooth free, as skew and heights follow each other")
     skew_iterations: int = threshold(6, "1", "choice: effort; least squares after each step, in which the skew moves")
+    other_drives: int = threshold(
+        24, "1", "measured: so many lead four drives of six to teeth that no steps led to; test_diagnosis_search"
+    )
+    other_drives_kept: int = threshold(
+        3, "1", "choice: effort; of these the best, whose skew and single teeth are fitted"
+    )
+    drawn_skew: float = threshold(0.5, "1", "choice: skew of a form up to which such a start begins, as others do")
     tooth_parts: tuple[float, ...] = threshold(
         (0.0, 0.5, 1.0, 1.5, 2.0), "1", "choice: heights over their usual size at which a single tooth is tried"
     )

@@ -62,12 +62,8 @@ def fit_base(
     thin_terms = [thinned(term, mask) for term in terms]
 
     def started(errors: Array) -> Fit:
-        start = _solve_offsets(evaluate(thin, errors, offsets, thin_terms, zeros))
+        start = with_offsets(evaluate(thin, errors, offsets, thin_terms, zeros))
         return refine(start, settings.start_iterations, settings.start_tolerance, move_shapes=False)
-
-    def drawn() -> Array:
-        errors = rng.normal(size=PARAMETERS) * problem.prior
-        return errors * rng.uniform(settings.smallest_start, settings.largest_start)
 
     def met_again() -> bool:
         """Whether enough starts have met in the same best minimum."""
@@ -75,9 +71,9 @@ def fit_base(
         return sum(fit.objective < least for fit in candidates) >= settings.same_minimum_starts
 
     # As many at once as are made in any case; then one by one.
-    candidates = each(started, [drawn() for _ in range(min(starts, settings.fewest_starts))])
+    candidates = each(started, [drawn(problem, rng) for _ in range(min(starts, settings.fewest_starts))])
     while len(candidates) < starts and not met_again():
-        candidates.append(started(drawn()))
+        candidates.append(started(drawn(problem, rng)))
     candidates.sort(key=lambda fit: fit.objective)
 
     def finished(candidate: Fit) -> Fit:
@@ -100,7 +96,16 @@ def thinned(term: Term, mask: Mask) -> Term:
     )
 
 
-def _solve_offsets(fit: Fit) -> Fit:
+def drawn(problem: FitProblem, rng: np.random.Generator) -> Array:
+    """Errors (12,) mm of a drive of the kind of `problem`, drawn by `rng`: larger than its tolerances as often as
+    smaller."""
+    settings = problem.settings.base
+    errors = rng.normal(size=PARAMETERS) * problem.prior
+    return np.asarray(errors * rng.uniform(settings.smallest_start, settings.largest_start))
+
+
+def with_offsets(fit: Fit) -> Fit:
+    """`fit` with the offsets that leave least, all else as it is."""
     nuisance = fit.problem.nuisance
     offsets = fit.offsets + least_squares(nuisance, fit.residual)
     return evaluate(fit.problem, fit.errors, offsets, fit.terms, fit.coefficients)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -50,7 +51,9 @@ def find_ripple(
         if high is None or not high.best.fit.terms:
             return high, None
         others = [one.fit for one in high.candidates[1:]]
-        return high, fit_in_zones(gather(recordings), what.best.fit, nuisances, high.best.fit, told, others)
+        return high, fit_in_zones(
+            gather(recordings), what.best.fit, nuisances, high.best.fit, copy.deepcopy(rng), told, others
+        )
 
     if (without_mesh := mesh_taken_out(found)) is not None:
         high, inside = ripple_beside(*without_mesh)

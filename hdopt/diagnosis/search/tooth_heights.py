@@ -4,6 +4,7 @@ A flank's form is as high as its tooth is worn or cut: heights that differ at ra
 every number round the rim. Their slow part, and the mean of the form over a pitch, lift the driving zone as the base
 does, so that no sidebands of the mesh hold them. The heights come in as waves round the rim, a few at first, each step
 from where the one before it ended, until every tooth is free. At last single teeth are tried at other heights.
+Where all of this leaves more than noise, other drives are drawn beside the free heights.
 """
 
 from __future__ import annotations
@@ -13,12 +14,21 @@ from dataclasses import replace
 import numpy as np
 
 from hdopt.arrays import Array, Index
+from hdopt.diagnosis.inference.base_fit import drawn, with_offsets
 from hdopt.diagnosis.inference.descent import refine
 from hdopt.diagnosis.inference.fit import Fit, evaluate
 from hdopt.diagnosis.numerical import HALF, TINY
 from hdopt.effects.met import ToothForms
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Term
+from hdopt.kinematics.cartesian import CARTESIAN_NAMES
+from hdopt.parallel.shared_memory import each
+
+OF_TWO_SIGNS = tuple(
+    i for i, name in enumerate(CARTESIAN_NAMES) if " tilt " in name or name.endswith("along its minor axis")
+)
+"""Errors of a drive of which the record shows the larger of two signs at any place: the rims', which lift either edge,
+and what moves the wave generator across its major axis."""
 
 
 def fit_heights(start: Fit, term: Term) -> Fit:
@@ -36,6 +46,52 @@ def fit_heights(start: Fit, term: Term) -> Fit:
         fit = _with_heights(fit, beside, term, basis, own)
         term = fit.terms[-1]
         own = np.linalg.lstsq(basis, heights_of(fit), rcond=None)[0]
+    return _single_teeth_mended(fit)
+
+
+def of_other_drives(fit: Fit, rng: np.random.Generator) -> Fit:
+    """A fit with a height of every tooth as `fit` has, its last term, from other drives and other skews of the form,
+    drawn by `rng`: the one of them that leaves least, or `fit`.
+
+    Heights of single teeth take up what a wrong drive leaves, so that no step leads from one minimum to the next. They
+    differ most in the tilts and in what lies along the minor axis, of which the record shows the larger of two signs at
+    any place (Jia 2021, Eqs. (16)-(32), to first order); every second start draws these alone, the others the whole
+    drive. With the skew held, the heights of all teeth and the drive come down together in some steps.
+    """
+    settings = fit.problem.settings.high_order
+    beside, forms = len(fit.terms) - 1, _forms_of(fit.terms[-1])
+    held = [replace(one, steps={}) for one in fit.terms[:beside]]
+    alike = np.full(len(forms.heights), usual(heights_of(fit)))
+    every = np.eye(len(alike))
+
+    def begun(number: int) -> tuple[Array, float]:
+        errors, other = fit.errors.copy(), drawn(fit.problem, rng)
+        of_two_signs = list(OF_TWO_SIGNS)
+        errors[of_two_signs] = other[of_two_signs]
+        return other if number % 2 else errors, float(rng.uniform(-settings.drawn_skew, settings.drawn_skew))
+
+    def come_down(start: tuple[Array, float]) -> tuple[Fit, Term]:
+        errors, skew = start
+        skewed = replace(fit.terms[-1], shape={**fit.terms[-1].shape, "skew": skew})
+        free = replace(skewed, met=replace(forms, heights=every, skew=skew), steps={})
+        there = evaluate(fit.problem, errors, fit.offsets, [*held, free], [*fit.coefficients[:beside], alike])
+        base = fit.problem.settings.base
+        return refine(with_offsets(there), base.start_iterations, base.start_tolerance, move_shapes=False), skewed
+
+    def mended(found: tuple[Fit, Term]) -> Fit:
+        there, skewed = found
+        whole = evaluate(there.problem, there.errors, there.offsets, *_of_heights(there, skewed, heights_of(there)))
+        return _single_teeth_mended(refine(whole, settings.skew_iterations))
+
+    found = each(come_down, [begun(number) for number in range(settings.other_drives)])
+    best = sorted(found, key=lambda one: one[0].objective)[: settings.other_drives_kept]
+    return min([fit, *each(mended, best)], key=lambda one: one.objective)
+
+
+def _single_teeth_mended(fit: Fit) -> Fit:
+    """`fit` with single teeth at other heights, its last term, as long as that leaves less."""
+    settings, beside = fit.problem.settings.high_order, len(fit.terms) - 1
+    teeth = len(heights_of(fit))
     basis = waves_round(teeth, teeth)
     for _ in range(settings.height_rounds):
         if (heights := single_teeth_tried(fit)) is None:

@@ -10,6 +10,7 @@ a drive that was bent to the bulges does not find its way back at once. At last 
 
 from __future__ import annotations
 
+import copy
 import itertools
 import math
 from collections.abc import Sequence
@@ -26,7 +27,7 @@ from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, term_column
 from hdopt.diagnosis.inference.noise import predictable_share
 from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.search.guess import Guess
-from hdopt.diagnosis.search.tooth_heights import fit_heights
+from hdopt.diagnosis.search.tooth_heights import fit_heights, of_other_drives
 from hdopt.effects.base import Explanation
 from hdopt.effects.term import Shape, Term
 from hdopt.parallel.shared_memory import each
@@ -51,6 +52,7 @@ def fit_in_zones(
     low: Fit,
     nuisances: Nuisances,
     ripple: Fit,
+    rng: np.random.Generator,
     told: Guess | None = None,
     other_sets: Sequence[Fit] = (),
 ) -> ZoneRipple | None:
@@ -61,8 +63,9 @@ def fit_in_zones(
     the mesh and its nearest waves.
 
     `rows` are the rows as recorded with their recorded error, `low` the base and effects fitted on averaged rows.
-    `nuisances` are the columns that are always free; `told` is what was found of it on other rows of the recordings,
-    inside the zones or beside them: where that leaves nothing that the row before would tell, nothing else is tried.
+    `nuisances` are the columns that are always free; `rng` draws other drives beside single teeth; `told` is what was
+    found of it on other rows of the recordings, inside the zones or beside them: where that leaves nothing that the row
+    before would tell, nothing else is tried.
     """
     base = low.problem.base
     candidates = ((one, _met_in_zones(one)) for one in (ripple, *other_sets))
@@ -90,7 +93,9 @@ def fit_in_zones(
         elif leaves_white_noise(sines):
             return None
     if not any(leaves_white_noise(fit) for fit in fits):
-        fits += each(lambda start: _step_by_step(problem, low, [*start, *beside], effect, shapes), starts)
+        fits += each(
+            lambda start: _step_by_step(problem, low, [*start, *beside], effect, shapes, copy.deepcopy(rng)), starts
+        )
     inside = min((sines, *fits), key=_score)
     if inside is sines:
         return None
@@ -126,10 +131,16 @@ def leaves_white_noise(fit: Fit) -> bool:
 
 
 def _step_by_step(
-    problem: FitProblem, low: Fit, beside: Sequence[Weighed], effect: Explanation, shapes: Sequence[Shape]
+    problem: FitProblem,
+    low: Fit,
+    beside: Sequence[Weighed],
+    effect: Explanation,
+    shapes: Sequence[Shape],
+    rng: np.random.Generator,
 ) -> Fit:
     """The best fit of `effect` inside the zones at one of its `shapes`, with all `beside` it, from the drive of `low`,
-    on a part of the rows of `problem`, then on all. Each shape begins with the waves of the one before."""
+    on a part of the rows of `problem`, then on all. Each shape begins with the waves of the one before; `rng` draws
+    other drives."""
     settings = problem.settings
     mask = np.zeros(len(problem.rows), bool)
     mask[:: max(1, len(mask) // settings.high_order.zone_rows)] = True
@@ -146,16 +157,19 @@ def _step_by_step(
         fit = refine(start, settings.base.full_iterations, move_shapes=False)
         waves = fit.coefficients[-1]
         found.append(fit)
-    found += _tooth_by_tooth(thin, low, found, effect)
+    found += _tooth_by_tooth(thin, low, found, effect, rng)
     best = min(found, key=_score)
     terms = [*(term for term, _ in beside), effect.term(problem.rows, best.terms[-1].shape)]
     whole = evaluate(problem, best.errors, best.offsets, terms, best.coefficients)
     return refine(whole, settings.fit.known_iterations, move_shapes=False)
 
 
-def _tooth_by_tooth(thin: FitProblem, low: Fit, found: Sequence[Fit], effect: Explanation) -> list[Fit]:
+def _tooth_by_tooth(
+    thin: FitProblem, low: Fit, found: Sequence[Fit], effect: Explanation, rng: np.random.Generator
+) -> list[Fit]:
     """Fits with a height of every tooth from the wave at the mesh's order of the first `found`: from the drive of the
-    best of them, and from that of `low`.
+    best of them, and from that of `low`. Where all leave more than noise, others in place of the best of each form,
+    from drives that `rng` draws.
     """
     few, best = found[0], min(found, key=_score)
     shapes = effect.tooth_by_tooth(few.terms[-1], best.coefficients[-1], thin.rows.ratio)
@@ -165,7 +179,12 @@ def _tooth_by_tooth(thin: FitProblem, low: Fit, found: Sequence[Fit], effect: Ex
         start = evaluate(thin, drive.errors, drive.offsets, few.terms[:-1], best.coefficients[:-1])
         return fit_heights(start, effect.term(thin.rows, shape))
 
-    return each(fitted, itertools.product(shapes, (best, low)))
+    begun = list(itertools.product(shapes, (best, low)))
+    fits = each(fitted, begun)
+    if any(leaves_white_noise(fit) for fit in fits):
+        return fits
+    of_form = [min(fits[at : at + 2], key=_score) for at in range(0, len(fits), 2)]
+    return fits + [of_other_drives(fit, rng) for fit in of_form]
 
 
 def _weighed(terms: Sequence[Term], fit: Fit) -> list[Weighed]:
