@@ -40,13 +40,15 @@ Pipeline = Callable[[Sequence[Recording]], State]
 @dataclass(frozen=True)
 class Part:
     """A diagnosis of the turns that were left: what its `base` alone and all that it chose (`best`) make of all turns,
-    fitted to those that were left; which rows hold hidden samples (`touched`, (n,)) and which nothing else (`hidden`,
+    fitted to those that were left, on rows without the ripple that it found, and what its base makes of rows with it
+    (`drive_alone`); which rows hold hidden samples (`touched`, (n,)) and which nothing else (`hidden`,
     (n,)); the `effects` found, and with how many coefficients and shapes (`freedom`), those of high orders among them;
     `guesses` for a search on all turns, and the `ripple` for the same.
     """
 
     base: Fit
     best: Fit
+    drive_alone: Fit
     touched: Mask
     hidden: Mask
     effects: tuple[str, ...]
@@ -90,8 +92,8 @@ class Part:
 
     def _errors_of(self, base: Fit, extended: Fit, effects: tuple[str, ...]) -> NestedHeldOut:
         """Errors of the `base` alone and of the `extended` fit on the hidden turns."""
-        left = [_rms(fit.residual[self.hidden]) for fit in (base, extended)]
-        return NestedHeldOut(left[0], left[1], len(np.unique(base.problem.rows.block[self.hidden])), effects)
+        left = [_rms(fit.residual[self.hidden]) for fit in (base, extended, self.drive_alone)]
+        return NestedHeldOut(left[0], left[1], len(np.unique(base.problem.rows.block[self.hidden])), effects, left[2])
 
 
 def all_found(state: State) -> tuple[tuple[str, ...], int]:
@@ -117,7 +119,9 @@ def diagnosis_of_a_part(
     rows = gather(subtract(seen, ripple_of(seen, state)), neighbours)
     share = shares_of_samples(seen, hidden, neighbours)
     base, best = (refitted(fit, rows, share > 0, state) for fit in (state.selection.base, state.selection.best.fit))
-    return Part(base, best, share > 0, share == 1, *all_found(state), state.as_guesses(), state.ripple_as_guess())
+    alone = base if state.ripple is None else refitted(base, gather(seen, neighbours), share > 0, state)
+    what = *all_found(state), state.as_guesses(), state.ripple_as_guess()
+    return Part(base, best, alone, share > 0, share == 1, *what)
 
 
 def as_seen(recordings: Sequence[Recording], hidden: Sequence[Mask], state: State) -> tuple[Recording, ...]:

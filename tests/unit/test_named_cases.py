@@ -73,6 +73,8 @@ def is_as_it_should_be(name, said):
         rival = SAME_COLUMNS.get(spec.effects[0], SAME_COLUMNS.get(name))
         assert (said["verdict"], named) == ("ambiguous" if rival else "named", set(spec.effects))
         assert not rival or [rival] in said["ambiguous_with"]
+        # What is named shows in the fit, by 2 % of the power: fault caught, a ripple taken out of the drive alone too.
+        assert said["fit"]["heldout_rms_extended_arcmin"] < 0.99 * said["fit"]["heldout_rms_base_arcmin"]
         if name not in WRONG_SIZE_YET:
             _has_the_true_size(said["effects"][0], simulate(spec).parameters()[spec.effects[0]])
 

@@ -135,8 +135,8 @@ def test_effects_gain_what_they_carry_themselves():
 
 def test_turns_that_no_stage_saw_must_show_what_is_named():
     """Fault caught: a set that was chosen on all turns and predicts the hidden ones worse than the base is named."""
-    assert unseen_gain(evidence(nested=NestedHeldOut(1.2, 1.0, 5, ()))) == pytest.approx(0.44)
-    assert unseen_gain(evidence(nested=NestedHeldOut(0.9, 1.0, 5, ()))) < 0
+    assert unseen_gain(evidence(nested=NestedHeldOut(1.2, 1.0, 5, (), 1.2))) == pytest.approx(0.44)
+    assert unseen_gain(evidence(nested=NestedHeldOut(0.9, 1.0, 5, (), 0.9))) < 0
     assert unseen_gain(evidence()) == np.inf
     assert replace(NAMED, unseen_gain=2.0, own_gain=2.0).carry_most
     assert not replace(NAMED, unseen_gain=0.5, own_gain=2.0).carry_most
@@ -146,7 +146,10 @@ def test_what_the_turns_left_prefer_is_held_against_the_hidden_ones():
     """What was proposed where they prefer it, else what was found on them. Fault caught: a search on a part that missed
     what is there makes what is named `unknown`.
     """
-    found, proposed = NestedHeldOut(2.0, 1.7, 5, ("hysteresis",)), NestedHeldOut(2.0, 1.1, 5, ("lost_motion",))
+    found, proposed = (
+        NestedHeldOut(2.0, 1.7, 5, ("hysteresis",), 2.0),
+        NestedHeldOut(2.0, 1.1, 5, ("lost_motion",), 2.0),
+    )
     assert Evidence.unseen.fget(SimpleNamespace(nested=found, proposed=proposed)) is proposed
     assert Evidence.unseen.fget(SimpleNamespace(nested=found, proposed=None)) is found
     # Whether turns that no stage saw show it is asked of what no stage saw alone.
@@ -154,7 +157,7 @@ def test_what_the_turns_left_prefer_is_held_against_the_hidden_ones():
 
 
 def test_what_is_left_is_that_of_turns_that_no_stage_saw():
-    hidden = NestedHeldOut(2.0, 1.7, 5, ("hysteresis", "lost_motion"))
+    hidden = NestedHeldOut(2.0, 1.7, 5, ("hysteresis", "lost_motion"), 2.0)
     assert unseen_rms(evidence(extended=4.0, nested=hidden)) == 1.7
     assert unseen_rms(evidence(extended=4.0)) == pytest.approx(2.0)
     one, other = SimpleNamespace(id="hysteresis"), SimpleNamespace(id="resonance")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from hdopt.diagnosis.inference.base_excitation import is_driven
 from hdopt.diagnosis.inference.catalogue import STRAIN_WAVE_ONLY
 from hdopt.diagnosis.inference.conditions import AcrossConditions, across_conditions
 from hdopt.diagnosis.inference.cross_validation import HeldOut, held_out, paired_t, turn_folds
-from hdopt.diagnosis.inference.fit import Fit, term_columns
+from hdopt.diagnosis.inference.descent import refine
+from hdopt.diagnosis.inference.fit import Fit, evaluate, term_columns
 from hdopt.diagnosis.inference.generic_basis import useful_columns
 from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut
 from hdopt.diagnosis.inference.neighbour_noise import noise_between_neighbours
@@ -39,7 +40,7 @@ from hdopt.effects import EFFECTS, HIGH_ORDER
 from hdopt.effects.probe import strongest_orders
 from hdopt.effects.term import Term
 from hdopt.recordings.recording import OF_ROUNDING, Recording
-from hdopt.recordings.rows import Rows
+from hdopt.recordings.rows import Rows, gather, neighbours_for
 
 
 @dataclass(frozen=True)
@@ -55,13 +56,16 @@ class Remainder:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Everything the verdict is drawn from."""
+    """Everything the verdict is drawn from. Held-out errors are those of rows without the ripple that was found, that
+    of the `drive_alone` with it.
+    """
 
     rows: Rows
     selection: Selection
     high: Selection | None
     nuisances: Nuisances
     base_held_out: HeldOut
+    drive_alone: HeldOut
     extended_held_out: HeldOut
     generic_held_out: HeldOut
     placebo_held_out: HeldOut
@@ -129,6 +133,7 @@ def assess(state: State) -> Evidence:
         high=state.high,
         nuisances=state.nuisances,
         base_held_out=base_out,
+        drive_alone=base_out if state.ripple is None else held_out(with_the_ripple(state), None, folds),
         extended_held_out=best_out,
         generic_held_out=generic_out,
         placebo_held_out=base_out if placebo is None else placebo_error(probe, placebo, folds),
@@ -151,6 +156,15 @@ def assess(state: State) -> Evidence:
         passes=repeated_passes(best),
         other_law=other_law(best, inflation),
     )
+
+
+def with_the_ripple(state: State) -> Fit:
+    """The base of `state` on rows that have the ripple too, which was taken out of those of its selection."""
+    base, recordings = state.selection.base, state.recordings
+    rows = gather(recordings, neighbours_for(recordings))
+    problem = replace(base.problem, rows=rows, nuisance=state.nuisances.columns(rows))
+    alone = evaluate(problem, base.errors, base.offsets, (), ())
+    return refine(alone, problem.settings.fit.settled_iterations)
 
 
 def without_ripple(state: State) -> tuple[Recording, ...]:

@@ -18,13 +18,15 @@ from hdopt.recordings.rows import Rows, gather, neighbours_for
 @dataclass(frozen=True)
 class NestedHeldOut:
     """Errors (arcmin rms) on `turns` whole turns that no stage of a diagnosis saw: of its `base` and of all that it
-    chose (`extended`), which were `effects` (ids, in the order of the alphabet).
+    chose (`extended`), which were `effects` (ids, in the order of the alphabet), both without the ripple that it found,
+    and of the `drive_alone` with it.
     """
 
     base: float
     extended: float
     turns: int
     effects: tuple[str, ...]
+    drive_alone: float
 
 
 def hidden_samples(

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 
 class FitNumbers(TypedDict):
-    """The numbers behind a verdict, arcmin rms: cross-validated errors of base, extended, generic and placebo model, on
+    """The numbers behind a verdict, arcmin rms: cross-validated errors of base, extended, generic and placebo model (a
+    ripple of orders that the search of high orders found belongs to all of these but the base), on
     turns that no stage saw (`nested`; None where too few could be spared), on the same turns of what the search on all
     turns found, fitted to the others (`proposed`; None where these do not prefer it), and on whole conditions (None
     where there is one condition), and the noise floor; the chance of a false alarm.

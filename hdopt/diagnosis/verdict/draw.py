@@ -76,11 +76,11 @@ def fit_numbers(evidence: Evidence) -> FitNumbers:
     """The numbers behind the verdict, as in the JSON's `fit`. `evidence` is that of the diagnosis."""
     across, nested, proposed = evidence.across_conditions, evidence.nested, evidence.proposed
     return {
-        "heldout_rms_base_arcmin": evidence.base_held_out.rms,
+        "heldout_rms_base_arcmin": evidence.drive_alone.rms,
         "heldout_rms_extended_arcmin": evidence.extended_held_out.rms,
         "heldout_rms_generic_arcmin": evidence.generic_held_out.rms,
         "heldout_rms_placebo_arcmin": evidence.placebo_held_out.rms,
-        "heldout_nested_rms_base_arcmin": nested.base if nested is not None else None,
+        "heldout_nested_rms_base_arcmin": nested.drive_alone if nested is not None else None,
         "heldout_nested_rms_arcmin": nested.extended if nested is not None else None,
         "heldout_proposed_rms_arcmin": proposed.extended if proposed is not None else None,
         "heldout_conditions_rms_base_arcmin": across.base if across is not None else None,
