@@ -97,8 +97,7 @@ def thinned(term: Term, mask: Mask) -> Term:
 
 
 def drawn(problem: FitProblem, rng: np.random.Generator) -> Array:
-    """Errors (12,) mm of a drive of the kind of `problem`, drawn by `rng`: larger than its tolerances as often as
-    smaller."""
+    """Errors (12,) mm of a random drive of the kind of `problem`, a part of its prior in size; `rng` draws both."""
     settings = problem.settings.base
     errors = rng.normal(size=PARAMETERS) * problem.prior
     return np.asarray(errors * rng.uniform(settings.smallest_start, settings.largest_start))

@@ -179,12 +179,12 @@ def _tooth_by_tooth(
         start = evaluate(thin, drive.errors, drive.offsets, few.terms[:-1], best.coefficients[:-1])
         return fit_heights(start, effect.term(thin.rows, shape))
 
-    begun = list(itertools.product(shapes, (best, low)))
-    fits = each(fitted, begun)
+    drives = (best, low)
+    fits = each(fitted, itertools.product(shapes, drives))
     if any(leaves_white_noise(fit) for fit in fits):
         return fits
-    of_form = [min(fits[at : at + 2], key=_score) for at in range(0, len(fits), 2)]
-    return fits + [of_other_drives(fit, rng) for fit in of_form]
+    of_shapes = [fits[at : at + len(drives)] for at in range(0, len(fits), len(drives))]
+    return fits + [of_other_drives(min(same, key=_score), rng) for same in of_shapes]
 
 
 def _weighed(terms: Sequence[Term], fit: Fit) -> list[Weighed]:
