@@ -2,8 +2,11 @@
 starts go down beside each other.
 
 Parameters stand in the order of what the columns follow: the base's errors, waves round the splines (each its sine and
-its cosine), what is met in the zones, and what nothing moves. The columns of the last are whitened once, and their
-products with each other worked out once.
+its cosine), what is met in the zones, errors of the input angle as it is read, and what nothing moves. The columns of
+the last are whitened once, and their products with each other worked out once.
+
+Where an input encoder reads ahead the drive stands behind. How fast its error changes as it turns follows from the
+slopes over its parameters: all that the input angle turns is a pair of them, of which the one becomes the other.
 """
 
 from __future__ import annotations
@@ -15,9 +18,13 @@ import numpy as np
 
 from hdopt.arrays import Array, Index
 from hdopt.diagnosis.inference.noise import filtered
-from hdopt.kinematics.cartesian import ONCE_ROUND, PARAMETERS
+from hdopt.kinematics.cartesian import CARTESIAN_NAMES, ONCE_ROUND, PARAMETERS
 from hdopt.kinematics.cartesian_kernel import BLOCK, Found, Gear, OnSplines, evaluated_into
 from hdopt.kinematics.compiled_closed_form import allocating, compiled, entry
+
+TURNED = (CARTESIAN_NAMES.index("axis eccentricity x"), CARTESIAN_NAMES.index("axis tilt x"), *ONCE_ROUND)
+"""The place of the errors that the input angle turns into those after them: of the axis once a turn, and of the
+splines' own sines with the angle at which they are met."""
 
 
 class Base(NamedTuple):
@@ -31,9 +38,11 @@ class Base(NamedTuple):
 class Problem(NamedTuple):
     """What is fitted: `rotation` (4, n) of the rows, the whitened record `target` (n,), the filter of the noise (`ar`,
     `root_weight`), of each wave its spline and its harmonic (`waves` (w, 2), those of a spline together and rising),
-    what either zone sees of each coefficient in the zones, mm (`zones` (2, z, n)), whitened columns that nothing moves
-    (`steady` (s, n)); the variance of the noise over that of the prior of each error (`precision` (12,)) and the
-    errors' bounds (`box` (12,))."""
+    what either zone sees of each coefficient in the zones, mm (`zones` (2, z, n)), what each coefficient of a reading
+    of the input adds to the record, arcmin (`readings` (r, n)), and to the input angle (`gain`, rad per arcmin), whose
+    `advance` is that of the flexspline's teeth, whitened columns that nothing moves (`steady` (s, n)); the variance of
+    the noise over that of the prior of each error (`precision` (12,)) and the errors' bounds (`box` (12,)).
+    """
 
     rotation: Array
     target: Array
@@ -41,6 +50,9 @@ class Problem(NamedTuple):
     root_weight: Array
     waves: Index
     zones: Array
+    readings: Array
+    gain: float
+    advance: float
     steady: Array
     precision: Array
     box: Array
@@ -76,19 +88,39 @@ def _look(base: Base, problem: Problem, x: Array, found: Found) -> tuple[Array, 
         for k in range(zones.shape[1]):
             for i in range(rows):
                 extra[side, i] += x[first + k] * zones[side, k, i]
+    rotation, row, white = problem.rotation, np.zeros((1, rows)), np.empty((1, rows))
+    first += zones.shape[1]
+    for k in range(len(problem.readings)):
+        for i in range(rows):
+            row[0, i] += x[first + k] * problem.readings[k, i]
+    if len(problem.readings) > 0:
+        rotation = _turned_back(problem, row[0])
     errors, on_splines = x[:PARAMETERS], OnSplines(base.cs_table, base.fs_table, on_cs, on_fs)
-    evaluated_into(problem.rotation, base.gear, errors, extra, np.zeros((2, 2, 1)), on_splines, found)
-    row, white = np.empty((1, rows)), np.empty((1, rows))
+    evaluated_into(rotation, base.gear, errors, extra, np.zeros((2, 2, 1)), on_splines, found)
     for i in range(rows):
-        row[0, i] = found.value[i]
+        row[0, i] += found.value[i]
     filtered(row, problem.ar, problem.root_weight, white)
-    residual = np.dot(x[first + zones.shape[1] :], problem.steady)
+    residual = np.dot(x[first + len(problem.readings) :], problem.steady)
     for i in range(rows):
         residual[i] = problem.target[i] - residual[i] - white[0, i]
     objective = np.dot(residual, residual)
     for i in range(PARAMETERS):
         objective += problem.precision[i] * errors[i] ** 2
     return residual, objective
+
+
+@allocating
+def _turned_back(problem: Problem, ahead: Array) -> Array:
+    """The rotation (4, n) of the rows where the drive stood, whose input was read `ahead` (n,), arcmin at the
+    output."""
+    given, rotation = problem.rotation, np.empty(problem.rotation.shape)
+    for i in range(len(ahead)):
+        for spline in range(2):
+            angle = problem.gain * ahead[i] * (problem.advance if spline else 1.0)
+            cosine, sine = math.cos(angle), math.sin(angle)
+            rotation[2 * spline, i] = given[2 * spline, i] * cosine + given[2 * spline + 1, i] * sine
+            rotation[2 * spline + 1, i] = given[2 * spline + 1, i] * cosine - given[2 * spline, i] * sine
+    return rotation
 
 
 @compiled
@@ -128,6 +160,29 @@ def _moving_columns(problem: Problem, scale: float, zone: Index, columns: Array)
     for k in range(zones.shape[1]):
         for i in range(n):
             columns[first + k, i] = scale * (zones[0, k, i] if zone[i] == 0 else zones[1, k, i])
+
+
+@allocating
+def _reading_columns(problem: Problem, x: Array, columns: Array) -> None:
+    """The columns of readings into `columns` (m, n), after those of the errors, waves and zones at the parameters `x`
+    (q,), which are there: what a reading adds, less what the drive would do where it was read and did not where it
+    stood."""
+    waves, readings = problem.waves, problem.readings
+    if len(readings) == 0:
+        return
+    first = PARAMETERS + 2 * len(waves) + problem.zones.shape[1]
+    slope = np.zeros(columns.shape[1])
+    for k in range(len(TURNED)):
+        at, speed = TURNED[k], problem.advance if TURNED[k] == ONCE_ROUND[1] else 1.0
+        for i in range(len(slope)):
+            slope[i] += speed * (x[at] * columns[at + 1, i] - x[at + 1] * columns[at, i])
+    for k in range(len(waves)):
+        at, speed = PARAMETERS + 2 * k, waves[k, 1] * (problem.advance if waves[k, 0] else 1.0)
+        for i in range(len(slope)):
+            slope[i] += speed * (x[at] * columns[at + 1, i] - x[at + 1] * columns[at, i])
+    for k in range(len(readings)):
+        for i in range(len(slope)):
+            columns[first + k, i] = readings[k, i] * (1 - problem.gain * slope[i])
 
 
 @compiled
@@ -214,6 +269,7 @@ def descended(base: Base, problem: Problem, start: Array, effort: Effort) -> tup
                 break
             _copy(found.slopes, columns, 0, 0)
             _moving_columns(problem, base.gear.scale, found.zone, columns)
+            _reading_columns(problem, x, columns)
             filtered(columns, problem.ar, problem.root_weight, design)
             # Row by row of the upper triangle would be slow, all at once twice the work.
             for first in range(0, m, 2 * PARAMETERS):

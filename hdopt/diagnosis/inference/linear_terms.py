@@ -17,16 +17,20 @@ from hdopt.diagnosis.inference.base_excitation import is_driven
 from hdopt.diagnosis.inference.compiled_descent import Base, Effort, Problem, descended
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate
 from hdopt.diagnosis.inference.read_angle import reads_input
+from hdopt.drive.geometry import ARCMIN
 from hdopt.effects.met import Waves
 from hdopt.effects.term import Term
-from hdopt.kinematics.cartesian import MOST_WAVES, PARAMETERS
+from hdopt.kinematics.cartesian import MOST_WAVES, PARAMETERS, CartesianModel
 
 
-def _is_linear(term: Term, move_shapes: bool) -> bool:
-    """Whether `term` is linear: no shape of its own moves, the drive's motion does not make its columns, it moves no
-    angles at which the drive stood, and of all that stands on a spline it is waves.
+def _is_linear(term: Term, move_shapes: bool, base: CartesianModel) -> bool:
+    """Whether `term` is linear: no shape of its own moves, the drive's motion does not make its columns, and of all
+    that stands on a spline it is waves. One that moves the angles at which the drive stood is taken for linear too,
+    but for a `base` with measured teeth, whose slopes the parameters do not tell.
     """
-    if (move_shapes and term.steps) or is_driven(term) or reads_input(term):
+    if (move_shapes and term.steps) or is_driven(term):
+        return False
+    if reads_input(term) and (term.columns is None or len(base.cs_table) or len(base.fs_table)):
         return False
     return term.met is None or (isinstance(term.met, Waves) and max(term.met.harmonics) <= MOST_WAVES)
 
@@ -47,7 +51,7 @@ class LinearTermsFit:
     def of(cls, fit: Fit, move_shapes: bool) -> LinearTermsFit | None:
         """`fit` so, None where it has no base or terms that are not linear; `move_shapes`: whether shapes move too."""
         base = fit.problem.base
-        if base is None or not all(_is_linear(term, move_shapes) for term in fit.terms):
+        if base is None or not all(_is_linear(term, move_shapes, base) for term in fit.terms):
             return None
         waves, places = _waves_of(fit.terms)
         seen, fixed = [np.empty((2, len(fit.zone), 0))], [fit.problem.nuisance]
@@ -56,17 +60,21 @@ class LinearTermsFit:
             if term.columns is None and term.zones is not None:
                 places[i], end = np.arange(end, end + term.width), end + term.width
                 seen.append(term.zones)
+        read = [i for i, term in enumerate(fit.terms) if reads_input(term)]
+        for i in read:
+            places[i], end = np.arange(end, end + fit.terms[i].width), end + fit.terms[i].width
         offsets = slice(end, end + len(fit.offsets))
         end = offsets.stop
         for i, term in enumerate(fit.terms):
-            if term.columns is not None:
+            if term.columns is not None and i not in read:
                 places[i], end = np.arange(end, end + term.width), end + term.width
                 fixed.append(term.columns)
         start = np.empty(end)
         start[:PARAMETERS], start[offsets] = fit.errors, fit.offsets
         for place, coefficients in zip(places, fit.coefficients, strict=True):
             start[place] = coefficients
-        problem = _problem_of(fit.problem, waves, np.concatenate(seen, axis=2), fixed)
+        readings = [columns for i in read if (columns := fit.terms[i].columns) is not None]
+        problem = _problem_of(fit.problem, waves, np.concatenate(seen, axis=2), readings, fixed)
         return cls(fit, Base(base.gear, base.cs_table, base.fs_table), problem, start, offsets, tuple(places))
 
     def refined(self, iterations: int, tolerance: float) -> Fit:
@@ -104,10 +112,12 @@ def _waves_of(terms: Sequence[Term]) -> tuple[Index, list[Index]]:
     return waves[order], [both[a:b].ravel() for a, b in pairwise(ends)]
 
 
-def _problem_of(problem: FitProblem, waves: Index, zones: Array, fixed: Sequence[Array]) -> Problem:
+def _problem_of(
+    problem: FitProblem, waves: Index, zones: Array, readings: Sequence[Array], fixed: Sequence[Array]
+) -> Problem:
     """`problem` as the compiled descent takes it: with `waves` round the splines, what stands in the
-    `zones` (2, n, z) and the columns that nothing moves (`fixed`)."""
-    noise = problem.noise
+    `zones` (2, n, z), the columns of `readings` of the input and those that nothing moves (`fixed`)."""
+    noise, base = problem.noise, problem.base
     return Problem(
         problem.rotation,
         noise.whiten(problem.rows.error),
@@ -115,6 +125,9 @@ def _problem_of(problem: FitProblem, waves: Index, zones: Array, fixed: Sequence
         noise.root_weight,
         waves,
         np.ascontiguousarray(zones.transpose(0, 2, 1)),
+        np.ascontiguousarray(np.column_stack([np.empty((len(problem.rows), 0)), *readings]).T),
+        ARCMIN * problem.rows.ratio,
+        1.0 if base is None else base.advance,
         noise.whitened(fixed).T,
         noise.sigma**2 * problem.prior_precision(PARAMETERS),
         problem.box,
