@@ -231,7 +231,7 @@ def fit_from_starts(monkeypatch, on_thinned_rows):
 
     monkeypatch.setattr(base_fit, "evaluate", evaluate)
     monkeypatch.setattr(base_fit, "refine", lambda fit, *rest, **more: fit)
-    monkeypatch.setattr(base_fit, "_solve_offsets", lambda fit: fit)
+    monkeypatch.setattr(base_fit, "with_offsets", lambda fit: fit)
     problem = Problem(
         base="a base", thin=False, settings=DEFAULT, nuisance=np.ones((9, 1)), rows=np.zeros(9), prior=PRIOR
     )
