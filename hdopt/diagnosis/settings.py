@@ -295,6 +295,13 @@ class AlternativeSettings:
     growing_trials: float = threshold(8.0, "1", "theorem: orders tried")
     load_forms: int = threshold(4, "1", "choice: even functions of torque tried")
     speed_forms: float = threshold(2.0, "1", "choice: even functions of speed tried")
+    speed_lags: tuple[float, ...] = threshold(
+        (0.02, 0.04, 0.08, 0.16, 0.32), "recordings", "choice: lags tried, over the time of the longest recording"
+    )
+    shortest_lag: float = threshold(
+        0.01, "recordings", "choice: lag that a fit may move to; its inverse is an exponent"
+    )
+    lag_derivative: float = threshold(0.02, "1", "choice: step of a lag's derivative over itself")
     speed_levels: float = threshold(0.05, "1", "choice: spread of speed over the largest from which it varies")
     scale_turns: float = threshold(2.0, "input turns", "choice: a ratio or gain needs a slope over some turns")
     scale_odds: float = threshold(-1.0, "1", "choice: log prior odds of a ratio or gain that is off, about 1 in 3")

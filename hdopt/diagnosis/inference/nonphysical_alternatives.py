@@ -1,8 +1,9 @@
 """Explanations without physics that compete with the catalogue: where one of them wins, the verdict is `unknown`.
 
 A sine at any order, a sine at any frequency in time, a jump, a bump, an order whose size changes with time, an even
-function of torque or speed: each is a plain description of structure, searched over all its shapes like an effect and
-charged like one. A catalogue effect that merely resembles such a structure loses against it.
+function of torque or speed, one that answers the speed late: each is a plain description of structure, searched over
+all its shapes like an effect and charged like one. A catalogue effect that merely resembles such a structure loses
+against it.
 """
 
 from __future__ import annotations
@@ -359,7 +360,9 @@ class EvenLoad(Alternative):
 
 
 class EvenSpeed(Alternative):
-    """A function of speed that is the same in both directions."""
+    """A function of speed that is the same in both directions, at once or with a lag, as of what heats itself by
+    friction: slower and slower towards what this speed leads to, from rest at the start of each recording.
+    """
 
     id = "_even_in_speed"
     domain = "speed"
@@ -371,13 +374,45 @@ class EvenSpeed(Alternative):
         return "speed that varies" if np.std(size) < self.settings.speed_levels * np.max(size) else None
 
     def search(self, probe: Probe) -> list[Term]:
-        return best_terms(probe, terms_at(self, probe.samples, [{"power": p} for p in (1.0, 2.0)]))
+        s, samples = self.settings, probe.samples
+        powers = [{"power": p} for p in (1.0, 2.0)]
+        found = best_terms(probe, terms_at(self, samples, powers))
+        if samples.time is None:
+            return found
+        lags = [lag * longest_recording(samples) for lag in s.speed_lags]
+        return [
+            *found,
+            *best_terms(probe, terms_at(self, samples, [p | {"lag_s": lag} for p in powers for lag in lags])),
+        ]
 
     def term(self, samples: Conditions, shape: Mapping[str, float], base_value: Array | None = None) -> Term:
-        own = np.zeros(len(samples)) if samples.speed is None else np.abs(samples.speed)
-        columns = ((own / np.max(own)) ** shape["power"])[:, None]
-        trials = self.settings.speed_forms
-        return Term(self.id, dict(shape), columns=columns, trials=trials, odds=self.settings.odds, doubtful=True)
+        s, own = self.settings, np.zeros(len(samples)) if samples.speed is None else np.abs(samples.speed)
+        column, steps, trials = (own / np.max(own)) ** shape["power"], {}, s.speed_forms
+        kept = dict(shape)
+        if "lag_s" in shape:
+            longest = longest_recording(samples)
+            kept["lag_s"] = float(np.clip(shape["lag_s"], s.shortest_lag * longest, longest))
+            column = lagging(samples, column, kept["lag_s"])
+            steps, trials = {"lag_s": s.lag_derivative * kept["lag_s"]}, s.speed_forms * len(s.speed_lags)
+        return Term(self.id, kept, columns=column[:, None], steps=steps, trials=trials, odds=s.odds, doubtful=True)
+
+
+def longest_recording(samples: Conditions) -> float:
+    """Time (s) that the longest recording of `samples` lasts."""
+    return max(float(np.ptp(samples.known_time[samples.record == record])) for record in range(samples.records))
+
+
+def lagging(samples: Conditions, target: Array, lag: float) -> Array:
+    """What follows a `target` (n,) with a `lag` (s) over the time of `samples`, from zero at the start of each
+    recording, (n,): y' = (target - y)/lag, the target held over each step.
+    """
+    found = np.empty(len(target))
+    for record in range(samples.records):
+        own = samples.record == record
+        time = samples.known_time[own]
+        growth = np.exp((time - time[0]) / lag)
+        found[own] = np.cumsum(target[own] * np.diff(growth, prepend=growth[0])) / growth
+    return found
 
 
 class Scale(Alternative):
