@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.diagnosis.inference.base_fit import fit_base
+from hdopt.diagnosis.inference.base_fit import fit_base, with_offsets
 from hdopt.diagnosis.inference.catalogue import SCALE, STRAIN_WAVE_ONLY
 from hdopt.diagnosis.inference.clean_base import (
     beside_smooth,
@@ -333,9 +333,7 @@ def guessed(guess: Guess, problem: FitProblem) -> Fit:
     """The model of `guess` on the rows of `problem`, with the offsets that these want."""
     bare = evaluate(problem, guess.errors, np.zeros(problem.nuisance.shape[1]), (), ())
     terms = [problem.explanations[effect].term(problem.rows, shape, bare.motion) for effect, shape in guess.terms]
-    fit = evaluate(problem, guess.errors, bare.offsets, terms, guess.coefficients)
-    offsets = bare.offsets + least_squares(problem.nuisance, fit.residual)
-    return evaluate(problem, guess.errors, offsets, terms, guess.coefficients)
+    return with_offsets(evaluate(problem, guess.errors, bare.offsets, terms, guess.coefficients))
 
 
 def measure_noise_again(state: State) -> State:

@@ -10,7 +10,7 @@ import pytest
 
 from hdopt.diagnosis import stages
 from hdopt.diagnosis import state as state_module
-from hdopt.diagnosis.inference import clean_base
+from hdopt.diagnosis.inference import base_fit, clean_base
 from hdopt.diagnosis.inference.common_slope import TakenSlope
 from hdopt.diagnosis.orientation import Orientation
 from hdopt.diagnosis.search import candidates
@@ -271,9 +271,12 @@ def test_a_guess_stands_where_it_stood(monkeypatch):
 
     def evaluate(problem, errors, offsets, terms, coefficients):
         seen.append((errors, offsets, terms, coefficients))
-        return SimpleNamespace(motion="its motion", offsets=offsets, residual=np.array([1.0, 3.0]))
+        left = {"motion": "its motion", "residual": np.array([1.0, 3.0])}
+        own = {"problem": problem, "errors": errors, "offsets": offsets, "terms": terms, "coefficients": coefficients}
+        return SimpleNamespace(**left, **own)
 
     monkeypatch.setattr(stages, "evaluate", evaluate)
+    monkeypatch.setattr(base_fit, "evaluate", evaluate)
     effect = SimpleNamespace(term=lambda rows, shape, motion: ("term", motion))
     problem = SimpleNamespace(nuisance=np.ones((2, 1)), rows=None, explanations={"tooth_mesh": effect})
     stages.guessed(GUESS, problem)

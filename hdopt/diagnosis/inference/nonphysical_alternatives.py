@@ -379,16 +379,17 @@ class EvenSpeed(Alternative):
         found = best_terms(probe, terms_at(self, samples, powers))
         if samples.time is None:
             return found
-        lags = [lag * longest_recording(samples) for lag in s.speed_lags]
+        longest = longest_recording(samples)
+        lags = [lag * longest for lag in s.speed_lags]
         return [
             *found,
             *best_terms(probe, terms_at(self, samples, [p | {"lag_s": lag} for p in powers for lag in lags])),
         ]
 
     def term(self, samples: Conditions, shape: Mapping[str, float], base_value: Array | None = None) -> Term:
-        s, own = self.settings, np.zeros(len(samples)) if samples.speed is None else np.abs(samples.speed)
+        s, kept = self.settings, dict(shape)
+        own = np.zeros(len(samples)) if samples.speed is None else np.abs(samples.speed)
         column, steps, trials = (own / np.max(own)) ** shape["power"], {}, s.speed_forms
-        kept = dict(shape)
         if "lag_s" in shape:
             longest = longest_recording(samples)
             kept["lag_s"] = float(np.clip(shape["lag_s"], s.shortest_lag * longest, longest))
