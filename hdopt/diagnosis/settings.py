@@ -295,7 +295,7 @@ class AlternativeSettings:
     growing_trials: float = threshold(8.0, "1", "theorem: orders tried")
     load_forms: int = threshold(4, "1", "choice: even functions of torque tried")
     speed_forms: float = threshold(2.0, "1", "choice: even functions of speed tried")
-    speed_lags: tuple[float, ...] = threshold(
+    lags: tuple[float, ...] = threshold(
         (0.02, 0.04, 0.08, 0.16, 0.32), "recordings", "choice: lags tried, over the time of the longest recording"
     )
     shortest_lag: float = threshold(
@@ -474,6 +474,17 @@ class HighOrderSettings:
     )
     tooth_gain: float = threshold(
         30.0, "noise variances", "choice: drop of the sum of squares from which another height of a tooth is taken"
+    )
+
+
+@dataclass(frozen=True)
+class CyclicSettings:
+    """Noise that arises at one angle of the input."""
+
+    angles: int = threshold(36, "1/input turn", "choice: angles told apart, 10 deg each")
+    rows_an_angle: float = threshold(1.0, "rows", "choice: rows of a turn at each angle from which angles are told")
+    over_elsewhere: float = threshold(
+        2.0, "1", "choice: power of what is new at one angle, over that of a usual one, from which it counts"
     )
 
 
@@ -747,6 +758,7 @@ class DiagnosisSettings:
     search: SearchSettings = SearchSettings()
     high_order: HighOrderSettings = HighOrderSettings()
     wander: WanderSettings = WanderSettings()
+    cyclic: CyclicSettings = CyclicSettings()
     walk: WalkSettings = WalkSettings()
     steps: StepSettings = StepSettings()
     orientation: OrientationSettings = OrientationSettings()

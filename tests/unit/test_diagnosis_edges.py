@@ -11,13 +11,13 @@ import pytest
 from test_effect_physics import RATE, RATIO, TURN, moving
 from test_windup_curves import fit_of
 
+from hdopt.diagnosis.alternatives import alternatives
 from hdopt.diagnosis.checks.scale import _scale
 from hdopt.diagnosis.checks.slow_wander import _autoregression, _cells, _filtered, _line
 from hdopt.diagnosis.checks.step_detection import Steps
 from hdopt.diagnosis.inference.cross_validation import HeldOut
 from hdopt.diagnosis.inference.encoder_steps import _is_most, gather, neighbours_for, on_samples
 from hdopt.diagnosis.inference.fit import evaluate
-from hdopt.diagnosis.inference.nonphysical_alternatives import alternatives
 from hdopt.diagnosis.inference.nuisance import angle_range, tent_functions
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.settings import DEFAULT

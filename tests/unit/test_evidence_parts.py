@@ -54,6 +54,7 @@ def assessed(monkeypatch):
             "detection_limits": lambda probe, pool, scale: (probe.name, pool, scale),
             "sudden_steps": lambda fit: f"steps of {fit.name}",
             "slow_wave": lambda fit: f"wave of {fit.name}",
+            "arising_at_an_angle": lambda fit: f"angles of {fit.name}",
             "without_ripple": lambda state: state.recordings,
             "noise_between_neighbours": lambda recordings: 0.01,
             "fitted_scale": lambda fit, nuisances: f"scale of {fit.name}",
@@ -94,6 +95,7 @@ def test_every_part_of_the_evidence_is_asked_of_its_own_fit(assessed):
     assert evidence.below_detection == ("best", "pool of base without ('bearing_pass',)", 2.0)
     assert evidence.steps == "steps of best"
     assert evidence.wave == "wave of best"
+    assert evidence.arising == "angles of best"
     assert evidence.scale == "scale of best"
     assert evidence.passes == "passes of best"
     assert evidence.other_law == "law beside best at 2.0"

@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from hdopt.diagnosis.alternatives import AnyOrder, Mains
 from hdopt.diagnosis.inference import fit as fitting
 from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.fit import Fit
-from hdopt.diagnosis.inference.nonphysical_alternatives import AnyOrder, Mains
 from hdopt.diagnosis.search import high_order
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.high_order import high_order_selection, ripple_orders, subtract

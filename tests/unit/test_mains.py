@@ -12,8 +12,8 @@ from test_effect_physics import RATE, RATIO, TURN, moving
 from test_windup_curves import fit_of
 
 from hdopt.diagnosis import diagnose
+from hdopt.diagnosis.alternatives import AnyFrequency, Mains
 from hdopt.diagnosis.inference.descent import refine
-from hdopt.diagnosis.inference.nonphysical_alternatives import AnyFrequency, Mains
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.search.penalty import Scale, penalty
 from hdopt.diagnosis.settings import DEFAULT

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hdopt.diagnosis import diagnose
+from hdopt.diagnosis.alternatives import Jump
 from hdopt.diagnosis.inference.catalogue import NEW_ZERO, TOLD, explanations, is_effect
-from hdopt.diagnosis.inference.nonphysical_alternatives import Jump
 from hdopt.recordings.rows import gather
 from hdopt.study import load_study
 from tests.unit.test_diagnosis import NOISE, bench

@@ -7,6 +7,7 @@ import pytest
 from scipy import linalg, signal
 from test_cross_validation import RATE, noisy, rows_of, without_base
 
+from hdopt.diagnosis.alternatives.in_time import strongest_frequencies
 from hdopt.diagnosis.inference import residual_noise
 from hdopt.diagnosis.inference.noise import (
     Noise,
@@ -16,7 +17,6 @@ from hdopt.diagnosis.inference.noise import (
     predictable_share,
     weights_with_a_past,
 )
-from hdopt.diagnosis.inference.nonphysical_alternatives import strongest_frequencies
 from hdopt.diagnosis.inference.residual_noise import measure_noise, roughness
 from hdopt.diagnosis.settings import DEFAULT
 

@@ -11,18 +11,14 @@ import scipy.ndimage
 from test_effect_physics import RATE, RATIO, TURN, moving
 from test_windup_curves import fit_of
 
-from hdopt.diagnosis.inference import nonphysical_alternatives
+from hdopt.diagnosis.alternatives import alternatives, in_time
+from hdopt.diagnosis.alternatives.in_time import strongest_frequencies
+from hdopt.diagnosis.alternatives.late import lagging, longest_recording
+from hdopt.diagnosis.alternatives.moments import smoothed
 from hdopt.diagnosis.inference.base_excitation import motion_of
 from hdopt.diagnosis.inference.change_points import find_steps
 from hdopt.diagnosis.inference.descent import refine
 from hdopt.diagnosis.inference.generic_basis import generic_columns
-from hdopt.diagnosis.inference.nonphysical_alternatives import (
-    alternatives,
-    lagging,
-    longest_recording,
-    smoothed,
-    strongest_frequencies,
-)
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.drive.geometry import ARCMIN
@@ -71,6 +67,12 @@ SIGNALS = {
         0.2 * TORQUE**2,
         0.3 * TORQUE * np.sin(T + 0.5),
         0.3 * TORQUE * np.cos(2 * T + 0.5),
+    ],
+    "_late_in_torque": [0.3 * answering(TORQUE, 1.9), 0.3 * answering(TORQUE, 0.5)],
+    "_torque_in_motion": [
+        0.2 * load * motion
+        for load in (TORQUE, np.abs(TORQUE))
+        for motion in (RECORD.direction, RECORD.speed / 5.0, SPEED)
     ],
     "_even_in_speed": [0.3 * SPEED, 0.3 * SPEED**2, 0.3 * answering(SPEED, 1.9), 0.3 * answering(SPEED**2, 0.7)],
     "_scale": [1e-5 * T / ARCMIN],
@@ -123,8 +125,26 @@ def test_what_answers_speed_late_answers_it_in_the_end():
         assert term.shape["lag_s"] == pytest.approx(kept)
         assert np.isfinite(term.columns).all()
     plain = one.term(RECORD, {"power": 1.0})
-    assert term.trials == len(DEFAULT.alternatives.speed_lags) * plain.trials
+    assert term.trials == len(DEFAULT.alternatives.lags) * plain.trials
     assert not plain.steps
+
+
+@pytest.mark.parametrize("lag", [0.7, 1.9, 5.0])
+def test_what_answers_torque_late_is_offered_near_its_lag(lag):
+    """Within the factor of 2^(1/2) that lies between two lags that are tried. Fault caught: one lag is tried, from
+    which a fit has far to go."""
+    offered = ONES["_late_in_torque"].search(FitProbe(refine(fit_of(RECORD, 0.3 * answering(TORQUE, lag)), 2)))
+    assert min(abs(np.log2(term.shape["lag_s"] / lag)) for term in offered) < 0.55
+
+
+def test_load_in_motion_pays_for_the_products_that_the_record_shows():
+    """Torque and its size times direction, speed and its size; in one direction a speed has no sign, and at one speed
+    it is the direction."""
+    one, shape = ONES["_torque_in_motion"], {"load": 0.0, "motion": 0.0}
+    there = moving((18,), speed=LEVELS_OF_WHOLE)
+    for record, products in ((RECORD, 6), (there, 2), (WHOLE, 2)):
+        assert one.term(record, shape).trials == products
+        assert one.lacks(record) is None
 
 
 def test_without_a_clock_speed_is_answered_at_once():
@@ -141,6 +161,7 @@ def test_what_competes_with_the_catalogue_pays_odds(name):
 
 
 WHOLE = moving()
+LEVELS_OF_WHOLE = np.repeat([2.0, 3.0, 5.0], 6 * RATE)
 LOCKED = moving(locked=True, theta=np.zeros(18 * RATE))
 
 
@@ -156,6 +177,11 @@ LOCKED = moving(locked=True, theta=np.zeros(18 * RATE))
         ("_changing_order", moving((3,))),
         ("_even_in_torque", moving(torque=None)),
         ("_even_in_torque", moving(torque=np.full(18 * RATE, 5.0))),
+        ("_late_in_torque", moving(torque=None)),
+        ("_late_in_torque", moving(time=None)),
+        ("_torque_in_motion", moving(torque=None, speed=LEVELS_OF_WHOLE)),
+        ("_torque_in_motion", moving((18,), speed=np.full(18 * RATE, 2.0))),
+        ("_torque_in_motion", LOCKED),
         ("_even_in_speed", WHOLE),
         ("_even_in_speed", moving(speed=None)),
         ("_scale", moving((1,))),
@@ -209,7 +235,7 @@ def test_frequencies_of_a_record_in_its_own_time():
 def test_waves_slower_than_the_record_shows_are_asked_in_time(monkeypatch):
     """From 0.35 waves a record on: below 0.4 the transform has none, and a fit does not begin by itself."""
     asked = []
-    monkeypatch.setattr(nonphysical_alternatives, "best_terms", lambda probe, terms, most=1: asked.extend(terms) or [])
+    monkeypatch.setattr(in_time, "best_terms", lambda probe, terms, most=1: asked.extend(terms) or [])
     ONES["_sine_in_time"].search(FitProbe(fit_of(RECORD, np.sin(9 * CLOCK))))
     waves = [term.shape["frequency_hz"] * CLOCK[-1] for term in asked]
     assert all(any(abs(wave - slow) < 1e-9 for wave in waves) for slow in (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8))
@@ -227,7 +253,12 @@ UNDER = {
         np.sin(order * c.theta + 0.2) for order in (1 - 1 / RATIO, 1 + 1 / RATIO, 3 - 1 / RATIO, 3 + 3 / RATIO)
     ),
     "time": lambda c: (c.time - 20.0) ** 4 + c.time,
-    "torque": lambda c: c.torque**4 - 3 * c.torque**3 + 100 * c.torque * np.cos(2 * c.theta + 0.4),
+    "torque": lambda c: (
+        c.torque**4
+        - 3 * c.torque**3
+        + 100 * c.torque * (np.cos(2 * c.theta + 0.4) + c.direction)
+        - 40 * c.torque * c.speed
+    ),
     "temperature": lambda c: c.temperature**2 - c.temperature,
     "speed": lambda c: c.speed + np.abs(c.speed) * (np.cos(4 * c.theta) + np.sin(2 * c.theta) + np.sin(c.theta)),
     "direction": lambda c: c.direction * (1 + np.sin(c.theta) + np.cos(2 * c.theta)),
@@ -251,14 +282,15 @@ def rows_of(conditions):
 
 
 def test_the_generic_basis_has_no_more_columns_than_it_says():
-    """Twelve whole orders; four of the output; k -+ 1/N and k (1 + 1/N) of four; degrees 4, 4 and 2; speed by degree
-    3 and three orders; direction with two, and three lengths. Less gives nothing."""
+    """Twelve whole orders; four of the output; k -+ 1/N and k (1 + 1/N) of four; degrees 4, 4 and 2; torque with two
+    orders, the direction and the speed; speed by degree 3 and three orders; direction with two, and three lengths. Less
+    gives nothing."""
     counts = {
         "integer order": 24,
         "output order": 8,
         "output-synchronous order": 22,  # 1 (1 + 1/N) is 1 + 1/N
         "time": 4,
-        "torque": 8,
+        "torque": 10,
         "temperature": 2,
         "speed": 9,
         "direction": 5,

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hdopt.diagnosis.checks.cyclostationarity import NOWHERE
 from hdopt.diagnosis.checks.slow_wander import SlowWave
 from hdopt.diagnosis.checks.step_detection import Steps
 from hdopt.diagnosis.checks.turn_by_turn import from_turn_to_turn
@@ -97,9 +98,11 @@ def evidence(fit, noise=NOISE):
         extended_held_out=SimpleNamespace(variance=0.001),
         neighbours_arcmin=noise,
         sensor_arcmin=0.0,
+        sensors_noise=noise,
         rows=SimpleNamespace(output_step=0.0),
         wave=None,
         steps=Steps(np.zeros(0, int), 0.0),
+        arising=NOWHERE,
     )
 
 

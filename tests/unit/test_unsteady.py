@@ -180,3 +180,46 @@ def test_what_changes_in_time_is_unknown(study, kind):
     assert diagnosis.verdict == "unknown"
     assert diagnosis.where["domain"] == "time"
     assert diagnosis.effects == ()
+
+
+@pytest.mark.slow
+def test_a_hub_that_slips_at_one_angle_is_unknown(study):
+    """By another amount each turn, at 100 deg of the input: twice the noise, 0.03 arcmin. Fault caught: `adequate`, as
+    the noise model took the slips up."""
+    rng, turns = np.random.default_rng(5), 120
+    theta = np.linspace(0, turns * TURN, 60 * turns)
+    turn = np.floor(theta / TURN - 100 / 360).astype(int) + 1
+    hidden = rng.normal(0, 0.03, turns + 1)[turn]
+    error = kinematic_error_arcmin(study.drive, study.errors, theta) + hidden + rng.normal(0, 0.017, len(theta))
+    diagnosis = diagnose(record(error, theta), study.drive)
+    assert (diagnosis.verdict, diagnosis.effects) == ("unknown", ())
+    assert diagnosis.where["domain"] == "angle"
+    assert diagnosis.where["input_angle_deg"] == pytest.approx(100, abs=10)
+    assert diagnosis.where["rms_arcmin"] == pytest.approx(0.03, rel=0.2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["friction under load", "creep under load"])
+def test_what_follows_the_torque_as_no_effect_does_is_unknown(study, kind):
+    """There and back over 30 turns at two speeds, a torque that swings seven times, 0.04 arcmin in noise of 0.02. Fault
+    caught: the noise model takes it up, and the answer is `adequate`."""
+    rng = np.random.default_rng(7)
+    there = np.linspace(0, 30 * TURN, ROWS // 2)
+    theta = np.r_[there, there[::-1]]
+    time = 0.01 * np.cumsum(np.r_[np.ones(ROWS // 2), 2 * np.ones(ROWS // 2)])
+    speed = np.gradient(theta, time)
+    torque = 25 * np.sin(TURN * 7 * time / time[-1])
+    late = lfilter([0.01], [1, -0.99], torque)
+    shape = {"friction under load": torque * speed, "creep under load": late}[kind]
+    hidden = 0.04 * shape / np.std(shape)
+    error = kinematic_error_arcmin(study.drive, study.errors, theta) + hidden + rng.normal(0, 0.02, ROWS)
+    table = {
+        "time_s": time,
+        "input_angle_deg": np.degrees(theta),
+        "output_angle_deg": np.degrees(theta / RATIO - error * ARCMIN),
+        "torque_Nm": torque,
+    }
+    diagnosis = diagnose(recording_from_table(pd.DataFrame(table), RATIO, name="record"), study.drive)
+    assert (diagnosis.verdict, diagnosis.effects) == ("unknown", ())
+    assert diagnosis.where["domain"] == "torque"
+    assert diagnosis.where["rms_arcmin"] == pytest.approx(0.04, rel=0.1)

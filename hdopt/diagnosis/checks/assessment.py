@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdopt.arrays import Array, Index
+from hdopt.diagnosis.checks.cyclostationarity import ArisingAtAnAngle, arising_at_an_angle
 from hdopt.diagnosis.checks.false_alarm import best_score, false_alarm_chance
 from hdopt.diagnosis.checks.other_laws import OtherLaw, other_law
 from hdopt.diagnosis.checks.repeated_passes import RepeatedPasses, repeated_passes
@@ -79,6 +80,7 @@ class Evidence:
     below_detection: dict[str, float]
     steps: Steps
     wave: SlowWave | None
+    arising: ArisingAtAnAngle
     orientation: Orientation
     neighbours_arcmin: float
     sensor_arcmin: float
@@ -149,6 +151,7 @@ def assess(state: State) -> Evidence:
         below_detection=detection_limits(FitProbe(best), pool, scale),
         steps=sudden_steps(best),
         wave=slow_wave(best),
+        arising=arising_at_an_angle(best),
         orientation=state.orientation,
         neighbours_arcmin=noise_between_neighbours(without_ripple(state)),
         sensor_arcmin=max(one.quantum_arcmin for one in state.recordings),

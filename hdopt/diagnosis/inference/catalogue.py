@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import lru_cache
 
-from hdopt.diagnosis.inference.nonphysical_alternatives import alternatives
+from hdopt.diagnosis.alternatives import alternatives
 from hdopt.diagnosis.settings import DEFAULT, AlternativeSettings
 from hdopt.effects import EFFECTS
 from hdopt.effects.base import Explanation

@@ -77,17 +77,28 @@ def _add_load(found: _Columns, rows: Rows, settings: GenericSettings) -> None:
         if not rows.locked:
             torque = rows.torque / np.max(np.abs(rows.torque))
             found.add(torque[:, None] * sine_columns(rows.theta, [1, 2]), "torque")
+            if rows.reverses:
+                found.add(torque * rows.direction, "torque")
+            if _speed_varies(rows, settings):
+                found.add(torque * rows.known_speed, "torque")
     if rows.temperature is not None and np.std(rows.temperature) > 0:
         found.add(_polynomial(rows.temperature, settings.temperature_degree), "temperature")
 
 
 def _add_speed(found: _Columns, rows: Rows, settings: GenericSettings) -> None:
-    if rows.speed is None or np.std(rows.speed) <= settings.speed_varies * np.max(np.abs(rows.speed)):
+    if not _speed_varies(rows, settings):
         return
-    found.add(_polynomial(rows.speed, settings.speed_degree), "speed")
-    size = np.abs(rows.speed)
+    found.add(_polynomial(rows.known_speed, settings.speed_degree), "speed")
+    size = np.abs(rows.known_speed)
     if not rows.locked and np.std(size) > settings.speed_levels * np.max(size):
         found.add((size / np.max(size))[:, None] * sine_columns(rows.theta, SPEED_ORDERS), "speed")
+
+
+def _speed_varies(rows: Rows, settings: GenericSettings) -> bool:
+    """Whether the speed of `rows` is known and differs along them, by its sign or its size."""
+    if rows.speed is None:
+        return False
+    return bool(np.std(rows.speed) > settings.speed_varies * np.max(np.abs(rows.speed)))
 
 
 def _add_direction(found: _Columns, rows: Rows, settings: GenericSettings) -> None:

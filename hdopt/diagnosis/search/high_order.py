@@ -10,12 +10,13 @@ from dataclasses import replace
 import numpy as np
 
 from hdopt.arrays import Array
+from hdopt.diagnosis.alternatives.in_angle import AnyOrder
+from hdopt.diagnosis.alternatives.in_time import Mains
 from hdopt.diagnosis.inference import noise as noise_model
 from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.descent import refine
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, with_terms
 from hdopt.diagnosis.inference.noise import Noise
-from hdopt.diagnosis.inference.nonphysical_alternatives import AnyOrder, Mains
 from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.inference.read_angle import where_it_stood
 from hdopt.diagnosis.inference.residual_gains import FitProbe

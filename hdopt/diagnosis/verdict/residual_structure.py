@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
+from hdopt.diagnosis.alternatives.in_time import Mains
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.turn_by_turn import from_turn_to_turn
 from hdopt.diagnosis.inference.catalogue import TOLD, is_outside, properties_of
 from hdopt.diagnosis.inference.cross_validation import paired_chance
 from hdopt.diagnosis.inference.fit import Fit
-from hdopt.diagnosis.inference.nonphysical_alternatives import Mains
 from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.search.candidates import Candidate, with_only
 from hdopt.diagnosis.verdict.named_effect import main_orders, share_of
@@ -79,6 +79,8 @@ def in_what_way(where: Where) -> str:
     if "spread_over_turns" in where:
         spread = where["spread_over_turns"]
         return f", and it comes and goes: its size differs by {spread:.2g} of its mean from one input turn to the next"
+    if "input_angle_deg" in where:
+        return f", new each turn and always at {where['input_angle_deg']:.3g} deg of the input"
     return ""
 
 
@@ -115,18 +117,39 @@ def comes_and_goes(evidence: Evidence) -> Where | None:
     return None
 
 
-def unsteady(evidence: Evidence) -> Where | None:
-    """Where something lives that changes in time as no noise does, or that comes and goes, if it is a fair part of what
-    is there and more than sensors and model resolve, or None. `evidence` is that of the diagnosis.
+def arises_at_an_angle(evidence: Evidence) -> Where | None:
+    """Where that lives which is new each turn but arises at one angle of the input, clearly and with far more power
+    than elsewhere, if it is worth a word; None where nothing does. What begins at an angle may last: told is the rms of
+    all that is left beyond the sensors' noise. `evidence` is that of the diagnosis.
     """
-    if (gone := comes_and_goes(evidence)) is not None:
-        return gone
+    found, settings = evidence.arising, evidence.settings
+    clear = found.chance < settings.verdict.remainder_chance and found.over_elsewhere > settings.cyclic.over_elsewhere
+    if not clear or found.rms**2 <= worth_a_word(evidence):
+        return None
+    beyond = evidence.extended_held_out.variance - evidence.sensors_noise**2
+    rms = math.sqrt(max(beyond, found.rms**2))
+    return place("angle", [], rms, evidence) | {"input_angle_deg": math.degrees(found.angle)}
+
+
+def worth_a_word(evidence: Evidence) -> float:
+    """Power (arcmin^2) from which what changes is a fair part of what is there and more than sensors and model resolve.
+    `evidence` is that of the diagnosis.
+    """
     settings = evidence.settings.verdict
     least = settings.remainder_share * explained_power(evidence)
-    floor = max(settings.smallest_share * evidence.extended_held_out.variance, resolution(evidence) ** 2)
+    return max(least, settings.smallest_share * evidence.extended_held_out.variance, resolution(evidence) ** 2)
+
+
+def unsteady(evidence: Evidence) -> Where | None:
+    """Where something lives that changes in time as no noise does, that comes and goes, or that is new each turn at one
+    angle, if it is worth a word, or None. `evidence` is that of the diagnosis.
+    """
+    gone = comes_and_goes(evidence) or arises_at_an_angle(evidence)
+    if gone is not None:
+        return gone
     wave, steps = evidence.wave, evidence.steps
     rms = max(wave.rms if wave is not None else 0.0, steps.rms)
-    if not (steps.any or wave is not None) or rms**2 <= max(least, floor):
+    if not (steps.any or wave is not None) or rms**2 <= worth_a_word(evidence):
         return None
     where = place("time", [], rms, evidence)
     if wave is not None and wave.rms >= steps.rms:

@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from hdopt.diagnosis.alternatives.in_time import Mains
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding, confounded_with
 from hdopt.diagnosis.inference.catalogue import EXACT_TOLD, TOLD, is_effect
 from hdopt.diagnosis.inference.cross_validation import paired_t
 from hdopt.diagnosis.inference.fit import Fit
-from hdopt.diagnosis.inference.nonphysical_alternatives import Mains
 from hdopt.diagnosis.search.candidates import Candidate, paid_for_freedom, penalty_scale
 from hdopt.diagnosis.search.high_order import lowest_order, ripple_orders
 from hdopt.diagnosis.search.penalty import leaves_nothing

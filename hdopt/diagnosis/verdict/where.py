@@ -8,7 +8,7 @@ from typing import NotRequired, TypedDict
 class Where(TypedDict):
     """Domain, orders (cycles an input turn), direction, share of the residual's power (0 to 1) and rms; of what changes
     in time also its period (s), or how many sudden steps there are; of what comes and goes the spread of its size from
-    one input turn to the next, over its mean.
+    one input turn to the next, over its mean; of what is new each turn at one angle of the input that angle.
     """
 
     domain: str
@@ -19,3 +19,4 @@ class Where(TypedDict):
     period_s: NotRequired[float]
     sudden_steps: NotRequired[int]
     spread_over_turns: NotRequired[float]
+    input_angle_deg: NotRequired[float]
