@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import DEFAULTS, StudyOptions, emit, status, study_options, table_options, work_options
+from hdopt.cli.common import StudyOptions, emit, status, study_options, table_options, work_options
 from hdopt.cli.completion import offered, rules
 from hdopt.cli.log import looked_at
 
@@ -38,13 +38,10 @@ def command(asked: StudyOptions, rule: str | None, compare: bool | None, json_fi
 
     from hdopt.allocation.convex import Infeasible
     from hdopt.workflow.allocate import allocate
-    from hdopt.workflow.allocation_bounds import default_lines
     from hdopt.workflow.allocation_stages import AllocationWatch
     from hdopt.workflow.requirement import of_allocation
 
     loaded, watch = asked.load(), AllocationWatch(get_ident())
-    context = click.get_current_context()
-    context.meta[DEFAULTS] = (*context.meta[DEFAULTS], *default_lines(loaded))
     try:
         with looked_at("allocation", watch.words):
             result = allocate(loaded, rule, compare=compare, seed=seed, progress=watch.rules)

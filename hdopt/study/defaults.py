@@ -26,7 +26,9 @@ USED: dict[str, tuple[str, ...]] = {
 """Command -> the sections whose defaults it may fall back on; a command that is not here says them itself."""
 WHOLE_STUDY = "run"
 """The command that uses every section that a study has."""
-WHOLE = ("allocate", "search")
+ALLOCATE = "allocate"
+"""The section of an allocation, which moves every tolerance that has a cost."""
+WHOLE = (ALLOCATE, "search")
 """Sections that a command may be run without: then all of their defaults hold."""
 OF_NO_WEIGHT = ("source", "noise_um", "correlation", "cost", "rated_torque_nm", "rated_speed_rpm")
 """Keys whose default changes nothing, or that another line speaks of."""
@@ -43,9 +45,13 @@ def defaults_taken(
     sections: Mapping[str, Section], names: Sequence[str], document: Document | None = None
 ) -> tuple[str, ...]:
     """A line for each of the sections `names` of a study, of its checked `sections`, that leaves something out: which
-    value holds instead, of the shipped drive that its `document` starts from (None: of none) or of its own."""
+    value holds instead, of the shipped drive that its `document` starts from (None: of none) or of its own; where
+    "allocate" is among them also how far tolerances may go whose costs do not say."""
+    from hdopt.study.cost_bounds import assumed_lines
+
     kept = () if document is None else tuple(_kept(name, document) for name in names if name in OF_ONE_DRIVE)
-    return (*filter(None, kept), *(line for name in names if (line := _line(name, sections.get(name)))))
+    bounds = assumed_lines(sections) if ALLOCATE in names else ()
+    return (*filter(None, kept), *(line for name in names if (line := _line(name, sections.get(name)))), *bounds)
 
 
 def _kept(name: str, document: Document) -> str:

@@ -10,8 +10,9 @@ from hdopt.allocation.request import AllocationRequest
 from hdopt.errors import HdoptError, unknown_name
 from hdopt.parallel.engine import Engine
 from hdopt.study import AnyStudy, Study, as_study
+from hdopt.study.cost_bounds import DEFAULT_REACH
 from hdopt.tolerance.intervals import IntervalEstimate
-from hdopt.workflow.allocation_bounds import DEFAULT_REACH, assumed_bounds, at_assumed_bounds, bound_notes
+from hdopt.workflow.allocation_bounds import assumed_bounds, at_assumed_bounds, bound_notes
 from hdopt.workflow.placed import numbers_named
 from hdopt.workflow.stack import ToleranceProblem, study_problem, words_on_model
 

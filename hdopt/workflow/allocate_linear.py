@@ -33,12 +33,13 @@ from hdopt.allocation.results import (
 from hdopt.allocation.spread import spread_factors
 from hdopt.errors import HdoptError
 from hdopt.study import Study
+from hdopt.study.cost_bounds import LINEAR_REACH
 from hdopt.study.costs import Cost
 from hdopt.study.tolerances import LinearStackSection
 from hdopt.tolerance.intervals import smallest_n
 from hdopt.tolerance.linear_stack import Dimension, linear_problem
 from hdopt.tolerance.stack import Stack, StackRequest, run_stack
-from hdopt.workflow.allocation_bounds import LINEAR_REACH, assumed_bounds, at_assumed_bounds, bound_notes
+from hdopt.workflow.allocation_bounds import assumed_bounds, at_assumed_bounds, bound_notes
 from hdopt.workflow.stack import STACK_N
 
 NORMAL = "the verified yield takes each dimension as normal, truncated at its tolerance"

@@ -8,8 +8,11 @@ from hdopt.allocation.convex import Item
 from hdopt.allocation.cost import Reciprocal
 from hdopt.cli import main
 from hdopt.study import load_study
+from hdopt.study.cost_bounds import assumed_lines
 from hdopt.study.costs import ReciprocalRow
-from hdopt.workflow.allocation_bounds import assumed_bounds, at_assumed_bounds, bound_notes, default_lines
+from hdopt.study.defaults import defaults_taken, used_by
+from hdopt.workflow.allocation_bounds import assumed_bounds, at_assumed_bounds, bound_notes
+from hdopt.workflow.check_study import check_study
 
 REACH = (0.1, 3.0)
 
@@ -54,10 +57,23 @@ def test_the_default_lines_name_the_costs_without_a_bound(tmp_path):
         wg_eccentricity_mm=LINES,
         axis_tilt_y_deg=SMOOTH,
     )
-    assert default_lines(study) == (
+    assert assumed_lines(study.sections) == (
         "cost.tightest is not given for axis_eccentricity_mm, axis_tilt_y_deg: 0.1 times the present tolerance",
         "cost.widest is not given for axis_tilt_y_deg: 3 times the present tolerance",
     )
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_whatever_allocates_says_how_far_tolerances_may_go(command):
+    """Before it does, and on the page of a run. Faults caught: said by `hdopt allocate` alone; said of a study that
+    has costs and allocates nothing."""
+    study = load_study("csf-25-80-tolerances")
+    lines = defaults_taken(study.sections, used_by(command, study.sections) or tuple(study.sections), study.document)
+    assert set(assumed_lines(study.sections)) <= set(lines)
+    assert len(assumed_lines(study.sections)) == 2
+    others = [name for name in study.sections if name != "allocate"]
+    assert not set(assumed_lines(study.sections)) & set(defaults_taken(study.sections, others, study.document))
+    assert set(assumed_lines(study.sections)) <= set(check_study(study).defaults)
 
 
 def test_tolerances_at_an_assumed_bound_are_named_with_the_key_that_moves_it(tmp_path):
