@@ -6,8 +6,7 @@ import pytest
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.search import at_home
-from hdopt.diagnosis.search.at_home import brought_home
-from hdopt.diagnosis.search.completion import is_outside_tolerances
+from hdopt.diagnosis.search.at_home import brought_home, is_outside_tolerances
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.effects import EFFECTS
 from hdopt.effects.declared import Shaft
@@ -80,6 +79,6 @@ def test_a_drive_that_is_far_out_stays(base):
 
 def test_what_is_at_home_stays(base, monkeypatch):
     """Without a fit. Fault caught: every drive fitted once more."""
-    monkeypatch.setattr(at_home, "_within", lambda *given: pytest.fail("fitted"))
+    monkeypatch.setattr(at_home, "fitted_within", lambda *given: pytest.fail("fitted"))
     fit = beside(problem_of(base, within()), within())
     assert home_of(fit) is fit

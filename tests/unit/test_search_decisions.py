@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from hdopt.diagnosis.inference import fit as fitting
+from hdopt.diagnosis.search import at_home, refinement, search_state, subset_search
 from hdopt.diagnosis.search import candidates as weighing
 from hdopt.diagnosis.search import completion as completing
 from hdopt.diagnosis.search import explore as exploring
-from hdopt.diagnosis.search import refinement, search_state, subset_search
 from hdopt.diagnosis.search.candidates import Candidate, RankedSubset
 from hdopt.diagnosis.search.search_state import SearchPlan, SearchState
 from hdopt.diagnosis.settings import DEFAULT
@@ -73,8 +73,9 @@ def weighed(monkeypatch):
     monkeypatch.setattr(search_state, "penalty_scale", lambda *about: "scale")
     monkeypatch.setattr(search_state, "FitProbe", lambda fit, keep=None, order_range=None: (fit, keep))
     monkeypatch.setattr(search_state, "search_terms", lambda probe, skip: [Effect("found beside")])
-    monkeypatch.setattr(completing, "is_far", lambda fit: np.array([False, fit.far]))
-    monkeypatch.setattr(completing, "beyond_tolerances", lambda fit, least: [fit.outside] * (fit.outside > least))
+    for module in (completing, at_home):
+        monkeypatch.setattr(module, "is_far", lambda fit: np.array([False, fit.far]))
+        monkeypatch.setattr(module, "beyond_tolerances", lambda fit, least: [fit.outside] * (fit.outside > least))
     for module in (subset_search, refinement, completing):
         monkeypatch.setattr(module, "is_acceptable", lambda fit: fit.may_be_said)
 
@@ -233,11 +234,19 @@ def no_waves(monkeypatch):
 @pytest.fixture
 def completion(monkeypatch, in_rows):
     """`of(first, *found)`: what is completed of a `first` candidate, where the terms `found` are seen beside it, and
-    the sets that were fitted, with whether they were from new drives; `waves` are the long ones of the teeth."""
+    the sets that were fitted, with whether they were from new drives; `waves` are the long ones of the teeth, `home`
+    what the first leaves beside a drive within its tolerances (None: none is found)."""
     fitted = []
 
-    def of(first, *found, known=(), waves=(), skip=()):
+    def of(first, *found, known=(), waves=(), skip=(), home=None):
         fitted.clear()
+
+        def fitted_within(fit, rng):
+            names = tuple(one.effect for one in fit.terms)
+            found = in_rows(0.0, names, 0.5 if home is None else home).fit
+            return replace(found, outside=SURELY + 1.0 if home is None else 0.0)
+
+        monkeypatch.setattr(completing, "fitted_within", fitted_within)
 
         def joint_fit(start, terms, rng=None):
             term = terms[-1]
@@ -436,6 +445,28 @@ def test_the_one_sine_that_brings_home_a_drive_surely_outside_completes_a_set(co
     begun = outside(in_rows(900.0, ("bearing",), 0.0), SURELY + 0.01)
     found = completion(begun, Beside("sine", -0.1, outside=0.99), known=(begun.fit,))
     assert [one.effects for one in found] == [("bearing", "sine"), ("bearing",)]
+    assert found[0].log_bayes_factor == pytest.approx(900.0 + 0.1 * ROWS / 2 - 3.0 - 0.01 * 3.0 * ROWS / 2)
+
+
+@pytest.mark.parametrize(
+    ("home", "pays"),
+    [(None, True), (0.04, True), (0.06, False), (0.5, False)],
+    ids=["no drive within", "no more than noise", "more", "far more"],
+)
+def test_what_is_left_beside_a_drive_at_home_is_no_misfit_of_a_shape(completion, in_rows, home, pays):
+    """The one sine that brings the drive home takes up all that is left without it beside a drive within its
+    tolerances. Faults caught: an eccentric input encoder given up for a drive twice outside its tolerances, beside a
+    windup whose shape was thought to leave it; one that pays nothing where no drive within is found."""
+    begun = outside(in_rows(900.0, ("bearing",), 0.0), SURELY + 0.01)
+    found = completion(begun, Beside("sine", -0.1, outside=0.99), known=(begun.fit,), home=home)
+    share = 0.01 * 3.0 * ROWS / 2 * pays
+    assert found[0].log_bayes_factor == pytest.approx(900.0 + 0.1 * ROWS / 2 - 3.0 - share)
+
+
+def test_what_brings_home_and_leaves_more_than_noise_pays_as_a_shape(completion, in_rows):
+    """Beside a drive at home half the noise is left above it, with the sine a fifth: the rest may be a misfit."""
+    begun = outside(in_rows(900.0, ("bearing",), 0.3), SURELY + 0.01)
+    found = completion(begun, Beside("sine", 0.2, outside=0.99), known=(in_rows(0.0, (), 0.0).fit,), home=0.5)
     assert found[0].log_bayes_factor == pytest.approx(900.0 + 0.1 * ROWS / 2 - 3.0 - 0.01 * 3.0 * ROWS / 2)
 
 

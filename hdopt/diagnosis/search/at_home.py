@@ -11,10 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from hdopt.diagnosis.inference.base_fit import fit_base
+from hdopt.diagnosis.inference.base_fit import beyond_tolerances, fit_base, is_far
 from hdopt.diagnosis.inference.descent import refine
 from hdopt.diagnosis.inference.fit import Fit, evaluate
-from hdopt.diagnosis.search.completion import is_outside_tolerances
+
+
+def is_outside_tolerances(fit: Fit) -> bool:
+    """Whether the drive in `fit` lies outside the tolerances of its kind: far, or surely."""
+    return bool(is_far(fit).any() or beyond_tolerances(fit, fit.problem.settings.base.surely_outside))
 
 
 def brought_home(fit: Fit, inflation: float, rng: np.random.Generator) -> Fit:
@@ -24,14 +28,14 @@ def brought_home(fit: Fit, inflation: float, rng: np.random.Generator) -> Fit:
     """
     if not is_outside_tolerances(fit):
         return fit
-    home = _within(fit, rng)
+    home = fitted_within(fit, rng)
     if (free := refine(home)).objective < home.objective and not is_outside_tolerances(free):
         home = free
     more = (home.objective - fit.objective) / home.problem.noise.sigma**2 / inflation
     return fit if more > fit.problem.settings.search.home_within or is_outside_tolerances(home) else home
 
 
-def _within(fit: Fit, rng: np.random.Generator) -> Fit:
+def fitted_within(fit: Fit, rng: np.random.Generator) -> Fit:
     """The best fit of the terms of `fit` beside a drive within the tolerances of its kind, on the same problem, from
     drives drawn by `rng`."""
     problem = fit.problem

@@ -3,11 +3,12 @@
 A set of effects pays a share of all that it explains for each effect (`search.penalty`): what an inexact shape leaves
 must not be named. So a delay that took the place of a friction and a delay leads these two, though it leaves what no
 noise does. A set that leaves more than noise, or whose drive lies far outside its tolerances, leaves physics out; where
-one plain effect more takes up nearly all of that, or brings the drive home, that is no misfit of a shape, which would
-be left beside it. Such sets do not pay for being inexact against the set that they complete. What many waves of the
-teeth leave of steps from tooth to tooth is a pulse, though: beside a term that bends to anything only sines of known
-orders and what does not turn with the drive complete a set. Beside terms that bend to nothing long waves of the teeth
-do too, where they take up most of what is left: the drive had taken up the rest of them.
+one plain effect more takes up nearly all of that, or brings the drive home and takes up nearly all that is left beside
+a drive at home, that is no misfit of a shape, which would be left beside it. Such sets do not pay for being inexact
+against the set that they complete. What many waves of the teeth leave of steps from tooth to tooth is a pulse, though:
+beside a term that bends to anything only sines of known orders and what does not turn with the drive complete a set.
+Beside terms that bend to nothing long waves of the teeth do too, where they take up most of what is left: the drive had
+taken up the rest of them.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from hdopt.diagnosis.inference.clean_base import long_waves
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.numerical import NORMAL_95, VARIANCE_OF_A_SQUARE
 from hdopt.diagnosis.search.acceptance import is_acceptable
+from hdopt.diagnosis.search.at_home import fitted_within, is_outside_tolerances
 from hdopt.diagnosis.search.candidates import (
     Candidate,
     from_new_drives,
@@ -113,15 +115,28 @@ def by_one_plain_effect(state: SearchState, first: Candidate) -> list[Candidate]
         home = []  # Several would do: none of them is told by that.
     inexact = not all(leaves_nothing(term) for term in fit.terms)
     share = inexact * state.scale.settings.other_kind * state.top_gain / state.inflation / 2
+    left_at_home = of_home(state, fit) if home and inexact else 0.0
     found = []
     for more in made:
         one = without_inexactness(state, first, state.weigh(more, state.top_gain))
-        if not fills(more):
+        came_home = any(more is fit_at_home for fit_at_home in home)
+        wanted_at_home = came_home and left_at_home > 0 and takes_up(more, left_at_home, state)
+        if not (fills(more) or wanted_at_home):
             one = replace(one, log_bayes_factor=one.log_bayes_factor - share)
-        completes = fills(more) or any(more is fit_at_home for fit_at_home in home)
-        if completes and may_come_first(one, first, state):
+        if (fills(more) or came_home) and may_come_first(one, first, state):
             found.append(one)
     return found
+
+
+def of_home(state: SearchState, fit: Fit) -> float:
+    """What the terms of `fit` leave above the noise, in noise variances, beside a drive within its tolerances: what
+    brings the drive home must take up that much, and is then no misfit of their shapes. 0 where that is no more than
+    noise, or no such drive is found. `state` is where the work stands; the draws are its own.
+    """
+    at_home = fitted_within(fit, copy.deepcopy(state.rng))
+    left = state.above_noise(at_home)
+    more_than_noise = left >= state.settings.leaves_more * state.scale.rows
+    return left if more_than_noise and not is_outside_tolerances(at_home) else 0.0
 
 
 def without_told(fit: Fit) -> list[Fit]:
@@ -149,11 +164,6 @@ def by_waves(state: SearchState, first: Candidate) -> list[Candidate]:
         if completes and may_come_first(one, first, state):
             found.append(one)
     return found
-
-
-def is_outside_tolerances(fit: Fit) -> bool:
-    """Whether the drive in `fit` lies outside the tolerances of its kind: far, or surely."""
-    return bool(is_far(fit).any() or beyond_tolerances(fit, fit.problem.settings.base.surely_outside))
 
 
 def brings_home(more: Fit, first: Candidate) -> bool:
