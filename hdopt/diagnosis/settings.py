@@ -484,7 +484,10 @@ class CyclicSettings:
     angles: int = threshold(36, "1/input turn", "choice: angles told apart, 10 deg each")
     rows_an_angle: float = threshold(1.0, "rows", "choice: rows of a turn at each angle from which angles are told")
     over_elsewhere: float = threshold(
-        2.0, "1", "choice: power of what is new at one angle, over that of a usual one, from which it counts"
+        2.5,
+        "1",
+        "choice: power of what is new at one angle, over that of a usual one; 20 clean recordings reach 1.90, of "
+        "three outsiders that arise at an angle the least has 6.5",
     )
 
 
