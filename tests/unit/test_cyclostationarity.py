@@ -11,6 +11,7 @@ from hdopt.diagnosis.checks.cyclostationarity import NOWHERE, ArisingAtAnAngle, 
 from hdopt.diagnosis.inference import noise as noise_model
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.orientation import Orientation
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.verdict import residual_structure
 from hdopt.effects.conditions import TURN
@@ -156,3 +157,12 @@ def test_clear_and_large_and_much_louder_than_elsewhere(change, said):
         assert residual_structure.arises_at_an_angle(seen)["rms_arcmin"] == pytest.approx(0.12)
         assert where["input_angle_deg"] == pytest.approx(PLACE_DEG)
         assert residual_structure.in_what_way(where) == ", new each turn and always at 123 deg of the input"
+
+
+def test_the_angle_is_that_of_the_recording_as_given():
+    """Of a recording that was fitted with its angles turned round 237 deg are 123. Fault caught: the angle at which
+    the hub is not, told to who marks it."""
+    seen = evidence(left_by(np.zeros(len(FORWARD))), seen_at(0.004))
+    seen.arising = ArisingAtAnAngle(rms=0.05, angle=np.radians(360 - PLACE_DEG), over_elsewhere=9.0, chance=1e-9)
+    seen.orientation = Orientation(input=-1, output=-1, decided_by="data")
+    assert residual_structure.arises_at_an_angle(seen)["input_angle_deg"] == pytest.approx(PLACE_DEG)

@@ -14,6 +14,7 @@ from hdopt.diagnosis.checks.step_detection import Steps
 from hdopt.diagnosis.checks.turn_by_turn import from_turn_to_turn
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.orientation import AS_COUNTED
 from hdopt.diagnosis.search.candidates import joint_fit
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.verdict import residual_structure
@@ -103,6 +104,7 @@ def evidence(fit, noise=NOISE):
         wave=None,
         steps=Steps(np.zeros(0, int), 0.0),
         arising=NOWHERE,
+        orientation=AS_COUNTED,
     )
 
 

@@ -17,6 +17,7 @@ from hdopt.diagnosis.search.candidates import Candidate, with_only
 from hdopt.diagnosis.verdict.named_effect import main_orders, share_of
 from hdopt.diagnosis.verdict.where import Where
 from hdopt.effects.tooth_mesh import ToothMesh
+from hdopt.recordings.read import TURN
 
 LISTED_DIGITS = 4
 """Digits of an order in the JSON."""
@@ -128,7 +129,9 @@ def arises_at_an_angle(evidence: Evidence) -> Where | None:
         return None
     beyond = evidence.extended_held_out.variance - evidence.sensors_noise**2
     rms = math.sqrt(max(beyond, found.rms**2))
-    return place("angle", [], rms, evidence) | {"input_angle_deg": math.degrees(found.angle)}
+    # As the recording counts, whichever way round it was fitted.
+    angle = -found.angle if evidence.orientation.turned else found.angle
+    return place("angle", [], rms, evidence) | {"input_angle_deg": math.degrees(angle % TURN)}
 
 
 def worth_a_word(evidence: Evidence) -> float:
