@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from hdopt.arrays import Array
+from hdopt.diagnosis.numerical import TINY
 from hdopt.diagnosis.settings import DEFAULT, AlternativeSettings
 from hdopt.effects.base import Explanation
 
@@ -11,3 +15,10 @@ class Alternative(Explanation):
 
     def __init__(self, settings: AlternativeSettings = DEFAULT.alternatives):
         self.settings = settings
+
+
+def of_largest(values: Array | None, n: int) -> Array:
+    """The `values` (n,) over the largest of them; zeros where there are none."""
+    if values is None:
+        return np.zeros(n)
+    return values / max(float(np.max(np.abs(values))), TINY)

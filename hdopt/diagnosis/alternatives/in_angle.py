@@ -15,15 +15,19 @@ from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Term
 
 
-class AnyOrder(Alternative):
-    """One sine, or three neighbours (a modulated sine), at any order."""
-
-    id = "_sine_in_angle"
-    domain = "asynchronous order"
+class OfOrder(Alternative):
+    """Something at an order, which takes some input turns to tell."""
 
     def lacks(self, samples: Conditions) -> str | None:
         least = self.settings.least_turns
         return None if samples.span_turns >= least else f"at least {least:g} input turns"
+
+
+class AnyOrder(OfOrder):
+    """One sine, or three neighbours (a modulated sine), at any order."""
+
+    id = "_sine_in_angle"
+    domain = "asynchronous order"
 
     def search(self, probe: Probe) -> list[Term]:
         s, rows = self.settings, probe.samples
@@ -61,15 +65,11 @@ class AnyOrder(Alternative):
         )
 
 
-class ChangingOrder(Alternative):
+class ChangingOrder(OfOrder):
     """A whole order, or a whole order of the flexspline, whose amplitude changes steadily over the recording."""
 
     id = "_changing_order"
     domain = "time"
-
-    def lacks(self, samples: Conditions) -> str | None:
-        least = self.settings.least_turns
-        return None if samples.span_turns >= least else f"at least {least:g} input turns"
 
     def search(self, probe: Probe) -> list[Term]:
         ratio = probe.samples.ratio

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.diagnosis.alternatives.base import Alternative
+from hdopt.diagnosis.alternatives.base import Alternative, of_largest
 from hdopt.diagnosis.alternatives.late import lagging, lags, within_reach
-from hdopt.diagnosis.numerical import TINY
 from hdopt.effects.base import terms_at
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.probe import Probe, best_terms
@@ -103,10 +102,3 @@ class LoadInMotion(UnderLoad):
         changes = bool(np.std(size) > self.settings.speed_levels * np.max(size))
         reverses = samples.reverses and not samples.locked
         return reverses, changes, changes and reverses
-
-
-def of_largest(values: Array | None, n: int) -> Array:
-    """The `values` (n,) over the largest of them; zeros where there are none."""
-    if values is None:
-        return np.zeros(n)
-    return values / max(float(np.max(np.abs(values))), TINY)

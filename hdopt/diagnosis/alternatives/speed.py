@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.diagnosis.alternatives.base import Alternative
+from hdopt.diagnosis.alternatives.base import Alternative, of_largest
 from hdopt.diagnosis.alternatives.late import lagging, lags, within_reach
 from hdopt.effects.base import terms_at
 from hdopt.effects.conditions import Conditions
@@ -40,8 +40,8 @@ class EvenSpeed(Alternative):
 
     def term(self, samples: Conditions, shape: Mapping[str, float], base_value: Array | None = None) -> Term:
         s, kept = self.settings, dict(shape)
-        own = np.zeros(len(samples)) if samples.speed is None else np.abs(samples.speed)
-        column, steps, trials = (own / np.max(own)) ** shape["power"], {}, s.speed_forms
+        own = np.abs(of_largest(samples.speed, len(samples)))
+        column, steps, trials = own ** shape["power"], {}, s.speed_forms
         if "lag_s" in shape:
             kept["lag_s"] = within_reach(samples, shape["lag_s"], s)
             column = lagging(samples, column, kept["lag_s"])
