@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from test_cross_validation import TURN, noisy
+from test_cross_validation import TURN, noisy, rows_of
 
 from hdopt.diagnosis import diagnose
 from hdopt.diagnosis.inference.catalogue import explanations
@@ -20,7 +20,7 @@ from hdopt.diagnosis.search.high_order import left_as_recorded
 from hdopt.effects import EFFECTS
 from hdopt.effects.declared import Shaft
 from hdopt.effects.local_tooth_defect import Seat
-from hdopt.kinematics.cartesian import CartesianModel
+from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
 from hdopt.kinematics.waveform import kinematic_error_arcmin
 from hdopt.recordings.read import recording_from_table
 from hdopt.study import load_study
@@ -59,8 +59,9 @@ def fit_with(problem, study, *weighed):
 
 
 def test_which_effects_move_the_angle_as_read():
-    """What turns with the input's encoder or its coupling, of all examples of all effects. Faults caught: one of the
-    three that is forgotten, the output's lines or coupling taken for the input's, an effect of the drive for either.
+    """What turns with the input's encoder or its coupling, and a delay, of all examples of all effects. Faults caught:
+    one of the four that is forgotten, the output's lines or coupling taken for the input's, an effect of the drive for
+    any of them.
     """
     gear = load_study(drive="csf-25-80").drive.geometry
     moving = set()
@@ -70,8 +71,8 @@ def test_which_effects_move_the_angle_as_read():
             shape, _ = effect.values({**defaults, **keys}, gear)
             if effect.reads_input(shape):
                 moving.add(effect.id)
-                assert shape["shaft"] == Shaft.INPUT
-    assert moving | {"encoder_interpolation"} == set(SINES)
+                assert shape.get("shaft", Shaft.INPUT) == Shaft.INPUT
+    assert moving | {"encoder_interpolation"} == {*SINES, "channel_delay"}
     lines = EFFECTS["encoder_interpolation"]
     assert lines.reads_input(SINES["encoder_interpolation"])
     assert not lines.reads_input({"shaft": Shaft.OUTPUT, "lines": 500, "cycles": (1,)})
@@ -167,6 +168,24 @@ def test_a_narrow_pulse_is_fitted_where_it_was_met(study):
     assert np.std(fit.residual) < 1e-4
     assert fit.coefficients[0] == pytest.approx([0.004], rel=2e-3)
     assert fit.coefficients[1] == pytest.approx([0.14, 0.14], rel=2e-3)
+
+
+@pytest.mark.parametrize("name", ["channel_delay", "_skew"])
+def test_a_delay_is_an_error_of_the_reading(study, name):
+    """The input turns both ways at two speeds, and the output is read 2 ms before it, or by as much more as time goes
+    on: at 40 rad/s the drive stood 4.6 deg back. Each pair is the drive's own at the moment of the output. Faults
+    caught: the drive at the angle as read, that of a moment as long after, a delay that grows and is not counted."""
+    speed = np.repeat([10.0, -10.0, 40.0, -40.0, 20.0, -20.0], 500)
+    time = np.arange(len(speed)) * 0.005
+    theta = np.cumsum(speed) * 0.005
+    delay, coefficient = (0.002, 2.0) if name == "channel_delay" else (1e-4 * time, 1e-4)
+    base = CartesianModel.of(study.drive)
+    own = to_cartesian(study.errors, base.half_width)
+    error = base.evaluate_at(base.rotation(theta - speed * delay), own)[0] + speed * delay / RATIO / ARCMIN
+    rows = replace(rows_of(error), theta=theta, speed=speed, time=time)
+    term = explanations()[name].term(rows, {})
+    fit = evaluate(problem_of(rows, base), own, np.zeros(1), [term], [np.array([coefficient])])
+    np.testing.assert_allclose(fit.residual, 0, atol=1e-9)
 
 
 def recorded(rows, error):

@@ -52,6 +52,9 @@ class Skew(Alternative):
         varies = float(np.std(samples.speed)) >= self.settings.speed_levels * float(np.max(np.abs(samples.speed)))
         return None if varies else "speed that varies"
 
+    def reads_input(self, shape: Shape) -> bool:
+        return True
+
     def search(self, probe: Probe) -> list[Term]:
         return [self.term(probe.samples, {})]
 

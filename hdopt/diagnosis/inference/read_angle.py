@@ -3,7 +3,8 @@
 An input encoder whose error is e(theta) shows e/N of it at the output, and the drive stands at theta - e where theta is
 read. An error of 0.1 arcmin at the output is 0.1 N arcmin at the input, 5 mrad at N = 160: nothing to a wave an input
 turn, but a third of the width of a damaged tooth's pulse, and 90 deg of a ripple that has 322 waves. What is fitted at
-the angles as read comes out too small, and the drive's own errors bend to make up for it.
+the angles as read comes out too small, and the drive's own errors bend to make up for it. An input that is read
+before the output or after it, at the speed it has, is read wrong by as much in the same way.
 """
 
 from __future__ import annotations
