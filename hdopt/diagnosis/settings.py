@@ -172,6 +172,7 @@ class NoiseSettings:
     first_share: float = threshold(0.3, "1", "choice: first guess of the noise over all that varies")
     smallest_arcmin: float = threshold(1e-9, "arcmin", "choice: first guess for a record without any variation")
     smallest_weight: float = threshold(1e-6, "1", "choice: root weight of rows without a past")
+    bands: int = threshold(32, "1", "choice: bands of the spectrum in which noise between lines is measured")
 
 
 @dataclass(frozen=True)
@@ -445,6 +446,9 @@ class HighOrderSettings:
         "theorem: orders from one to two times the lowest, of falling power, spread by 0.1 to 0.2 of their middle",
     )
     noise_lines: int = threshold(6, "1", "choice: lines taken out before the noise is measured")
+    between_lines: float = threshold(
+        0.8, "1", "choice: noise between all lines over what the strongest leave, below which there are many lines"
+    )
     order_share: float = threshold(0.49, "1", "theorem: below half the rows a turn an order is sampled (Nyquist)")
     beside: float = threshold(
         0.01, "1", "choice: power over the high orders' from which their names are looked at anew"

@@ -40,7 +40,7 @@ from hdopt.diagnosis.state import State
 from hdopt.effects.sines import sine_columns
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import Recording
-from hdopt.recordings.rows import gather, neighbours_for
+from hdopt.recordings.rows import gather, neighbours_for, row_of_each_sample
 
 
 def begin(
@@ -381,13 +381,16 @@ def search_without_ripple(state: State) -> State:
     cleaned = subtract(state.recordings, state.ripple)
     rows = gather(cleaned, neighbours_for(cleaned))
     problem = replace(state.problem, rows=rows, nuisance=state.nuisances.columns(rows))
-    base = refine(on_problem(state.base, problem), settings.fit.known_iterations)
-    measured = measure_noise(base if not before.effects else on_problem(before.fit, problem))
+    ripple = state.high.best.fit
+    base = lowest_of_both_drives(on_problem(state.base, problem), ripple)
+    found = base if not before.effects else lowest_of_both_drives(on_problem(before.fit, problem), ripple)
+    measured = measure_noise(found)
     base = refine(on_problem(base, problem.with_noise(measured.noise)), settings.fit.settled_iterations)
+    leaders = leaders_on(state.selection, base.problem)
     plan = SearchPlan(
         skip=state.ruled_out,
-        known=leaders_on(state.selection, base.problem),
-        subtracted=subtracted_terms(base, float(np.var(state.ripple)), state.high.best.fit.terms),
+        known=(*leaders, *at_drive_of(ripple, leaders)),
+        subtracted=subtracted_terms(base, power_in_rows(state.ripple, ripple, cleaned), ripple.terms),
     )
     selection = select(base, measured.inflation, rng, plan)
     state = replace(state.found(selection), inflation=measured.inflation, rng=rng)
@@ -398,6 +401,36 @@ def search_without_ripple(state: State) -> State:
         high, _ = ripple_beside_selection(state, rng)
         state = state if stands(state.high, high) else replace(state, high=high)
     return state
+
+
+def power_in_rows(adds: Array, ripple: Fit, recordings: Sequence[Recording]) -> float:
+    """The power (arcmin^2) of what the terms of a `ripple` may leave in the rows of `recordings`, to whose samples they
+    add so much (`adds`, (N,)): inside the zones as much as the means of samples hold of it. Beside them it may lift the
+    zones by as much as it is large, which no sine of it does.
+    """
+    if ripple.problem.base is None:
+        return float(np.var(adds))
+    row = row_of_each_sample(recordings, neighbours_for(recordings))
+    return float(np.var(np.bincount(row, adds) / np.bincount(row)))
+
+
+def at_drive_of(ripple: Fit, fits: Sequence[Fit]) -> tuple[Fit, ...]:
+    """`fits` at the drive beside which a `ripple` was fitted inside the zones, with the offsets that they want there:
+    without the ripple the drive was bent to what it does to the zones. None for a ripple beside them.
+    """
+    if ripple.problem.base is None:
+        return ()
+    there = (evaluate(one.problem, ripple.errors, one.offsets, one.terms, one.coefficients) for one in fits)
+    return tuple(with_offsets(one) for one in there)
+
+
+def lowest_of_both_drives(fit: Fit, ripple: Fit) -> Fit:
+    """The way down of `fit` from where it is, or from the drive beside which a `ripple` was fitted inside the zones,
+    whichever leaves less.
+    """
+    iterations = fit.problem.settings.fit.known_iterations
+    starts = (fit, *at_drive_of(ripple, [fit]))
+    return min((refine(start, iterations) for start in starts), key=lambda one: one.objective)
 
 
 def stands(before: Selection | None, anew: Selection | None) -> bool:

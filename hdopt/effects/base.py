@@ -36,6 +36,8 @@ class Explanation(ABC):
     """Whether its columns are known to the last digit, so that nothing of it is left for another to explain."""
     leaves_nothing: ClassVar[bool] = False
     """Whether it reaches no orders but its own."""
+    sudden: ClassVar[bool] = False
+    """Whether it happens within a few rows, so that it may be sharper than the shape that is fitted to it."""
     has_parts: ClassVar[bool] = False
     """Whether `every_part_shows` asks anything."""
     excites: ClassVar[bool] = False

@@ -39,6 +39,7 @@ class Hysteresis(Effect):
     id = "hysteresis"
     place = 50
     domain = "reversal"
+    sudden = True
     has_parts = True
     shifts_one_way = True
     separating = (

@@ -76,6 +76,7 @@ class LocalToothDefect(Effect):
     id = "local_tooth_defect"
     place = 150
     domain = "angle"
+    sudden = True
     excites = True
     same_each_time = True
     needs_strain_wave = True

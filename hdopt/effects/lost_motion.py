@@ -41,6 +41,7 @@ class LostMotion(Effect):
     id = "lost_motion"
     place = 60
     domain = "reversal"
+    sudden = True
     shifts_one_way = True
     separating = "reverse slowly at several input angles and speeds: play steps at once, and alike at every speed"
     declared = (

@@ -74,27 +74,24 @@ def test_what_was_taken_out_gained_its_power_in_every_row():
 
 @pytest.fixture
 def searched(monkeypatch):
-    """The search of high orders, where averaged rows were explained by a rough term of 2 arcmin^2 and an exact one:
-    what it was asked, by the power that both explain together and the lines that stand out."""
+    """The search of high orders, where averaged rows were explained by a rough term that may leave 2 arcmin^2 there and
+    an exact one: what it was asked, by the power that both explain together."""
 
     class AveragedRows(SimpleNamespace):
         def __len__(self):
             return 2
 
-    def of(together=9.0, lines=(30.0,), lowest=None, averaged=True):
+    def of(together=9.0, lowest=None, averaged=True):
         seen = SimpleNamespace()
         rows = AveragedRows(locked=False, are_averages=averaged, rows_per_turn=400.0, highest_order=20.0)
         terms = (SimpleNamespace(rough=True), SimpleNamespace(rough=False))
-        sizes = [np.array([-1.0, 1.0]) * np.sqrt(2.0), np.array([-5.0, 5.0])]
 
         class Problem(SimpleNamespace):
             def with_noise(self, noise):
                 return Problem(**{**vars(self), "noise": noise})
 
         problem = Problem(rows=rows, settings=DEFAULT, noise="first guess")
-        low = SimpleNamespace(
-            problem=problem, terms=terms, residual=np.zeros(2), contribution=lambda i: sizes[i], offsets=None
-        )
+        low = SimpleNamespace(problem=problem, terms=terms, residual=np.zeros(2), offsets=None)
         base = SimpleNamespace(residual=np.array([-1.0, 1.0]) * np.sqrt(together))
         found = SimpleNamespace(best=SimpleNamespace(fit=low), base=base)
 
@@ -105,13 +102,17 @@ def searched(monkeypatch):
             seen.plan, seen.noise = plan, bare.problem.noise
             return "a selection"
 
-        monkeypatch.setattr(high_order, "left_as_recorded", lambda *about: problem)
+        def power_left(fit, which, lowest):
+            assert (fit, which) == ("as recorded", [0])
+            seen.from_order = lowest
+            return 2.0
+
+        monkeypatch.setattr(high_order, "on_rows_as_recorded", lambda *about: "as recorded")
+        monkeypatch.setattr(high_order, "left_of", lambda fit: problem if fit == "as recorded" else None)
+        monkeypatch.setattr(high_order, "noise_beside_lines", lambda bare, orders: (bare.problem.noise, orders))
+        monkeypatch.setattr(high_order, "power_left", power_left)
         monkeypatch.setattr(high_order, "evaluate", evaluate)
         monkeypatch.setattr(high_order, "refine", lambda fit, iterations: fit)
-        monkeypatch.setattr(high_order, "FitProbe", lambda fit: fit)
-        monkeypatch.setattr(high_order, "strongest_orders", lambda *about, **limits: list(lines))
-        monkeypatch.setattr(high_order, "waves_of", lambda rows, values, orders: 0.75 * values)
-        monkeypatch.setattr(high_order.noise_model, "estimate", lambda rows, left, settings: np.std(left))
         monkeypatch.setattr(high_order, "leaves_nothing", lambda term: not term.rough)
         monkeypatch.setattr(high_order, "subtracted_terms", lambda fit, power, terms: (power, list(terms)))
         monkeypatch.setattr(high_order, "select", select)
@@ -129,9 +130,9 @@ def test_high_orders_are_searched_by_what_is_of_high_order(searched):
     assert plan.order_range == (20.0, DEFAULT.high_order.order_share * 400.0)
 
 
-def test_a_strong_ripple_is_no_noise_of_the_rows_as_recorded(searched):
-    assert searched().noise == pytest.approx(1.0)
-    assert searched(lines=()).noise == pytest.approx(4.0)
+def test_high_orders_are_searched_in_the_noise_beside_lines(searched):
+    """Faults caught: the first guess kept, or the noise beside other orders than those that are searched."""
+    assert searched().noise == ("first guess", (20.0, DEFAULT.high_order.order_share * 400.0))
 
 
 def test_what_rough_shapes_explained_may_come_back_as_high_orders(searched):
@@ -140,6 +141,7 @@ def test_what_rough_shapes_explained_may_come_back_as_high_orders(searched):
     for together, power in ((9.0, 2.0), (0.5, 0.5)):
         seen = searched(together)
         assert seen.plan.subtracted == (pytest.approx(power), [seen.rough])
+        assert seen.from_order == 20.0
 
 
 def test_a_ripple_found_in_the_zones_adds_what_it_adds_there(monkeypatch):

@@ -344,10 +344,11 @@ def test_a_base_beside_waves_is_made_from_the_clean_one(monkeypatch):
 
 @pytest.fixture
 def without_ripple(monkeypatch):
-    """`of(effects before, effects after, power of the best)`: what was measured, the plan, the state after."""
+    """`of(effects before, effects after, power of the best, what is left at the ripple's drive)`: what was measured,
+    the plan, the base it was for, the state after. From where they are all fits leave 1."""
 
-    def of(before, after, size):
-        seen = SimpleNamespace(measured=[], plans=[], again=0)
+    def of(before, after, size, there=2.0):
+        seen = SimpleNamespace(measured=[], plans=[], again=0, bases=[])
         terms = tuple(SimpleNamespace(effect=name) for name in before)
         high = selection_of(Told("high", terms=("a ripple's term",)))
         first = Told("first", terms=terms)
@@ -359,11 +360,20 @@ def without_ripple(monkeypatch):
 
         def select(base, inflation, rng, plan):
             seen.plans.append(plan)
+            seen.bases.append(base.name)
             return Selection(base, (Candidate(best, 0.0, 0.0),), inflation)
 
         def find(*about):
             seen.again += 1
             return high, None
+
+        def at_drive_of(ripple, fits):
+            assert ripple is high.best.fit
+            return tuple(replace(one, name=f"{one.name} there", objective=there) for one in fits)
+
+        def power_in_rows(adds, ripple, recordings):
+            assert ripple is high.best.fit
+            return float(np.var(adds))
 
         monkeypatch.setattr(stages, "subtract", lambda recordings, ripple: recordings)
         monkeypatch.setattr(stages, "gather", lambda recordings, neighbours: SimpleNamespace(locked=False))
@@ -373,6 +383,8 @@ def without_ripple(monkeypatch):
         monkeypatch.setattr(stages, "measure_noise", measure)
         monkeypatch.setattr(stages, "select", select)
         monkeypatch.setattr(stages, "stands", lambda before, anew: False)
+        monkeypatch.setattr(stages, "at_drive_of", at_drive_of)
+        monkeypatch.setattr(stages, "power_in_rows", power_in_rows)
         monkeypatch.setattr(stages, "find_ripple", find)
         monkeypatch.setattr(stages, "subtracted_terms", lambda base, power, terms: (power, terms))
         ripple = np.array([-2.0, 2.0])
@@ -391,6 +403,15 @@ def test_freed_of_a_ripple_the_rest_is_searched_in_its_own_noise(without_ripple)
     assert seen.plans[0].subtracted == (4.0, ("a ripple's term",))
     assert seen.after.inflation == 6.0
     assert without_ripple((), (), 3.0).measured == ["base"]
+
+
+def test_freed_of_a_ripple_the_search_knows_the_drive_beside_which_it_was_fitted(without_ripple):
+    """Of both drives that which leaves less, for the base and for what the noise is measured beside; what is known, at
+    both. Faults caught: one drive alone for either, the worse of them."""
+    for there, name in ((2.0, ""), (0.5, " there")):
+        seen = without_ripple(("hysteresis",), ("hysteresis",), 3.0, there)
+        assert (seen.measured, seen.bases) == ([f"first{name}"], [f"base{name}"])
+        assert [fit.name for fit in seen.plans[0].known] == ["first", "first there"]
 
 
 def test_a_ripple_is_named_anew_where_what_stands_beside_it_is_another(without_ripple):

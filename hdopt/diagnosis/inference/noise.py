@@ -7,6 +7,7 @@ in the residual must stay visible.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
@@ -137,6 +138,25 @@ def estimate(rows: Rows, residual: Array, settings: NoiseSettings = DEFAULT.nois
     return Noise(ar, float(np.sqrt(np.sum(white**2) / max((noise.root_weight > 0).sum(), 1))), noise.root_weight)
 
 
+def beneath_lines(rows: Rows, residual: Array, settings: NoiseSettings = DEFAULT.noise) -> Noise:
+    """AR noise of `rows` from a `residual` (n,), arcmin, in which many narrow lines stand: by its power between them.
+    In each of some bands that is the median of the periodogram over log 2, whatever lines take less than half of the
+    band (of noise a power has an exponential distribution, whose median is log 2 of its mean). `settings` are the
+    thresholds.
+    """
+    n = len(residual)
+    power = np.abs(np.fft.rfft(residual))[1:] ** 2 / n
+    bands = np.array_split(power, min(settings.bands, len(power)))
+    level = np.concatenate([np.full(len(band), np.median(band)) for band in bands]) / math.log(2)
+    lags = _highest_order(rows.piece, settings) + 1
+    covariance = np.fft.irfft(np.r_[level[0], level], 2 * len(level))[:lags]
+    ar = autoregression(covariance, n, settings)
+    filtered_by = np.r_[1.0, -without_lines(ar, settings.largest_oscillating_pole)]
+    apart = np.arange(len(filtered_by))
+    variance = filtered_by @ covariance[np.abs(apart[:, None] - apart)] @ filtered_by
+    return Noise(-filtered_by[1:], math.sqrt(max(float(variance), TINY)), weights_with_a_past(rows, len(ar)))
+
+
 def predictable_share(rows: Rows, residual: Array, settings: NoiseSettings = DEFAULT.noise) -> float:
     """Share of the power of a `residual` (n,) that the `rows` before tell, by an autoregression of the order that
     Schwarz's criterion prefers: 0 for white noise. `settings` are the thresholds.
@@ -159,13 +179,18 @@ def weights_with_a_past(rows: Rows, order: int) -> Array:
 def _covariance(piece: Index, residual: Array, settings: NoiseSettings) -> Array:
     """Mean products of `residual` (n,) with itself some rows later, over no gap between the contiguous `piece`s."""
     n = len(residual)
-    highest = int(min(settings.highest_order, np.bincount(piece).max() // settings.rows_a_lag))
+    highest = _highest_order(piece, settings)
     covariance = np.empty(highest + 1)
     for lag in range(highest + 1):
         same = piece[lag:] == piece[: n - lag]
         products = residual[lag:][same] * residual[: n - lag][same]
         covariance[lag] = products.mean() if len(products) else 0.0
     return covariance
+
+
+def _highest_order(piece: Index, settings: NoiseSettings) -> int:
+    """The longest memory that rows of these contiguous `piece`s (n,) can tell."""
+    return int(min(settings.highest_order, np.bincount(piece).max() // settings.rows_a_lag))
 
 
 def autoregression(covariance: Array, rows: int, settings: NoiseSettings = DEFAULT.noise) -> Array:

@@ -12,14 +12,19 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.diagnosis.alternatives.in_angle import AnyOrder
 from hdopt.diagnosis.alternatives.in_time import Mains
-from hdopt.diagnosis.inference import noise as noise_model
 from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.descent import refine
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, with_terms
-from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.inference.fit import Fit, evaluate, with_terms
 from hdopt.diagnosis.inference.nuisance import Nuisances
-from hdopt.diagnosis.inference.read_angle import where_it_stood
 from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.search.as_recorded import (
+    left_as_recorded,
+    left_of,
+    noise_beside_lines,
+    on_rows_as_recorded,
+    power_left,
+    waves_of,
+)
 from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.penalty import SubtractedTerms, leaves_nothing
 from hdopt.diagnosis.search.search_state import SearchPlan
@@ -28,7 +33,6 @@ from hdopt.diagnosis.search.zone_high_order import ZoneRipple, fit_in_zones, lea
 from hdopt.diagnosis.settings import DEFAULT, HighOrderSettings
 from hdopt.effects import EFFECTS, HIGH_ORDER
 from hdopt.effects.probe import strongest_orders
-from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Term
 from hdopt.recordings.read import Recording
 from hdopt.recordings.rows import Rows, gather
@@ -110,50 +114,23 @@ def high_order_selection(
     averaged = low.problem.rows
     if averaged.locked or not (averaged.are_averages or lowest is not None):
         return None
-    problem = left_as_recorded(recordings, low, nuisances)
-    raw = problem.rows
-    settings = problem.settings
+    as_recorded = on_rows_as_recorded(recordings, low, nuisances)
+    problem = left_of(as_recorded)
+    raw, settings = problem.rows, problem.settings
     above, highest = ripple_orders(averaged, raw, settings.high_order)
     lowest = above if lowest is None else lowest
     orders = (lowest, highest)
     start = evaluate(problem, np.zeros(0), np.zeros(1), (), ())
     bare = refine(start, settings.fit.offset_iterations)
-    noise = noise_model.estimate(raw, bare.residual, settings.noise)
-    # A strong ripple must not be taken for noise: its strongest lines are taken out before the noise is measured.
-    lines = strongest_orders(FitProbe(bare), settings.high_order.noise_lines, lowest=lowest, highest=highest)
-    if lines:
-        left = bare.residual - waves_of(raw, bare.residual, lines)
-        noise = noise_model.estimate(raw, left, settings.noise)
+    noise = noise_beside_lines(bare, (lowest, highest))
     bare = evaluate(problem.with_noise(noise), np.zeros(0), bare.offsets, (), ())
     low_effects = (*ruled_out, *(e for e in explanations() if e not in HIGH_ORDER and e not in (AnyOrder.id, Mains.id)))
-    # What a pulse or a loop leaves where its shape is not quite right reaches into these orders too.
     rough = [i for i, term in enumerate(low.terms) if not leaves_nothing(term)]
-    power = float(np.var(sum((low.contribution(i) for i in rough), np.zeros(len(averaged)))))
+    power = power_left(as_recorded, rough, lowest)
     # A term may be large only against a bent base: what both explain together is what counts.
     power = min(power, max(float(np.var(found.base.residual) - np.var(low.residual)), 0.0))
     taken = subtracted_terms(bare, power, [low.terms[i] for i in rough])
     return select(bare, 1.0, rng, SearchPlan(skip=low_effects, order_range=orders, subtracted=taken))
-
-
-def left_as_recorded(recordings: Sequence[Recording], fit: Fit, nuisances: Nuisances) -> FitProblem:
-    """What `fit`, made on averaged rows, leaves of the rows as recorded, at the input angles at which by it the drive
-    stood: a problem with an offset alone beside it. `recordings` are those diagnosed. `nuisances` are the columns that
-    are always free.
-    """
-    raw, old = gather(recordings), fit.problem
-    problem = replace(old, rows=raw, nuisance=nuisances.columns(raw), noise=Noise.white(raw, 1.0))
-    base_value = np.zeros(len(raw)) if old.base is None else old.base.evaluate_at(problem.rotation, fit.errors)[0]
-    terms = [problem.explanations[t.effect].term(raw, t.shape, base_value) for t in fit.terms]
-    anew = evaluate(problem, fit.errors, fit.offsets, terms, fit.coefficients)
-    left = replace(where_it_stood(raw, anew.ahead), error=anew.residual)
-    noise = Noise.white(left, float(np.std(left.error)))
-    return FitProblem(left, None, np.ones((len(left), 1)), noise, settings=old.settings)
-
-
-def waves_of(rows: Rows, values: Array, orders: Sequence[float]) -> Array:
-    """The sines of `orders` (cycles an input turn of `rows`) in `values` (n,), together, (n,)."""
-    columns = sine_columns(rows.theta, orders)
-    return columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
 
 
 def ripple_orders(averaged: Rows, raw: Rows, settings: HighOrderSettings = DEFAULT.high_order) -> tuple[float, float]:

@@ -1,0 +1,53 @@
+"""Beside a ripple that the zones meet: the drive there, and what the ripple may leave in averaged rows."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from test_cross_validation import TURN, noisy
+
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate
+from hdopt.diagnosis.inference.noise import Noise
+from hdopt.diagnosis.stages import at_drive_of, power_in_rows
+from hdopt.kinematics.cartesian import CartesianModel
+from hdopt.recordings.read import recording_from_table
+from hdopt.recordings.rows import neighbours_for
+from hdopt.study import load_study
+
+SIZE = 0.05
+
+
+def test_a_fit_goes_to_the_drive_of_the_ripple_with_its_own_terms():
+    """Faults caught: the drive as it was, the offset of the other drive kept, terms or coefficients lost, a drive taken
+    from a ripple beside the zones, which has none."""
+    rows = noisy(6)
+    problem = FitProblem(
+        rows, CartesianModel.of(load_study(drive="csf-25-80").drive), np.ones((len(rows), 1)), Noise.white(rows, 0.02)
+    )
+    term = problem.explanations["output_coupling"].term(rows, {"shaft": "output", "orders": (2,)})
+    fit = evaluate(problem, 0.5 * problem.prior, np.array([3.0]), [term], [np.array([0.1, -0.2])])
+    ripple = SimpleNamespace(problem=problem, errors=-0.3 * problem.prior)
+    (there,) = at_drive_of(ripple, [fit])
+    np.testing.assert_array_equal(there.errors, ripple.errors)
+    np.testing.assert_array_equal(there.coefficients[0], [0.1, -0.2])
+    assert there.terms == (term,)
+    assert np.mean(there.residual) == pytest.approx(0, abs=1e-9)
+    beside = SimpleNamespace(problem=SimpleNamespace(base=None), errors=np.zeros(0))
+    assert at_drive_of(beside, [fit]) == ()
+
+
+@pytest.mark.parametrize(("base", "power"), [("a base", 0.0), (None, SIZE**2 / 2)])
+def test_a_ripple_in_the_zones_leaves_what_the_means_of_samples_hold_of_it(base, power):
+    """A wave that the means of samples take out. Faults caught: its power in the samples counted inside the zones, or
+    in their means beside the zones, where what it does to these is no part of it."""
+    theta = np.arange(60000) * TURN / 1500
+    frame = {"input_angle_deg": np.degrees(theta), "output_angle_deg": np.degrees(theta) / 80}
+    recordings = [recording_from_table(pd.DataFrame(frame), 80.0)]
+    count = neighbours_for(recordings)
+    assert count > 2
+    wave = SIZE * np.sin(TURN * np.arange(len(theta)) / count)
+    ripple = SimpleNamespace(problem=SimpleNamespace(base=base))
+    assert power_in_rows(wave, ripple, recordings) == pytest.approx(power, abs=1e-9)
+    slow = np.sqrt(2) * SIZE * np.sin(theta)
+    assert power_in_rows(slow, ripple, recordings) == pytest.approx(SIZE**2, rel=1e-2)
