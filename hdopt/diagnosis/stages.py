@@ -21,7 +21,7 @@ from hdopt.diagnosis.inference.clean_base import (
 )
 from hdopt.diagnosis.inference.common_slope import TakenSlope, common_slope, input_is_off
 from hdopt.diagnosis.inference.descent import refine
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, with_terms
 from hdopt.diagnosis.inference.generic_basis import generic_columns
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.normal_equations import least_squares
@@ -389,7 +389,7 @@ def search_without_ripple(state: State) -> State:
     leaders = leaders_on(state.selection, base.problem)
     plan = SearchPlan(
         skip=state.ruled_out,
-        known=(*leaders, *at_drive_of(ripple, leaders)),
+        known=(*leaders, *at_drive_of(ripple, leaders), *each_left_out(leaders[:1], ripple)),
         subtracted=subtracted_terms(base, power_in_rows(state.ripple, ripple, cleaned), ripple.terms),
     )
     selection = select(base, measured.inflation, rng, plan)
@@ -422,6 +422,14 @@ def at_drive_of(ripple: Fit, fits: Sequence[Fit]) -> tuple[Fit, ...]:
         return ()
     there = (evaluate(one.problem, ripple.errors, one.offsets, one.terms, one.coefficients) for one in fits)
     return tuple(with_offsets(one) for one in there)
+
+
+def each_left_out(leaders: Sequence[Fit], ripple: Fit) -> list[Fit]:
+    """The sets with one term less than each of `leaders`, at whichever drive leaves less, its own or that beside which
+    a `ripple` was fitted: one of them may have stood for what the ripple does.
+    """
+    lowest = [min((one, *at_drive_of(ripple, [one])), key=lambda fit: fit.objective) for one in leaders]
+    return [with_terms(one, one.all_but(at)) for one in lowest if len(one.terms) > 1 for at in range(len(one.terms))]
 
 
 def lowest_of_both_drives(fit: Fit, ripple: Fit) -> Fit:

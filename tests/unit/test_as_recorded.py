@@ -7,10 +7,10 @@ import pytest
 from test_cross_validation import RATE, TURN, noisy, rows_of, without_base
 
 from hdopt.diagnosis.inference import noise as noise_model
-from hdopt.diagnosis.inference.catalogue import OUTSIDE, explanations
+from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise, beneath_lines
-from hdopt.diagnosis.search.as_recorded import is_sudden, noise_beside_lines, power_left
+from hdopt.diagnosis.search.as_recorded import noise_beside_lines, power_left, power_of_steps
 from hdopt.effects import EFFECTS
 from hdopt.effects.term import Term
 
@@ -80,28 +80,60 @@ def test_many_lines_are_no_noise_and_few_are_taken_out():
 
 
 def test_which_happens_suddenly():
-    """Of all that may be named, loops and pulses; and whatever has no physics. Faults caught: one forgotten, a delay or
-    waves of the teeth taken for sudden, a description that is not."""
-    sudden = {name for name in explanations() if is_sudden(Term(name, {}, columns=np.ones((1, 1))))}
-    assert sudden & set(EFFECTS) == {"hysteresis", "lost_motion", "local_tooth_defect"}
-    assert sudden - set(EFFECTS) == OUTSIDE
+    """Of all that may be named, loops and pulses. Faults caught: one forgotten, a delay or waves of the teeth taken for
+    sudden."""
+    assert {name for name, one in EFFECTS.items() if one.sudden} == {"hysteresis", "lost_motion", "local_tooth_defect"}
+    assert not any(one.sudden for name, one in explanations().items() if name not in EFFECTS)
 
 
-def test_what_a_shape_may_leave_at_high_orders():
-    """A delay of 1 arcmin^2 with a ripple of order 12 in the speed, 0.02 arcmin^2, may leave that from order 10 on, and
-    nothing from order 13 on; a loop of 4 arcmin^2 all of it. Faults caught: the whole power of either, half of the
-    spectrum's, an order of the wrong row rate, terms that were not asked for."""
+SLOW, LOOP = 0, 1
+TURNS_A_LOOP = 4
+
+
+@pytest.fixture(scope="module")
+def low():
+    """A delay of 1 arcmin^2 with a ripple of order 12 in the speed, 0.02 arcmin^2, a loop of 4 arcmin^2 that is crossed
+    in a tenth of a turn, a step of 1 arcmin, and a drift that nobody asks for."""
     rows = noisy(20)
     problem = FitProblem(rows, None, np.ones((len(rows), 1)), Noise.white(rows, SIGMA))
     slow = np.sqrt(2) * np.sin(2 * rows.theta) + 0.2 * np.sin(12 * rows.theta)
+    loop = np.clip(20 / TURN * np.arcsin(np.sin(rows.theta / TURNS_A_LOOP)) * TURNS_A_LOOP, -1, 1)
     terms = [
         Term("channel_delay", {}, columns=slow[:, None]),
-        Term("hysteresis", {}, columns=np.sign(np.sin(rows.theta + 0.01))[:, None]),
+        Term("hysteresis", {}, columns=loop[:, None]),
+        Term("_jump", {}, columns=(rows.theta > 60)[:, None] * 1.0),
         Term("thermal_drift", {}, columns=np.sin(15 * rows.theta)[:, None]),
     ]
-    own = [np.ones(1), np.full(1, 2.0), np.ones(1)]
-    fit = evaluate(problem, np.zeros(0), np.zeros(1), terms, own)
-    assert power_left(fit, [0], 10.0) == pytest.approx(0.02, rel=1e-3)
-    assert power_left(fit, [0], 13.0) == pytest.approx(0.0, abs=1e-9)
-    assert power_left(fit, [0, 1], 13.0) == pytest.approx(np.var(fit.contribution(1)))
-    assert power_left(fit, [], 10.0) == 0.0
+    return evaluate(problem, np.zeros(0), np.zeros(1), terms, [np.ones(1), np.full(1, 2.0), np.ones(1), np.ones(1)])
+
+
+def test_what_a_smooth_shape_may_leave_at_high_orders(low):
+    """What it has there. Faults caught: its whole power, half of the spectrum's, an order of the wrong row rate, terms
+    that were not asked for."""
+    assert power_left(low, [SLOW], 10.0) == pytest.approx(0.02, rel=1e-3)
+    assert power_left(low, [SLOW], 13.0) == pytest.approx(0.0, abs=1e-9)
+    assert power_left(low, [], 10.0) == 0.0
+    assert power_left(low, [2], 10.0) == pytest.approx(np.var(low.contribution(2)))
+
+
+def test_a_loop_may_be_as_sharp_as_steps(low):
+    """Of 4 arcmin each time that it is crossed, ten times in twenty turns: by the orders from 10 on of such steps,
+    which the spectrum of a loop without width shows, within a third for where in its cell a step stands. Faults caught:
+    all of its power, what it has itself, both, 1/(2 pi f)^2 on one side of the spectrum, the height for its square."""
+    rows = low.problem.rows
+    sharp = 2.0 * np.sign(low.contribution(LOOP))
+    power = 2 * np.abs(np.fft.rfft(sharp)) ** 2 / len(rows) ** 2
+    expected = power[10 * 20 :].sum()
+    found = power_left(low, [LOOP], 10.0)
+    assert found == pytest.approx(expected, rel=0.35)
+    cut = 10.0 / rows.rows_per_turn
+    assert found == pytest.approx(power_of_steps(low.contribution(LOOP), cut))
+    own = 2 * np.abs(np.fft.rfft(low.contribution(LOOP))) ** 2 / len(rows) ** 2
+    assert own[10 * 20 :].sum() < 0.3 * found < 0.1 * np.var(sharp)
+
+
+def test_a_step_between_two_cells_counts():
+    """Fault caught: cells that do not reach to the next one's first row."""
+    values = (np.arange(400) >= 200) * 3.0
+    for cut in (0.05, 0.051):
+        assert power_of_steps(values, cut) == pytest.approx(9 / (2 * np.pi**2 * cut * 400))

@@ -1,5 +1,6 @@
 """Beside a ripple that the zones meet: the drive there, and what the ripple may leave in averaged rows."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,7 @@ from test_cross_validation import TURN, noisy
 
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
-from hdopt.diagnosis.stages import at_drive_of, power_in_rows
+from hdopt.diagnosis.stages import at_drive_of, each_left_out, power_in_rows
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.rows import neighbours_for
@@ -35,6 +36,27 @@ def test_a_fit_goes_to_the_drive_of_the_ripple_with_its_own_terms():
     assert np.mean(there.residual) == pytest.approx(0, abs=1e-9)
     beside = SimpleNamespace(problem=SimpleNamespace(base=None), errors=np.zeros(0))
     assert at_drive_of(beside, [fit]) == ()
+
+
+def test_each_term_is_left_out_at_the_better_drive():
+    """Faults caught: the drive that leaves more, a term that is never left out, a set of one that becomes none."""
+    rows = noisy(6)
+    base = CartesianModel.of(load_study(drive="csf-25-80").drive)
+    problem = FitProblem(rows, base, np.ones((len(rows), 1)), Noise.white(rows, 0.02))
+    terms = [
+        problem.explanations["output_coupling"].term(rows, {"shaft": "output", "orders": (2,)}),
+        problem.explanations["channel_delay"].term(replace(rows, speed=np.sin(rows.theta)), {}),
+    ]
+    fit = evaluate(problem, 0.0 * problem.prior, np.zeros(1), terms, [np.zeros(2), np.zeros(1)])
+    worse, better = (SimpleNamespace(problem=problem, errors=size * problem.prior) for size in (2.0, 0.0))
+    for ripple, start in ((worse, fit), (better, at_drive_of(better, [fit])[0])):
+        found = each_left_out([fit], ripple)
+        assert [one.terms for one in found] == [(terms[1],), (terms[0],)]
+        assert all(np.array_equal(one.errors, start.errors) for one in found)
+    alone = evaluate(problem, fit.errors, np.zeros(1), terms[:1], [np.zeros(2)])
+    assert each_left_out([alone], better) == []
+    far = evaluate(problem, 2.0 * problem.prior, np.zeros(1), terms, [np.zeros(2), np.zeros(1)])
+    assert not any(one.errors.any() for one in each_left_out([far], better))
 
 
 @pytest.mark.parametrize(("base", "power"), [("a base", 0.0), (None, SIZE**2 / 2)])

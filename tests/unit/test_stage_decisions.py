@@ -385,6 +385,7 @@ def without_ripple(monkeypatch):
         monkeypatch.setattr(stages, "stands", lambda before, anew: False)
         monkeypatch.setattr(stages, "at_drive_of", at_drive_of)
         monkeypatch.setattr(stages, "power_in_rows", power_in_rows)
+        monkeypatch.setattr(stages, "each_left_out", lambda fits, ripple: [Told(f"less than {f.name}") for f in fits])
         monkeypatch.setattr(stages, "find_ripple", find)
         monkeypatch.setattr(stages, "subtracted_terms", lambda base, power, terms: (power, terms))
         ripple = np.array([-2.0, 2.0])
@@ -407,11 +408,11 @@ def test_freed_of_a_ripple_the_rest_is_searched_in_its_own_noise(without_ripple)
 
 def test_freed_of_a_ripple_the_search_knows_the_drive_beside_which_it_was_fitted(without_ripple):
     """Of both drives that which leaves less, for the base and for what the noise is measured beside; what is known, at
-    both. Faults caught: one drive alone for either, the worse of them."""
+    both, and with one term less. Faults caught: one drive alone for either, the worse of them, no term less."""
     for there, name in ((2.0, ""), (0.5, " there")):
         seen = without_ripple(("hysteresis",), ("hysteresis",), 3.0, there)
         assert (seen.measured, seen.bases) == ([f"first{name}"], [f"base{name}"])
-        assert [fit.name for fit in seen.plans[0].known] == ["first", "first there"]
+        assert [fit.name for fit in seen.plans[0].known] == ["first", "first there", "less than first"]
 
 
 def test_a_ripple_is_named_anew_where_what_stands_beside_it_is_another(without_ripple):

@@ -18,7 +18,6 @@ from hdopt.diagnosis.inference.read_angle import where_it_stood
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.effects.probe import strongest_orders
 from hdopt.effects.sines import sine_columns
-from hdopt.effects.term import Term
 from hdopt.recordings.read import Recording
 from hdopt.recordings.rows import Rows, gather
 
@@ -38,21 +37,38 @@ def noise_beside_lines(bare: Fit, orders: tuple[float, float]) -> Noise:
 
 
 def power_left(as_recorded: Fit, which: Sequence[int], lowest: float) -> float:
-    """The power (arcmin^2) of those terms of a model `as_recorded` (`which`) that a shape not quite right may leave at
-    orders from the `lowest` on. What happens suddenly, a pulse or a loop, may be sharper than the shape that is fitted:
-    all of its power counts. Of the others it is what they have there themselves.
+    """The power (arcmin^2) of those terms of a model `as_recorded` (`which`) of which a share may be left at orders
+    from the `lowest` on where their shape is not quite right: what they have there themselves. What happens suddenly,
+    a pulse or a loop, may be sharper than the shape that is fitted, as sharp as steps; what has no physics may be
+    anything.
     """
     rows, terms = as_recorded.problem.rows, as_recorded.terms
-    nothing = np.zeros(len(rows))
-    sudden = sum((as_recorded.contribution(i) for i in which if is_sudden(terms[i])), nothing)
-    smooth = sum((as_recorded.contribution(i) for i in which if not is_sudden(terms[i])), nothing)
-    power = 2 * np.abs(np.fft.rfft(smooth)) ** 2 / len(rows) ** 2
-    return float(np.var(sudden) + power[math.ceil(lowest / rows.rows_per_turn * len(rows)) :].sum())
+    outside = [i for i in which if is_outside(terms[i].effect)]
+    sudden = [i for i in which if properties_of(terms[i].effect).sudden]
+    others = [i for i in which if i not in (*outside, *sudden)]
+
+    def total(some: Sequence[int]) -> Array:
+        return np.asarray(sum((as_recorded.contribution(i) for i in some), np.zeros(len(rows))))
+
+    cut = lowest / rows.rows_per_turn
+    return float(np.var(total(outside))) + power_beyond(total(others), cut) + power_of_steps(total(sudden), cut)
 
 
-def is_sudden(term: Term) -> bool:
-    """Whether what `term` stands for may be sharper than the shape that is fitted to it; what has no physics may."""
-    return is_outside(term.effect) or properties_of(term.effect).sudden
+def power_beyond(values: Array, cut: float) -> float:
+    """The power of `values` (n,) at more than `cut` cycles a row."""
+    power = 2 * np.abs(np.fft.rfft(values)) ** 2 / len(values) ** 2
+    return float(power[math.ceil(cut * len(values)) :].sum())
+
+
+def power_of_steps(values: Array, cut: float) -> float:
+    """The power that `values` (n,) would have at more than `cut` cycles a row, did they change in one step wherever
+    they change within 1/`cut` rows: of a step of 1 arcmin the integral of 1/(2 pi f)^2 over these f, on both sides, is
+    1/(2 pi^2 cut)."""
+    cells = np.arange(0, len(values), math.ceil(1 / cut))
+    first = np.r_[values[cells[1:]], values[-1]]
+    highest = np.maximum(np.maximum.reduceat(values, cells), first)
+    lowest = np.minimum(np.minimum.reduceat(values, cells), first)
+    return float(np.sum((highest - lowest) ** 2)) / (2 * math.pi**2 * cut * len(values))
 
 
 def on_rows_as_recorded(recordings: Sequence[Recording], fit: Fit, nuisances: Nuisances) -> Fit:
