@@ -383,7 +383,8 @@ def search_without_ripple(state: State) -> State:
     problem = replace(state.problem, rows=rows, nuisance=state.nuisances.columns(rows))
     ripple = state.high.best.fit
     base = lowest_of_both_drives(on_problem(state.base, problem), ripple)
-    found = base if not before.effects else lowest_of_both_drives(on_problem(before.fit, problem), ripple)
+    rest = without_effects_of(ripple, before.fit)
+    found = lowest_of_both_drives(on_problem(rest, problem), ripple) if rest.terms else base
     measured = measure_noise(found)
     base = refine(on_problem(base, problem.with_noise(measured.noise)), settings.fit.settled_iterations)
     leaders = leaders_on(state.selection, base.problem)
@@ -401,6 +402,14 @@ def search_without_ripple(state: State) -> State:
         high, _ = ripple_beside_selection(state, rng)
         state = state if stands(state.high, high) else replace(state, high=high)
     return state
+
+
+def without_effects_of(ripple: Fit, fit: Fit) -> Fit:
+    """`fit` without what was taken out as a `ripple`: in rows that hold a mesh it is among the others, and free
+    beside nothing it would take up noise.
+    """
+    taken = {term.effect for term in ripple.terms}
+    return with_terms(fit, [at for at, term in enumerate(fit.terms) if term.effect not in taken])
 
 
 def power_in_rows(adds: Array, ripple: Fit, recordings: Sequence[Recording]) -> float:

@@ -10,7 +10,7 @@ from test_cross_validation import TURN, noisy
 
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
-from hdopt.diagnosis.stages import at_drive_of, each_left_out, power_in_rows
+from hdopt.diagnosis.stages import at_drive_of, each_left_out, power_in_rows, without_effects_of
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.rows import neighbours_for
@@ -57,6 +57,17 @@ def test_each_term_is_left_out_at_the_better_drive():
     assert each_left_out([alone], better) == []
     far = evaluate(problem, 2.0 * problem.prior, np.zeros(1), terms, [np.zeros(2), np.zeros(1)])
     assert not any(one.errors.any() for one in each_left_out([far], better))
+
+
+def test_noise_is_measured_beside_what_was_not_taken_out():
+    """Faults caught: the mesh free again beside rows that are rid of it, or what stands beside it left out too."""
+    rows = noisy(6)
+    problem = FitProblem(rows, None, np.ones((len(rows), 1)), Noise.white(rows, 0.02))
+    mesh = problem.explanations["tooth_mesh"].term(rows, {"sidebands": (0,)})
+    other = problem.explanations["output_coupling"].term(rows, {"shaft": "output", "orders": (2,)})
+    fit = evaluate(problem, np.zeros(0), np.zeros(1), [mesh, other], [np.ones(2), np.array([0.1, 0.2])])
+    assert without_effects_of(SimpleNamespace(terms=[mesh]), fit).terms == (other,)
+    assert without_effects_of(SimpleNamespace(terms=[]), fit).terms == (mesh, other)
 
 
 @pytest.mark.parametrize(("base", "power"), [("a base", 0.0), (None, SIZE**2 / 2)])

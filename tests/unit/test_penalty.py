@@ -58,7 +58,7 @@ def test_waves_of_both_splines_teeth_pay_once_for_bending():
         ([circular, flexspline], 2),
         ([circular, teeth("fs_tooth_harmonics", Spline.FLEX, 2)], 2),
         ([circular, flexspline, term("bearing_pass")], 3),
-        ([circular, mesh], 3),
+        ([circular, mesh], 2 + COSTS.other_kind / COSTS.discrepancy),
     ]:
         own = sum(one.width * np.log(100.0) / 2 + COSTS.effect_cost for one in pair)
         assert paid(pair, gain=1e4) == pytest.approx(own + inexact * COSTS.discrepancy * 1e4 / 2)
@@ -80,6 +80,19 @@ def test_sines_that_leave_nothing_pay_as_such_beside_any_other_kind():
         ([loop, sine, nothing], COSTS.other_kind + COSTS.discrepancy),
     ]:
         assert discrepancy(terms) == pytest.approx(share)
+
+
+def test_a_ripple_among_the_rows_is_of_another_kind_than_what_turns():
+    """The misfit of a mesh in rows that hold its waves lies at its own orders, far above a bearing's; one that was
+    taken out has left what it does to the zones, which is alike. An encoder's lines leave nothing, and are as all
+    sines. Faults caught: a mesh that hides a bearing behind 8 % of its own power, one that was taken out and hides
+    nothing."""
+    mesh, bearing = term("tooth_mesh"), term("bearing_pass")
+    assert discrepancy([mesh, bearing]) == pytest.approx(COSTS.other_kind)
+    assert discrepancy([mesh, term("hysteresis"), bearing]) == pytest.approx(2 * COSTS.other_kind)
+    assert discrepancy([bearing], subtracted=[mesh]) == pytest.approx(COSTS.discrepancy)
+    assert discrepancy([encoder(64), bearing]) == pytest.approx(COSTS.discrepancy)
+    assert discrepancy([bearing], subtracted=[term("hysteresis")]) == pytest.approx(COSTS.other_kind)
 
 
 def test_a_drive_far_outside_its_tolerances_pays_as_an_effect_of_another_kind():

@@ -385,6 +385,7 @@ def without_ripple(monkeypatch):
         monkeypatch.setattr(stages, "stands", lambda before, anew: False)
         monkeypatch.setattr(stages, "at_drive_of", at_drive_of)
         monkeypatch.setattr(stages, "power_in_rows", power_in_rows)
+        monkeypatch.setattr(stages, "without_effects_of", lambda ripple, fit: fit)
         monkeypatch.setattr(stages, "each_left_out", lambda fits, ripple: [Told(f"less than {f.name}") for f in fits])
         monkeypatch.setattr(stages, "find_ripple", find)
         monkeypatch.setattr(stages, "subtracted_terms", lambda base, power, terms: (power, terms))

@@ -28,6 +28,9 @@ KINDS = {
 }
 """Kind of an effect by its domain; reversal and direction are one: no curve of the torque makes a loop."""
 
+RIPPLE = "ripple"
+"""The kind of a ripple of the teeth in rows that hold its waves."""
+
 
 @dataclass(frozen=True)
 class SubtractedTerms:
@@ -67,7 +70,7 @@ def penalty(terms: Sequence[Term], gain: float, scale: Scale) -> float:
     cost += s.one_in_the_other * sum(properties_of(name).special_case_of in names for name in names)
     cost += doubtful_among(terms, subtracted.terms) * s.clear_win * gain / scale.inflation / 2
     rough = [term for term in subtracted.terms if not leaves_nothing(term)]
-    more = discrepancy([*terms, *rough], s) - discrepancy(rough, s)
+    more = discrepancy(terms, s, rough) - discrepancy((), s, rough)
     inexact = more * (gain + (subtracted.gain if rough else 0.0))
     if terms and subtracted.terms and not rough:
         # What was taken out to the last digit leaves as little as another kind of effect.
@@ -114,15 +117,21 @@ class Nature(NamedTuple):
 def nature_of(term: Term, settings: PenaltySettings = DEFAULT.penalty) -> Nature:
     """The nature of `term`; `settings` are the thresholds."""
     outside, bending = is_outside(term.effect), flexibility(term, settings)
-    return Nature(outside, kind_of(term), bending, isinstance(term.met, Waves), leaves_nothing(term))
+    kind = RIPPLE if properties_of(term.effect).high_order and not leaves_nothing(term) else kind_of(term)
+    return Nature(outside, kind, bending, isinstance(term.met, Waves), leaves_nothing(term))
 
 
-def discrepancy(terms: Sequence[Term], settings: PenaltySettings = DEFAULT.penalty) -> float:
-    """Share of the explained power that a set of `terms` pays for the inexactness of its shapes; a description
-    without physics could be the misfit of anything. Many waves of both splines' teeth pay for bending, each to the
-    misfit of the other, and not for being alike too. `settings` are the thresholds.
+def discrepancy(
+    terms: Sequence[Term], settings: PenaltySettings = DEFAULT.penalty, subtracted: Sequence[Term] = ()
+) -> float:
+    """Share of the explained power that a set of `terms` pays for the inexactness of its shapes, beside those that were
+    `subtracted` from the rows; a description without physics could be the misfit of anything. Many waves of both
+    splines' teeth pay for bending, each to the misfit of the other, and not for being alike too. A ripple of the teeth
+    in rows that hold it leaves its misfit at its own orders; one that was taken out has left in the averaged rows what
+    it does to the driving zone, which turns as everything does. `settings` are the thresholds.
     """
-    return _share(tuple(nature_of(term, settings) for term in terms), settings)
+    taken = (nature_of(term, settings)._replace(kind=kind_of(term)) for term in subtracted)
+    return _share((*(nature_of(term, settings) for term in terms), *taken), settings)
 
 
 @cache
