@@ -33,6 +33,7 @@ from hdopt.diagnosis.search.at_home import brought_home
 from hdopt.diagnosis.search.candidates import Candidate, paid_for_freedom, penalty_scale
 from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.high_order import find_ripple, strong_ripple, subtract, subtracted_terms
+from hdopt.diagnosis.search.penalty import leaves_nothing
 from hdopt.diagnosis.search.search_state import SearchPlan
 from hdopt.diagnosis.search.subset_search import Selection, first_look, most_explained, select, select_from
 from hdopt.diagnosis.settings import DiagnosisSettings
@@ -405,10 +406,10 @@ def search_without_ripple(state: State) -> State:
 
 
 def without_effects_of(ripple: Fit, fit: Fit) -> Fit:
-    """`fit` without what was taken out as a `ripple`: in rows that hold a mesh it is among the others, and free
-    beside nothing it would take up noise.
+    """`fit` without the mesh that was taken out as a `ripple`: in rows that hold one it is among the others, and free
+    beside nothing it would take up noise. An encoder's cycles below those of the ripple are there as before.
     """
-    taken = {term.effect for term in ripple.terms}
+    taken = {term.effect for term in ripple.terms if not leaves_nothing(term)}
     return with_terms(fit, [at for at, term in enumerate(fit.terms) if term.effect not in taken])
 
 

@@ -11,6 +11,7 @@ from test_cross_validation import TURN, noisy
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.stages import at_drive_of, each_left_out, power_in_rows, without_effects_of
+from hdopt.effects.declared import Shaft
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import recording_from_table
 from hdopt.recordings.rows import neighbours_for
@@ -60,7 +61,8 @@ def test_each_term_is_left_out_at_the_better_drive():
 
 
 def test_noise_is_measured_beside_what_was_not_taken_out():
-    """Faults caught: the mesh free again beside rows that are rid of it, or what stands beside it left out too."""
+    """Faults caught: the mesh free again beside rows that are rid of it, what stands beside it left out too, an
+    encoder's first cycle left out where its second was taken out."""
     rows = noisy(6)
     problem = FitProblem(rows, None, np.ones((len(rows), 1)), Noise.white(rows, 0.02))
     mesh = problem.explanations["tooth_mesh"].term(rows, {"sidebands": (0,)})
@@ -68,6 +70,10 @@ def test_noise_is_measured_beside_what_was_not_taken_out():
     fit = evaluate(problem, np.zeros(0), np.zeros(1), [mesh, other], [np.ones(2), np.array([0.1, 0.2])])
     assert without_effects_of(SimpleNamespace(terms=[mesh]), fit).terms == (other,)
     assert without_effects_of(SimpleNamespace(terms=[]), fit).terms == (mesh, other)
+    shape = {"lines": 8, "shaft": Shaft.INPUT, "cycles": (1,)}
+    lines = problem.explanations["encoder_interpolation"].term(rows, shape)
+    fit = evaluate(problem, np.zeros(0), np.zeros(1), [lines, other], [np.ones(2), np.array([0.1, 0.2])])
+    assert without_effects_of(SimpleNamespace(terms=[lines]), fit).terms == (lines, other)
 
 
 @pytest.mark.parametrize(("base", "power"), [("a base", 0.0), (None, SIZE**2 / 2)])
