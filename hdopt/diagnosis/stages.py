@@ -389,9 +389,10 @@ def search_without_ripple(state: State) -> State:
     measured = measure_noise(found)
     base = refine(on_problem(base, problem.with_noise(measured.noise)), settings.fit.settled_iterations)
     leaders = leaders_on(state.selection, base.problem)
+    there = at_drive_of(ripple, leaders)
     plan = SearchPlan(
         skip=state.ruled_out,
-        known=(*leaders, *at_drive_of(ripple, leaders), *each_left_out(leaders[:1], ripple)),
+        known=(*leaders, *there, *each_left_out((*leaders[:1], *there[:1]))),
         subtracted=subtracted_terms(base, power_in_rows(state.ripple, ripple, cleaned), ripple.terms),
     )
     selection = select(base, measured.inflation, rng, plan)
@@ -434,12 +435,14 @@ def at_drive_of(ripple: Fit, fits: Sequence[Fit]) -> tuple[Fit, ...]:
     return tuple(with_offsets(one) for one in there)
 
 
-def each_left_out(leaders: Sequence[Fit], ripple: Fit) -> list[Fit]:
-    """The sets with one term less than each of `leaders`, at whichever drive leaves less, its own or that beside which
-    a `ripple` was fitted: one of them may have stood for what the ripple does.
+def each_left_out(ways: Sequence[Fit]) -> list[Fit]:
+    """The sets with one term less than a leader, at that drive of its `ways` which leaves least: one of its terms may
+    have stood for what a ripple does. None without a leader, or for one of a single term.
     """
-    lowest = [min((one, *at_drive_of(ripple, [one])), key=lambda fit: fit.objective) for one in leaders]
-    return [with_terms(one, one.all_but(at)) for one in lowest if len(one.terms) > 1 for at in range(len(one.terms))]
+    if not ways or len(ways[0].terms) == 1:
+        return []
+    lowest = min(ways, key=lambda fit: fit.objective)
+    return [with_terms(lowest, lowest.all_but(at)) for at in range(len(lowest.terms))]
 
 
 def lowest_of_both_drives(fit: Fit, ripple: Fit) -> Fit:

@@ -51,13 +51,13 @@ def test_each_term_is_left_out_at_the_better_drive():
     fit = evaluate(problem, 0.0 * problem.prior, np.zeros(1), terms, [np.zeros(2), np.zeros(1)])
     worse, better = (SimpleNamespace(problem=problem, errors=size * problem.prior) for size in (2.0, 0.0))
     for ripple, start in ((worse, fit), (better, at_drive_of(better, [fit])[0])):
-        found = each_left_out([fit], ripple)
+        found = each_left_out((fit, *at_drive_of(ripple, [fit])))
         assert [one.terms for one in found] == [(terms[1],), (terms[0],)]
         assert all(np.array_equal(one.errors, start.errors) for one in found)
     alone = evaluate(problem, fit.errors, np.zeros(1), terms[:1], [np.zeros(2)])
-    assert each_left_out([alone], better) == []
+    assert each_left_out((alone, *at_drive_of(better, [alone]))) == each_left_out(()) == []
     far = evaluate(problem, 2.0 * problem.prior, np.zeros(1), terms, [np.zeros(2), np.zeros(1)])
-    assert not any(one.errors.any() for one in each_left_out([far], better))
+    assert not any(one.errors.any() for one in each_left_out((far, *at_drive_of(better, [far]))))
 
 
 def test_noise_is_measured_beside_what_was_not_taken_out():

@@ -386,7 +386,7 @@ def without_ripple(monkeypatch):
         monkeypatch.setattr(stages, "at_drive_of", at_drive_of)
         monkeypatch.setattr(stages, "power_in_rows", power_in_rows)
         monkeypatch.setattr(stages, "without_effects_of", lambda ripple, fit: fit)
-        monkeypatch.setattr(stages, "each_left_out", lambda fits, ripple: [Told(f"less than {f.name}") for f in fits])
+        monkeypatch.setattr(stages, "each_left_out", lambda ways: [Told(f"less than {one.name}") for one in ways])
         monkeypatch.setattr(stages, "find_ripple", find)
         monkeypatch.setattr(stages, "subtracted_terms", lambda base, power, terms: (power, terms))
         ripple = np.array([-2.0, 2.0])
@@ -413,7 +413,12 @@ def test_freed_of_a_ripple_the_search_knows_the_drive_beside_which_it_was_fitted
     for there, name in ((2.0, ""), (0.5, " there")):
         seen = without_ripple(("hysteresis",), ("hysteresis",), 3.0, there)
         assert (seen.measured, seen.bases) == ([f"first{name}"], [f"base{name}"])
-        assert [fit.name for fit in seen.plans[0].known] == ["first", "first there", "less than first"]
+        assert [fit.name for fit in seen.plans[0].known] == [
+            "first",
+            "first there",
+            "less than first",
+            "less than first there",
+        ]
 
 
 def test_a_ripple_is_named_anew_where_what_stands_beside_it_is_another(without_ripple):

@@ -122,7 +122,7 @@ def high_order_selection(
     orders = (lowest, highest)
     start = evaluate(problem, np.zeros(0), np.zeros(1), (), ())
     bare = refine(start, settings.fit.offset_iterations)
-    noise = noise_beside_lines(bare, (lowest, highest))
+    noise = noise_beside_lines(bare, orders)
     bare = evaluate(problem.with_noise(noise), np.zeros(0), bare.offsets, (), ())
     low_effects = (*ruled_out, *(e for e in explanations() if e not in HIGH_ORDER and e not in (AnyOrder.id, Mains.id)))
     rough = [i for i, term in enumerate(low.terms) if not leaves_nothing(term)]
