@@ -21,7 +21,7 @@ from hdopt.diagnosis.inference.clean_base import (
 )
 from hdopt.diagnosis.inference.common_slope import TakenSlope, common_slope, input_is_off
 from hdopt.diagnosis.inference.descent import refine
-from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate, with_terms
+from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate
 from hdopt.diagnosis.inference.generic_basis import generic_columns
 from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.normal_equations import least_squares
@@ -31,9 +31,16 @@ from hdopt.diagnosis.inference.settled_shapes import settled
 from hdopt.diagnosis.orientation import Orientation, is_decisive, preference, turn_round
 from hdopt.diagnosis.search.at_home import brought_home
 from hdopt.diagnosis.search.candidates import Candidate, paid_for_freedom, penalty_scale
+from hdopt.diagnosis.search.freed_of_ripple import (
+    at_drive_of,
+    each_left_out,
+    lowest_of_both_drives,
+    power_in_rows,
+    stands,
+    without_effects_of,
+)
 from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.high_order import find_ripple, strong_ripple, subtract, subtracted_terms
-from hdopt.diagnosis.search.penalty import leaves_nothing
 from hdopt.diagnosis.search.search_state import SearchPlan
 from hdopt.diagnosis.search.subset_search import Selection, first_look, most_explained, select, select_from
 from hdopt.diagnosis.settings import DiagnosisSettings
@@ -380,7 +387,8 @@ def search_without_ripple(state: State) -> State:
         return state
     rng, settings, before = state.draws(), state.settings, state.selection.best
     cleaned = subtract(state.recordings, state.ripple)
-    rows = gather(cleaned, neighbours_for(cleaned))
+    neighbours = neighbours_for(cleaned)
+    rows = gather(cleaned, neighbours)
     problem = replace(state.problem, rows=rows, nuisance=state.nuisances.columns(rows))
     ripple = state.high.best.fit
     base = lowest_of_both_drives(on_problem(state.base, problem), ripple)
@@ -390,10 +398,11 @@ def search_without_ripple(state: State) -> State:
     base = refine(on_problem(base, problem.with_noise(measured.noise)), settings.fit.settled_iterations)
     leaders = leaders_on(state.selection, base.problem)
     there = at_drive_of(ripple, leaders)
+    power = power_in_rows(state.ripple, ripple, row_of_each_sample(cleaned, neighbours))
     plan = SearchPlan(
         skip=state.ruled_out,
         known=(*leaders, *there, *each_left_out((*leaders[:1], *there[:1]))),
-        subtracted=subtracted_terms(base, power_in_rows(state.ripple, ripple, cleaned), ripple.terms),
+        subtracted=subtracted_terms(base, power, ripple.terms),
     )
     selection = select(base, measured.inflation, rng, plan)
     state = replace(state.found(selection), inflation=measured.inflation, rng=rng)
@@ -404,63 +413,6 @@ def search_without_ripple(state: State) -> State:
         high, _ = ripple_beside_selection(state, rng)
         state = state if stands(state.high, high) else replace(state, high=high)
     return state
-
-
-def without_effects_of(ripple: Fit, fit: Fit) -> Fit:
-    """`fit` without the mesh that was taken out as a `ripple`: in rows that hold one it is among the others, and free
-    beside nothing it would take up noise. An encoder's cycles below those of the ripple are there as before.
-    """
-    taken = {term.effect for term in ripple.terms if not leaves_nothing(term)}
-    return with_terms(fit, [at for at, term in enumerate(fit.terms) if term.effect not in taken])
-
-
-def power_in_rows(adds: Array, ripple: Fit, recordings: Sequence[Recording]) -> float:
-    """The power (arcmin^2) of what the terms of a `ripple` may leave in the rows of `recordings`, to whose samples they
-    add so much (`adds`, (N,)): inside the zones as much as the means of samples hold of it. Beside them it may lift the
-    zones by as much as it is large, which no sine of it does.
-    """
-    if ripple.problem.base is None:
-        return float(np.var(adds))
-    row = row_of_each_sample(recordings, neighbours_for(recordings))
-    return float(np.var(np.bincount(row, adds) / np.bincount(row)))
-
-
-def at_drive_of(ripple: Fit, fits: Sequence[Fit]) -> tuple[Fit, ...]:
-    """`fits` at the drive beside which a `ripple` was fitted inside the zones, with the offsets that they want there:
-    without the ripple the drive was bent to what it does to the zones. None for a ripple beside them.
-    """
-    if ripple.problem.base is None:
-        return ()
-    there = (evaluate(one.problem, ripple.errors, one.offsets, one.terms, one.coefficients) for one in fits)
-    return tuple(with_offsets(one) for one in there)
-
-
-def each_left_out(ways: Sequence[Fit]) -> list[Fit]:
-    """The sets with one term less than a leader, at that drive of its `ways` which leaves least: one of its terms may
-    have stood for what a ripple does. None without a leader, or for one of a single term.
-    """
-    if not ways or len(ways[0].terms) == 1:
-        return []
-    lowest = min(ways, key=lambda fit: fit.objective)
-    return [with_terms(lowest, lowest.all_but(at)) for at in range(len(lowest.terms))]
-
-
-def lowest_of_both_drives(fit: Fit, ripple: Fit) -> Fit:
-    """The way down of `fit` from where it is, or from the drive beside which a `ripple` was fitted inside the zones,
-    whichever leaves less.
-    """
-    iterations = fit.problem.settings.fit.known_iterations
-    starts = (fit, *at_drive_of(ripple, [fit]))
-    return min((refine(start, iterations) for start in starts), key=lambda one: one.objective)
-
-
-def stands(before: Selection | None, anew: Selection | None) -> bool:
-    """Whether what was found in the zones `before` explains the rows as recorded better than what was found `anew`
-    beside other effects: the zones make many minima, and the second look may have missed it.
-    """
-    if before is None or not any(term.in_zones for term in before.best.fit.terms):
-        return False
-    return anew is None or bool(np.var(before.best.fit.residual) < np.var(anew.best.fit.residual))
 
 
 def settle_shapes(state: State) -> State:

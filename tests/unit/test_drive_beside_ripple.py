@@ -10,11 +10,11 @@ from test_cross_validation import TURN, noisy
 
 from hdopt.diagnosis.inference.fit import FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
-from hdopt.diagnosis.stages import at_drive_of, each_left_out, power_in_rows, without_effects_of
+from hdopt.diagnosis.search.freed_of_ripple import at_drive_of, each_left_out, power_in_rows, stands, without_effects_of
 from hdopt.effects.declared import Shaft
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import recording_from_table
-from hdopt.recordings.rows import neighbours_for
+from hdopt.recordings.rows import neighbours_for, row_of_each_sample
 from hdopt.study import load_study
 
 SIZE = 0.05
@@ -87,6 +87,22 @@ def test_a_ripple_in_the_zones_leaves_what_the_means_of_samples_hold_of_it(base,
     assert count > 2
     wave = SIZE * np.sin(TURN * np.arange(len(theta)) / count)
     ripple = SimpleNamespace(problem=SimpleNamespace(base=base))
-    assert power_in_rows(wave, ripple, recordings) == pytest.approx(power, abs=1e-9)
+    row = row_of_each_sample(recordings, count)
+    assert power_in_rows(wave, ripple, row) == pytest.approx(power, abs=1e-9)
     slow = np.sqrt(2) * SIZE * np.sin(theta)
-    assert power_in_rows(slow, ripple, recordings) == pytest.approx(SIZE**2, rel=1e-2)
+    assert power_in_rows(slow, ripple, row) == pytest.approx(SIZE**2, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("in_zones", "left", "stand"), [(True, 2.0, True), (True, 0.5, False), (False, 2.0, False), (True, None, True)]
+)
+def test_a_ripple_in_the_zones_stands_where_a_second_look_leaves_more(in_zones, left, stand):
+    """Fault caught: the worse of two minima kept because it came last."""
+
+    def found(size, zones):
+        fit = SimpleNamespace(terms=[SimpleNamespace(in_zones=zones)], residual=size * np.array([-1.0, 1.0]))
+        return SimpleNamespace(best=SimpleNamespace(fit=fit))
+
+    anew = None if left is None else found(left, False)
+    assert stands(found(1.0, in_zones), anew) is stand
+    assert not stands(None, anew)

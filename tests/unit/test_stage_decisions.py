@@ -13,7 +13,7 @@ from hdopt.diagnosis import state as state_module
 from hdopt.diagnosis.inference import base_fit, clean_base
 from hdopt.diagnosis.inference.common_slope import TakenSlope
 from hdopt.diagnosis.orientation import Orientation
-from hdopt.diagnosis.search import candidates
+from hdopt.diagnosis.search import candidates, freed_of_ripple
 from hdopt.diagnosis.search.candidates import Candidate
 from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.subset_search import Selection
@@ -371,19 +371,21 @@ def without_ripple(monkeypatch):
             assert ripple is high.best.fit
             return tuple(replace(one, name=f"{one.name} there", objective=there) for one in fits)
 
-        def power_in_rows(adds, ripple, recordings):
+        def power_in_rows(adds, ripple, row):
             assert ripple is high.best.fit
             return float(np.var(adds))
 
         monkeypatch.setattr(stages, "subtract", lambda recordings, ripple: recordings)
+        monkeypatch.setattr(stages, "row_of_each_sample", lambda recordings, neighbours: neighbours)
         monkeypatch.setattr(stages, "gather", lambda recordings, neighbours: SimpleNamespace(locked=False))
         monkeypatch.setattr(stages, "neighbours_for", lambda recordings: 1)
         monkeypatch.setattr(stages, "on_problem", lambda fit, problem: replace(fit, problem=problem))
-        monkeypatch.setattr(stages, "refine", lambda fit, iterations: fit)
         monkeypatch.setattr(stages, "measure_noise", measure)
         monkeypatch.setattr(stages, "select", select)
         monkeypatch.setattr(stages, "stands", lambda before, anew: False)
-        monkeypatch.setattr(stages, "at_drive_of", at_drive_of)
+        for module in (stages, freed_of_ripple):
+            monkeypatch.setattr(module, "at_drive_of", at_drive_of)
+            monkeypatch.setattr(module, "refine", lambda fit, iterations: fit)
         monkeypatch.setattr(stages, "power_in_rows", power_in_rows)
         monkeypatch.setattr(stages, "without_effects_of", lambda ripple, fit: fit)
         monkeypatch.setattr(stages, "each_left_out", lambda ways: [Told(f"less than {one.name}") for one in ways])
@@ -428,21 +430,6 @@ def test_a_ripple_is_named_anew_where_what_stands_beside_it_is_another(without_r
     assert without_ripple(("hysteresis",), ("thermal_drift",), 0.1).again == 0
 
 
-@pytest.mark.parametrize(
-    ("in_zones", "left", "stand"), [(True, 2.0, True), (True, 0.5, False), (False, 2.0, False), (True, None, True)]
-)
-def test_a_ripple_in_the_zones_stands_where_a_second_look_leaves_more(in_zones, left, stand):
-    """Fault caught: the worse of two minima kept because it came last."""
-
-    def found(size, zones):
-        fit = SimpleNamespace(terms=[SimpleNamespace(in_zones=zones)], residual=size * np.array([-1.0, 1.0]))
-        return SimpleNamespace(best=SimpleNamespace(fit=fit))
-
-    anew = None if left is None else found(left, False)
-    assert stages.stands(found(1.0, in_zones), anew) is stand
-    assert not stages.stands(None, anew)
-
-
 @pytest.fixture
 def first(monkeypatch):
     """`of(errors, ...)`: the problem of the first fit of recordings of these errors."""
@@ -466,6 +453,7 @@ def first(monkeypatch):
                 return np.ones((len(rows.error), 1))
 
         rows = SimpleNamespace(error=np.asarray(errors, float))
+        monkeypatch.setattr(stages, "row_of_each_sample", lambda recordings, neighbours: neighbours)
         monkeypatch.setattr(stages, "gather", lambda recordings, neighbours: rows)
         monkeypatch.setattr(stages, "neighbours_for", lambda recordings: 1)
         monkeypatch.setattr(stages, "nuisances_for", lambda *about: Nuisances(hidden))
