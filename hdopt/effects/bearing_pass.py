@@ -14,14 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdopt.arrays import Array
+from hdopt.arrays import Array, Mask
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects._zone_harmonics import zone_harmonics
 from hdopt.effects.base import Effect, Keys
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import UM, Quantity, Sines, needed, number, smallest_set
 from hdopt.effects.estimate import FitEstimate, Parameter, counted
-from hdopt.effects.probe import Probe, best_terms, widest_that_pays
+from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Shape, Term
 from hdopt.errors import HdoptError, MissingValue
@@ -113,6 +113,14 @@ def zone_orders(shape: Shape) -> tuple[int, ...]:
     """
     members, balls = tuple(shape["zones"]), int(shape["balls"])
     return (*members, balls) if balls and balls not in members else members
+
+
+def _waves_that_show(term: Term, estimate: FitEstimate) -> tuple[Array, Mask]:
+    """The size of each wave of `term`, and whether it surely is there."""
+    sines = 2 * (term.width // 2)
+    size = np.hypot(estimate.values[0:sines:2], estimate.values[1:sines:2])
+    variance = np.diag(estimate.covariance)[:sines]
+    return size, size > LINE_SHOWS * np.sqrt(0.5 * (variance[0::2] + variance[1::2]))
 
 
 @dataclass(frozen=True)
@@ -264,10 +272,13 @@ class BearingPass(Effect):
             for n, members in ((0, few), (0, pair), (0, many), (self._likely_balls(r, spectrum)[-1], pair))
         )
         best = best_of(about(best, (-0.4, -0.2, 0.0, 0.2, 0.4)))
-        sets = [self.term(samples, {**best, "zones": members}, trials=trials) for members in ZONE_HARMONICS]
-        best = widest_that_pays(probe, sets)[0].shape
         likely = self._likely_balls(best["ball_to_pitch_ratio"], spectrum)
-        best = best_of({**best, "balls": n} for n in {0, best["balls"], *likely})
+        best = best_of(
+            {**best, "balls": n, "zones": members}
+            for n in sorted({0, best["balls"], *likely})
+            for members in ZONE_HARMONICS
+            if n not in members
+        )
         paid = trials * (len(BALLS) if best["balls"] else 1)
         fine = about(best, (-0.1, -0.05, 0.0, 0.05, 0.1))
         return best_terms(probe, [self.term(samples, shape, trials=paid) for shape in fine])
@@ -308,10 +319,7 @@ class BearingPass(Effect):
         """
         if not RATIO_RANGE[0] <= term.shape["ball_to_pitch_ratio"] <= RATIO_RANGE[1]:
             return False
-        sines = 2 * (term.width // 2)
-        size = np.hypot(estimate.values[0:sines:2], estimate.values[1:sines:2])
-        variance = np.diag(estimate.covariance)[:sines]
-        certain = size > LINE_SHOWS * np.sqrt(0.5 * (variance[0::2] + variance[1::2]))
+        size, certain = _waves_that_show(term, estimate)
         if "zones" not in term.shape or len(term.shape["zones"]) <= FEW_WAVES:
             return bool(np.all(certain & (size > LEAST_LINE * size.max())))
         return bool(np.mean(certain) >= MANY_SHOW)
@@ -332,6 +340,23 @@ class BearingPass(Effect):
             return [h * half if h % 2 == 0 else 1 + h * half for h in zone_orders(shape)]
         orders = bearing_orders(shape["ball_to_pitch_ratio"], shape["balls"], ratio)
         return [float(orders[i]) for i in shape["lines"]]
+
+    @staticmethod
+    def _balls_that_show(term: Term, estimate: FitEstimate) -> int | None:
+        """The number of balls, all alike in load, whose wave stands out: of a number that was looked for over the usual
+        wave, of a wide set of waves the last that stands out over each from half its number on, as waves of unlike
+        balls die away; None where none does.
+        """
+        waves = np.array(zone_orders(term.shape))
+        size, certain = _waves_that_show(term, estimate)
+        if balls := int(term.shape["balls"]):
+            of_balls = waves == balls
+            return balls if size[of_balls][0] > COUNTED * np.median(size[~of_balls]) else None
+        for at in np.flatnonzero(certain & (waves >= BALLS[0]))[::-1]:
+            others = (waves >= waves[at] / 2) & (waves != waves[at])
+            if size[at] > COUNTED * size[others].max():
+                return int(waves[at])
+        return None
 
     def orders_of_columns(self, term: Term, ratio: float) -> list[float]:
         """In the zones, the orders at which these meet the balls: the zones' own turn is in `orders`."""
@@ -379,9 +404,8 @@ class BearingPass(Effect):
         found = {"ball_to_pitch_ratio": estimate.parameter(term.width, "1")}
         if "zones" in term.shape:
             found["unequal_um"] = estimate.amplitude(0, 1, "um", scale=1e3)
-            size = np.hypot(estimate.values[0 : term.width : 2], estimate.values[1 : term.width : 2])
-            if term.shape["balls"] and size[-1] > COUNTED * np.median(size[:-1]):
-                found["balls"] = counted(term.shape["balls"])
+            if (balls := self._balls_that_show(term, estimate)) is not None:
+                found["balls"] = counted(balls)
             return found
         if any(i in PASSES for i in term.shape["lines"]):
             found["balls"] = counted(term.shape["balls"])

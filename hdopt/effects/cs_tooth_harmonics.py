@@ -23,7 +23,7 @@ from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import UM, Sines
 from hdopt.effects.estimate import FitEstimate, Parameter
 from hdopt.effects.met import Spline, Waves
-from hdopt.effects.probe import Probe, widest_that_pays
+from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.term import Shape, Term
 
 RUNS: tuple[tuple[int, ...], ...] = ((2,), (3,), *(tuple(range(2, k + 1)) for k in (3, 4, 5, 8, 14, 24, 40, 70)))
@@ -92,7 +92,7 @@ class CircularSplineToothHarmonics(Effect):
         runs = [run for run in RUNS if run[-1] <= limit]
         if runs and runs[-1][-1] < int(limit) < RUNS[-1][-1]:
             runs.append(tuple(range(2, int(limit) + 1)))
-        terms = widest_that_pays(probe, terms_at(self, samples, [shape_of(run) for run in runs]))
+        terms = best_terms(probe, terms_at(self, samples, [shape_of(run) for run in runs]), 2)
         few = [members for members in self._strongest_few(probe, limit) if self.stands_alone(members)]
         return [*terms, *terms_at(self, samples, [shape_of(members) for members in few if not has_no_gap(members)])]
 

@@ -55,19 +55,6 @@ class Probe(Protocol):
         """
 
 
-def widest_that_pays(probe: Probe, terms: Sequence[Term]) -> list[Term]:
-    """The best of `terms` for the residual of `probe` after paying for their freedom, and the one before it; `terms`
-    grow, and the growing stops where it twice did not pay.
-    """
-    cost = math.log(max(len(probe.residual), 2))
-    ranked: list[tuple[float, int]] = []
-    for i, term in enumerate(terms):
-        ranked.append((probe.gain(term) - cost * term.freedom, i))
-        if i - max(ranked)[1] >= 2:
-            break
-    return [terms[i] for _, i in sorted(ranked, reverse=True)[:2]]
-
-
 def best_terms(probe: Probe, terms: Sequence[Term], keep: int = 1) -> list[Term]:
     """The `keep` of `terms` with the largest gain on the residual of `probe`, after paying for freedom and odds."""
     if len(terms) < 2:

@@ -502,7 +502,7 @@ def test_a_defect_of_the_output_is_looked_for_in_parts_of_its_widest():
 def runs_offered(monkeypatch, effect, **samples):
     """The runs of waves that a search looks at, in their order."""
     offered = []
-    monkeypatch.setattr(cs_tooth_harmonics, "widest_that_pays", lambda probe, terms: offered.extend(terms) or [])
+    monkeypatch.setattr(cs_tooth_harmonics, "best_terms", lambda probe, terms, keep: offered.extend(terms) or [])
     monkeypatch.setattr(cs_tooth_harmonics, "terms_at", lambda effect, samples, shapes: shapes)
     monkeypatch.setattr(CircularSplineToothHarmonics, "_strongest_few", lambda self, probe, limit: [])
     assert EFFECTS[effect].search(SimpleNamespace(samples=SimpleNamespace(**samples))) == []
