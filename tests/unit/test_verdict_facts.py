@@ -12,6 +12,7 @@ import pytest
 from test_verdict_rules import CLEAN, FIRED, NAMED, held
 
 from hdopt.diagnosis.checks.assessment import Evidence
+from hdopt.diagnosis.checks.confounding import Confounding
 from hdopt.diagnosis.checks.other_laws import OtherLaw
 from hdopt.diagnosis.checks.repeated_passes import NOTHING_REPEATED, RepeatedPasses
 from hdopt.diagnosis.inference import fit as fitting
@@ -22,6 +23,7 @@ from hdopt.diagnosis.search import candidates
 from hdopt.diagnosis.search.penalty import Scale, penalty
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.verdict import facts as facts_module
+from hdopt.diagnosis.verdict import rivals as rivals_module
 from hdopt.diagnosis.verdict import rules
 from hdopt.diagnosis.verdict.facts import (
     find,
@@ -587,7 +589,8 @@ def test_facts_are_drawn_from_what_measures_them(monkeypatch):
 
 
 def test_what_a_part_may_be_is_another_explanation(monkeypatch):
-    """Beside those that are candidates, placebos and imitators. Would catch one of the four that is not listed."""
+    """Beside those that are candidates, placebos and imitators. Would catch one of the four that is not listed, and
+    what is not said likened to others."""
     no = dict.fromkeys(("turns_suffice", "momentary", "clearly_unexplained", "too_little", "scale_is_as_good"), False)
     no |= dict.fromkeys(("is_a_walk", "above_resolution", "beaten_by_generic", "found_again"), False)
     no |= dict.fromkeys(("own_gain", "power_together", "unseen_gain", "unseen_rms", "left_over_passes"), 0.0)
@@ -599,5 +602,34 @@ def test_what_a_part_may_be_is_another_explanation(monkeypatch):
     for name, value in {**no, **{one: ((one,),) for one in lists}}.items():
         monkeypatch.setattr(facts_module, name, lambda *about, value=value, **more: value)
     monkeypatch.setattr(facts_module.Facts, "named", property(lambda facts: True))
+    monkeypatch.setattr(facts_module.Facts, "said", property(lambda facts: True))
+    effects = (NamedEffect("hysteresis", 0.9, {}, {}, ""),)
+    monkeypatch.setattr(facts_module, "as_right_as_such_names", lambda *about: effects)
+    monkeypatch.setattr(facts_module, "shared_with_imitators", lambda *about: effects)
+    asked = []
+    monkeypatch.setattr(facts_module, "confounded_pairs", lambda *about: asked.append(about[-1]) or ())
     found.settings = replace(found.settings, verdict=replace(found.settings.verdict, most_rivals=9))
     assert set(find(found).facts.rivals) == {(one,) for one in lists}
+    assert asked == [["hysteresis"]]
+
+
+@pytest.mark.parametrize("said", [("tooth_mesh",), ("hysteresis", "tooth_mesh"), ("hysteresis",), ()])
+def test_what_is_not_said_is_likened_to_nothing(monkeypatch, said):
+    """A lobe smaller than the model's resolution beside a mesh that is said stopped a diagnosis with KeyError. Every
+    effect of both searches that is not said is left out of the pairs; fault caught: those of all terms."""
+    found = evidence(candidate({"hysteresis": 1.0, "circular_spline_lobing": 1e-9, SCALE: 1.0}), lacking={})
+    found.inflation, found.rows.ratio, found.rows.highest_order = 1.0, 80.0, 20.0
+    high = candidate({"tooth_mesh": 1.0, "_any_order": 1.0})
+    high.fit.terms = tuple(replace(term, shape={"sidebands": (0,)}) for term in high.fit.terms)
+    high.fit.problem = SimpleNamespace(rows=SimpleNamespace(rows_per_turn=400.0))
+
+    def alike(fit, index, inflation=1.0, others=(), order_range=None):
+        name = fit.terms[index].effect
+        return [Confounding(name, "resonance", 1.0, 1.0, 0.0, "record at two speeds")]
+
+    monkeypatch.setattr(rivals_module, "confounded_with", alike)
+    pairs = rivals_module.confounded_pairs(found, True, high, said)
+    assert sorted(pair.effect for pair in pairs) == sorted(said)
+    effects = [NamedEffect(name, 0.9, {"rms_arcmin": 1.0}, {}, "") for name in said]
+    shared = rivals_module.shared_with_imitators(effects, pairs, (), DEFAULT.verdict)
+    assert [one.confidence for one in shared] == [pytest.approx(0.45)] * len(said)

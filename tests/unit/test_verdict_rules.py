@@ -206,12 +206,20 @@ def held(turns, variance):
 
 
 @pytest.mark.parametrize(
-    ("placebo", "apart", "said"),
-    [(1.0, 0.0, (("hysteresis",),)), (1.0, 19.0, (("hysteresis",),)), (1.0, 21.0, ()), (1.5, 0.0, ())],
+    ("placebo", "apart", "odds", "said"),
+    [
+        (1.0, 0.0, 0.0, (("hysteresis",),)),
+        (1.0, 19.0, 0.0, (("hysteresis",),)),
+        (1.0, 21.0, 0.0, ()),
+        (1.0, 15.0, -4.0, (("hysteresis",),)),
+        (1.0, 15.0, -10.0, ()),
+        (1.5, 0.0, 0.0, ()),
+    ],
 )
-def test_a_placebo_that_predicts_as_well_is_another_explanation(placebo, apart, said):
-    """Where single rows part the two by more than 20 in log evidence, whole turns that do not are no tie."""
-    pair = SimpleNamespace(effect="lost_motion", other="hysteresis", evidence_apart=apart)
+def test_a_placebo_that_predicts_as_well_is_another_explanation(placebo, apart, odds, said):
+    """Where single rows part the two by more than 20 in log evidence, whole turns that do not are no tie; nor do they
+    where the placebo is that much less likely to begin with."""
+    pair = SimpleNamespace(effect="lost_motion", other="hysteresis", evidence_apart=apart, odds=odds)
     settings = DEFAULT
     evidence = SimpleNamespace(
         settings=settings,

@@ -219,8 +219,8 @@ def find(evidence: Evidence) -> Findings:
         left_over_floor=left_over_floor(evidence),
         other_law=evidence.other_law.log_evidence,
     )
-    pairs = confounded_pairs(evidence, facts.named, high) if facts.said else ()
     effects = as_right_as_such_names(effects_said(evidence, facts, high), evidence)
+    pairs = confounded_pairs(evidence, facts.named, high, [one.id for one in effects]) if facts.said else ()
     as_good: Sets = ()
     if facts.named:
         as_good = rivals(evidence, high)

@@ -112,15 +112,16 @@ def ahead_without_physics(evidence: Evidence) -> float:
 
 def placebo_as_good(evidence: Evidence, pairs: Sequence[Confounding]) -> Sets:
     """The placebo, as another explanation, where it predicts unseen turns as well as what was found in `evidence`, and
-    none of the confounded `pairs` says that rows part them: what tells play from friction lies in the few rows after a
-    reversal, and drowns in whole turns.
+    none of the confounded `pairs` says that rows and prior odds part them: what tells play from friction lies in the
+    few rows after a reversal, and drowns in whole turns.
     """
     settings = evidence.settings.verdict
     base, own = evidence.base_held_out.variance, evidence.extended_held_out.variance
     found = {name for name in evidence.selection.best.effects if is_effect(name)}
     if evidence.placebo is None or not found or evidence.placebo in found:
         return ()
-    apart = [pair.evidence_apart for pair in pairs if pair.effect in found and pair.other == evidence.placebo]
+    alike = (pair for pair in pairs if pair.effect in found and pair.other == evidence.placebo)
+    apart = [pair.evidence_apart - pair.odds for pair in alike]
     if apart and min(apart) >= settings.placebo_apart:
         return ()
     reached = base - evidence.placebo_held_out.variance >= settings.placebo_share * (base - own)
@@ -169,23 +170,25 @@ def shared_with_imitators(
     return tuple(replace(one, confidence=one.confidence / shares[one.id]) for one in effects)
 
 
-def confounded_pairs(evidence: Evidence, named: bool, high: Candidate | None) -> tuple[Confounding, ...]:
-    """Each effect that is said against every other of the catalogue, the most confounded pair first: of the best set
-    where it is `named`, and of what was found in `high` orders. `evidence` is that of the diagnosis.
+def confounded_pairs(
+    evidence: Evidence, named: bool, high: Candidate | None, said: Sequence[str]
+) -> tuple[Confounding, ...]:
+    """Each effect that is `said` (ids) against every other of the catalogue, the most confounded pair first: of the
+    best set where it is `named`, and of what was found in `high` orders. `evidence` is that of the diagnosis.
     """
     pairs: list[Confounding] = []
     if named:
         others = [name for name in EFFECTS if name not in evidence.lacking]
         fit = evidence.selection.best.fit
         for index, term in enumerate(fit.terms):
-            if is_effect(term.effect):
+            if term.effect in said:
                 pairs += confounded_with(fit, index, evidence.inflation, others)
     if high is not None:
         above, highest = ripple_orders(evidence.rows, high.fit.problem.rows, evidence.settings.high_order)
         # A mesh inside the zones may stand within the orders of the averaged rows.
         orders = (min(above, lowest_order(high.fit.terms, evidence.rows.ratio)), highest)
         for index, term in enumerate(high.fit.terms):
-            if is_effect(term.effect):
+            if term.effect in said:
                 pairs += confounded_with(high.fit, index, others=HIGH_ORDER, order_range=orders)
     return tuple(sorted(pairs, key=lambda pair: -pair.imitates))
 
