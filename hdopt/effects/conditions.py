@@ -24,6 +24,11 @@ ROWS_OF_THE_START = 5
 """Rows from which the speed is taken with which a piece begins."""
 
 
+def varies(values: Array | None, share: float) -> bool:
+    """Whether a channel is known, and its `values` (n,) have a standard deviation above this `share` of the largest."""
+    return values is not None and bool(np.std(values) > share * np.max(np.abs(values)))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Conditions:
     """Rows of one motion or of several recordings; every array has shape (n,), in order of time.

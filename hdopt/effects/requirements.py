@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hdopt.effects.conditions import Conditions
+from hdopt.effects.conditions import Conditions, varies
 
 LEAST_SPEED_SPREAD, LEAST_TORQUE_SPREAD = 0.003, 0.02
 """Standard deviation over the largest value from which speed or torque varies."""
@@ -32,16 +32,14 @@ def varying_torque(conditions: Conditions) -> str | None:
     """None where the `conditions` have a torque and it varies, else what they lack."""
     if conditions.torque is None:
         return "a torque column"
-    spread, largest = float(np.std(conditions.torque)), float(np.max(np.abs(conditions.torque)))
-    return "torque that varies" if spread <= LEAST_TORQUE_SPREAD * largest or spread == 0 else None
+    return None if varies(conditions.torque, LEAST_TORQUE_SPREAD) else "torque that varies"
 
 
 def varying_speed(conditions: Conditions) -> str | None:
     """None where the `conditions` have a speed and it varies, else what they lack."""
     if conditions.speed is None:
         return "a time column"
-    spread, largest = float(np.std(conditions.speed)), float(np.max(np.abs(conditions.speed)))
-    return "speed that varies" if spread <= LEAST_SPEED_SPREAD * largest else None
+    return None if varies(conditions.speed, LEAST_SPEED_SPREAD) else "speed that varies"
 
 
 def varying_temperature(conditions: Conditions) -> str | None:

@@ -10,7 +10,7 @@ from hdopt.arrays import Array
 from hdopt.diagnosis.alternatives.base import Alternative, of_largest
 from hdopt.diagnosis.alternatives.late import lagging, lags, within_reach
 from hdopt.effects.base import terms_at
-from hdopt.effects.conditions import Conditions
+from hdopt.effects.conditions import Conditions, varies
 from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Term
@@ -98,7 +98,7 @@ class LoadInMotion(UnderLoad):
 
     def _motions(self, samples: Conditions) -> tuple[bool, bool, bool]:
         """Whether the direction, the speed and the size of the speed differ along `samples`, each from the others."""
-        size = np.zeros(1) if samples.locked or samples.speed is None else np.abs(samples.speed)
-        changes = bool(np.std(size) > self.settings.speed_levels * np.max(size))
+        size = None if samples.locked or samples.speed is None else np.abs(samples.speed)
+        changes = varies(size, self.settings.speed_levels)
         reverses = samples.reverses and not samples.locked
         return reverses, changes, changes and reverses

@@ -10,7 +10,7 @@ from hdopt.arrays import Array
 from hdopt.diagnosis.alternatives.base import Alternative, of_largest
 from hdopt.diagnosis.alternatives.late import lagging, lags, within_reach
 from hdopt.effects.base import terms_at
-from hdopt.effects.conditions import Conditions
+from hdopt.effects.conditions import Conditions, varies
 from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.term import Term
 
@@ -26,8 +26,7 @@ class EvenSpeed(Alternative):
     def lacks(self, samples: Conditions) -> str | None:
         if samples.locked or samples.speed is None:
             return "speed that varies"
-        size = np.abs(samples.speed)
-        return "speed that varies" if np.std(size) < self.settings.speed_levels * np.max(size) else None
+        return None if varies(np.abs(samples.speed), self.settings.speed_levels) else "speed that varies"
 
     def search(self, probe: Probe) -> list[Term]:
         s, samples = self.settings, probe.samples

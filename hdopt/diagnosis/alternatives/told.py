@@ -9,7 +9,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.diagnosis.alternatives.base import Alternative
 from hdopt.drive.geometry import ARCMIN
-from hdopt.effects.conditions import Conditions
+from hdopt.effects.conditions import Conditions, varies
 from hdopt.effects.estimate import FitEstimate
 from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.term import Shape, Term
@@ -49,8 +49,7 @@ class Skew(Alternative):
     def lacks(self, samples: Conditions) -> str | None:
         if samples.locked or samples.speed is None or samples.time is None:
             return "time and speed"
-        varies = float(np.std(samples.speed)) >= self.settings.speed_levels * float(np.max(np.abs(samples.speed)))
-        return None if varies else "speed that varies"
+        return None if varies(samples.speed, self.settings.speed_levels) else "speed that varies"
 
     def reads_input(self, shape: Shape) -> bool:
         return True

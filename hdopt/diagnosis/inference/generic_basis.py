@@ -12,6 +12,7 @@ from hdopt.arrays import Array
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import RIDGE, TINY
 from hdopt.diagnosis.settings import DEFAULT, GenericSettings
+from hdopt.effects.conditions import varies
 from hdopt.effects.probe import strongest_orders
 from hdopt.effects.sines import sine_columns
 from hdopt.recordings.rows import Rows
@@ -79,26 +80,19 @@ def _add_load(found: _Columns, rows: Rows, settings: GenericSettings) -> None:
             found.add(torque[:, None] * sine_columns(rows.theta, [1, 2]), "torque")
             if rows.reverses:
                 found.add(torque * rows.direction, "torque")
-            if _speed_varies(rows, settings):
+            if varies(rows.speed, settings.speed_varies):
                 found.add(torque * rows.known_speed, "torque")
     if rows.temperature is not None and np.std(rows.temperature) > 0:
         found.add(_polynomial(rows.temperature, settings.temperature_degree), "temperature")
 
 
 def _add_speed(found: _Columns, rows: Rows, settings: GenericSettings) -> None:
-    if not _speed_varies(rows, settings):
+    if not varies(rows.speed, settings.speed_varies):
         return
     found.add(_polynomial(rows.known_speed, settings.speed_degree), "speed")
     size = np.abs(rows.known_speed)
-    if not rows.locked and np.std(size) > settings.speed_levels * np.max(size):
+    if not rows.locked and varies(size, settings.speed_levels):
         found.add((size / np.max(size))[:, None] * sine_columns(rows.theta, SPEED_ORDERS), "speed")
-
-
-def _speed_varies(rows: Rows, settings: GenericSettings) -> bool:
-    """Whether the speed of `rows` is known and differs along them, by its sign or its size."""
-    if rows.speed is None:
-        return False
-    return bool(np.std(rows.speed) > settings.speed_varies * np.max(np.abs(rows.speed)))
 
 
 def _add_direction(found: _Columns, rows: Rows, settings: GenericSettings) -> None:
