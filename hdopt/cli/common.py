@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar  # Any: values of JSON; what the 
 import click
 from click.shell_completion import CompletionItem
 
-from hdopt.cli.completion import a_file, drives, engines, offered, studies
+from hdopt.cli.completion import a_file, drives, engines, offered, structures, studies
 from hdopt.cli.log import logged
 from hdopt.cli.whole_number import WholeNumber
 from hdopt.files import HasTables, claim_output, files_of_work, to_csv, to_json, write_tables, write_text
@@ -101,6 +101,12 @@ set_option = click.option(
     "--set", "overrides", metavar="KEY=VALUE", multiple=True, help="Change a key of the study; may be repeated."
 )
 drive_option = click.option("--drive", metavar="NAME", shell_complete=offered(drives), help="A shipped drive, by name.")
+structure_option = click.option(
+    "--structure",
+    metavar="S",
+    shell_complete=offered(structures),
+    help="integral, automatic, one_way_major or one_way_minor.",
+)
 
 
 study_argument = click.argument("study", required=False, metavar="[STUDY]", shell_complete=offered(studies, files=True))

@@ -10,8 +10,17 @@ from typing import TYPE_CHECKING, Any, TypeVar  # Any: what the command's other 
 
 import click
 
-from hdopt.cli.common import CHECK, OutputFile, StudyOptions, answer_options, emit, study_options, table_options
-from hdopt.cli.completion import a_file, offered, structures
+from hdopt.cli.common import (
+    CHECK,
+    OutputFile,
+    StudyOptions,
+    answer_options,
+    emit,
+    structure_option,
+    study_options,
+    table_options,
+)
+from hdopt.cli.completion import a_file
 from hdopt.words import settled
 
 if TYPE_CHECKING:
@@ -54,12 +63,7 @@ def file_options(command: Callable[..., R]) -> Callable[..., R]:
 @click.command()
 @table_options
 @study_options
-@click.option(
-    "--structure",
-    metavar="S",
-    shell_complete=offered(structures),
-    help="integral, automatic, one_way_major or one_way_minor.",
-)
+@structure_option
 @file_options
 @click.option("--context", is_flag=True, help="With bearing races, flexspline ring and circular spline.")
 @click.option(

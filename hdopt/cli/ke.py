@@ -8,8 +8,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hdopt.cli.common import StudyOptions, check_option, emit, json_option, status, study_options, table_options
-from hdopt.cli.completion import geometries, offered, structures, unhyphened
+from hdopt.cli.common import (
+    StudyOptions,
+    check_option,
+    emit,
+    json_option,
+    status,
+    structure_option,
+    study_options,
+    table_options,
+)
+from hdopt.cli.completion import geometries, offered, unhyphened
 from hdopt.cli.whole_number import WholeNumber
 from hdopt.words import counted
 
@@ -20,12 +29,7 @@ if TYPE_CHECKING:
 @click.command()
 @table_options
 @study_options
-@click.option(
-    "--structure",
-    metavar="S",
-    shell_complete=offered(structures),
-    help="integral, automatic, one_way_major or one_way_minor.",
-)
+@structure_option
 @click.option("--sampling-deg", type=float, help="Also take the peak-to-peak only on this grid, from 0.")
 @click.option("--turns", type=float, help="Input turns of that grid; one full relative turn if omitted.")
 @check_option
