@@ -24,6 +24,7 @@ from hdopt.kinematics.beat_tables import (
     compiled,
     four,
     inlined,
+    least_of,
     whole_of,
 )
 from hdopt.kinematics.branches import TIE_MM
@@ -155,18 +156,6 @@ def fill_circular(table: Array, bends: tuple[float, float], rows: Singles) -> Ci
     return Circular(table, rows, bends[0], bends[1], extent, steepest * m * PER_RAD)
 
 
-@compiled
-def least_single(values: Singles, n: int) -> float:
-    """Least of the first `n` of `values`, which are folded in halves and lost."""
-    while n > 1:
-        half = (n + 1) // 2
-        for i in range(n - half):
-            a, b = values[i], values[i + half]
-            values[i] = a if a < b else b
-        n = half
-    return float(values[0])
-
-
 @inlined
 def largest_of_branches(branches: Array, bends: Singles, sizes: Singles, turns: Singles) -> Bends:
     """`Bends` of wrapped `branches`, whose offsets on the FS bend otherwise by some hundredths; `bends`, `sizes` and
@@ -182,7 +171,7 @@ def largest_of_branches(branches: Array, bends: Singles, sizes: Singles, turns: 
             bend, size = bends_by if bends_by > bend else bend, abs(here) if abs(here) > size else size
             turn = turns_by if turns_by > turn else turn
         bends[i], sizes[i], turns[i] = -narrowed(bend), -narrowed(size), -narrowed(turn)
-    return Bends(-least_single(bends, n), -least_single(sizes, n), -least_single(turns, n))
+    return Bends(-least_of(bends, n), -least_of(sizes, n), -least_of(turns, n))
 
 
 @inlined

@@ -142,7 +142,7 @@ def by_four(values: Array, at: Four) -> float:
 
 
 @compiled
-def least_of(values: Array, n: int) -> float:
+def least_of(values: Array | Singles, n: int) -> float:
     """Least of the first `n` of `values`, which are folded in halves and lost: lane by lane, as a loop over all of them
     would not be."""
     while n > 1:
