@@ -273,15 +273,20 @@ class BearingPass(Effect):
         )
         best = best_of(about(best, (-0.4, -0.2, 0.0, 0.2, 0.4)))
         likely = self._likely_balls(best["ball_to_pitch_ratio"], spectrum)
-        best = best_of(
+        sets = [
             {**best, "balls": n, "zones": members}
             for n in sorted({0, best["balls"], *likely})
             for members in ZONE_HARMONICS
             if n not in members
-        )
-        paid = trials * (len(BALLS) if best["balls"] else 1)
-        fine = about(best, (-0.1, -0.05, 0.0, 0.05, 0.1))
-        return best_terms(probe, [self.term(samples, shape, trials=paid) for shape in fine])
+        ]
+        # Of many waves some may be missing, and the set is no name; of few that are all there it is one.
+        best, of_few = best_of(sets), best_of(shape for shape in sets if len(zone_orders(shape)) <= FEW_WAVES)
+        found: list[Term] = []
+        for one in (best,) if of_few == best else (best, of_few):
+            paid = trials * (len(BALLS) if one["balls"] else 1)
+            fine = about(one, (-0.1, -0.05, 0.0, 0.05, 0.1))
+            found += best_terms(probe, [self.term(samples, shape, trials=paid) for shape in fine])
+        return found
 
     @staticmethod
     def _likely_ratios(span_turns: float, ratios: Array, spectrum: _Spectrum) -> list[float]:
