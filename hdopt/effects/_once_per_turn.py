@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-import numpy as np
-
 from hdopt.arrays import Array
 from hdopt.effects.base import Effect, terms_at
 from hdopt.effects.conditions import Conditions
@@ -60,7 +58,7 @@ class ShaftSine(Effect):
         )
 
     def every_part_shows(self, term: Term, estimate: FitEstimate) -> bool:
-        size = np.hypot(estimate.values[0 : term.width : 2], estimate.values[1 : term.width : 2])
+        size = estimate.sizes(term.width // 2)
         return bool(size[0] > LEAST_PART * size.max())
 
     def reads_input(self, shape: Shape) -> bool:

@@ -117,9 +117,8 @@ def zone_orders(shape: Shape) -> tuple[int, ...]:
 
 def _waves_that_show(term: Term, estimate: FitEstimate) -> tuple[Array, Mask]:
     """The size of each wave of `term`, and whether it surely is there."""
-    sines = 2 * (term.width // 2)
-    size = np.hypot(estimate.values[0:sines:2], estimate.values[1:sines:2])
-    variance = np.diag(estimate.covariance)[:sines]
+    size = estimate.sizes(term.width // 2)
+    variance = np.diag(estimate.covariance)[: 2 * len(size)]
     return size, size > LINE_SHOWS * np.sqrt(0.5 * (variance[0::2] + variance[1::2]))
 
 
@@ -257,36 +256,32 @@ class BearingPass(Effect):
             return []
         trials, samples = spectrum.trials, probe.samples
 
-        def best_of(shapes: Iterable[Shape]) -> Shape:
+        def ranked(shapes: Iterable[Shape]) -> list[Term]:
             terms = [self.term(samples, s, trials=trials * (len(BALLS) if s["balls"] else 1)) for s in shapes]
-            return best_terms(probe, terms)[0].shape
+            return best_terms(probe, terms, len(terms))
 
         def about(shape: Shape, steps: Sequence[float]) -> list[Shape]:
             ratio = shape["ball_to_pitch_ratio"]
             return [{**shape, "ball_to_pitch_ratio": ratio + d / samples.span_turns} for d in steps]
 
         few, pair, many = ZONE_HARMONICS[0], ZONE_HARMONICS[2], ZONE_HARMONICS[5]
-        best = best_of(
+        first = ranked(
             {"ball_to_pitch_ratio": r, "balls": n, "zones": members}
             for r in self._likely_ratios(samples.span_turns, ratios, spectrum)
             for n, members in ((0, few), (0, pair), (0, many), (self._likely_balls(r, spectrum)[-1], pair))
         )
-        best = best_of(about(best, (-0.4, -0.2, 0.0, 0.2, 0.4)))
+        best = ranked(about(first[0].shape, (-0.4, -0.2, 0.0, 0.2, 0.4)))[0].shape
         likely = self._likely_balls(best["ball_to_pitch_ratio"], spectrum)
-        sets = [
+        sets = ranked(
             {**best, "balls": n, "zones": members}
             for n in sorted({0, best["balls"], *likely})
             for members in ZONE_HARMONICS
             if n not in members
-        ]
+        )
         # Of many waves some may be missing, and the set is no name; of few that are all there it is one.
-        best, of_few = best_of(sets), best_of(shape for shape in sets if len(zone_orders(shape)) <= FEW_WAVES)
-        found: list[Term] = []
-        for one in (best,) if of_few == best else (best, of_few):
-            paid = trials * (len(BALLS) if one["balls"] else 1)
-            fine = about(one, (-0.1, -0.05, 0.0, 0.05, 0.1))
-            found += best_terms(probe, [self.term(samples, shape, trials=paid) for shape in fine])
-        return found
+        of_few = next(term for term in sets if len(zone_orders(term.shape)) <= FEW_WAVES)
+        chosen = sets[:1] if of_few is sets[0] else [sets[0], of_few]
+        return [ranked(about(term.shape, (-0.1, -0.05, 0.0, 0.05, 0.1)))[0] for term in chosen]
 
     @staticmethod
     def _likely_ratios(span_turns: float, ratios: Array, spectrum: _Spectrum) -> list[float]:

@@ -11,8 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from hdopt.arrays import Array
 from hdopt.drive.geometry import DriveGeometry
 from hdopt.effects.base import Effect, Keys, terms_at
@@ -90,7 +88,7 @@ class CircularSplineLobing(Effect):
 
     def every_part_shows(self, term: Term, estimate: FitEstimate) -> bool:
         """An overtone is at most as large as its wave: of n lobes a larger one is 2 n lobes."""
-        size = np.hypot(estimate.values[0 : term.width : 2], estimate.values[1 : term.width : 2])
+        size = estimate.sizes(term.width // 2)
         return bool(size[0] >= size.max())
 
     def term(self, conditions: Conditions, shape: Shape, motion: Array | None = None) -> Term:

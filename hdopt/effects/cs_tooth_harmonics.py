@@ -120,7 +120,7 @@ class CircularSplineToothHarmonics(Effect):
         members = members_of(term.shape)
         if not self.stands_alone(members):
             return False
-        size = np.hypot(estimate.values[0 : term.width : 2], estimate.values[1 : term.width : 2])
+        size = estimate.sizes(term.width // 2)
         shown = size > LEAST_OF_FEW * size.max()
         if not has_no_gap(members):
             return bool(np.all(shown))

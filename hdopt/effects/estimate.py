@@ -73,6 +73,10 @@ class FitEstimate:
         half = HALF_WIDTH_95 * math.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0))
         return Parameter(value, value - half, value + half, unit)
 
+    def sizes(self, sines: int) -> Array:
+        """Sizes of the first so many `sines`, of which each has a sine's and a cosine's coefficient, (sines,)."""
+        return np.asarray(np.hypot(self.values[0 : 2 * sines : 2], self.values[1 : 2 * sines : 2]))
+
     def amplitude(self, sin: int, cos: int, unit: str = "arcmin", scale: float = 1.0) -> Parameter:
         """Amplitude of a pair of sine and cosine coefficients (their places `sin` and `cos`), times `scale`, in `unit`.
 

@@ -453,7 +453,6 @@ def first(monkeypatch):
                 return np.ones((len(rows.error), 1))
 
         rows = SimpleNamespace(error=np.asarray(errors, float))
-        monkeypatch.setattr(stages, "row_of_each_sample", lambda recordings, neighbours: neighbours)
         monkeypatch.setattr(stages, "gather", lambda recordings, neighbours: rows)
         monkeypatch.setattr(stages, "neighbours_for", lambda recordings: 1)
         monkeypatch.setattr(stages, "nuisances_for", lambda *about: Nuisances(hidden))
