@@ -15,10 +15,10 @@ from hdopt.drive.errors import DriveErrors
 from hdopt.drive.geometry import Drive, Structure
 from hdopt.effects.met import Spline
 from hdopt.errors import HdoptError
-from hdopt.kinematics.closed_form import TipGeometry, tip_geometry
 from hdopt.kinematics.waveform import full_turn
 from hdopt.parallel.shared_memory import in_blocks
 from hdopt.simulation.effect_values import EffectValues
+from hdopt.simulation.gearing import Gearing, gearing_of
 from hdopt.simulation.model import ExtendedModel
 from hdopt.simulation.operation import Operation
 
@@ -175,10 +175,10 @@ def matrix_peak_to_peak_arcmin(drive: Drive, matrix: Array, added: AddedTable, h
 
 @dataclass(frozen=True)
 class CellsOfTurn:
-    """What the compiled kernel knows of drives with effects besides their errors: `_constants`, and the `table` of the
-    effects cell by cell."""
+    """What the compiled kernel knows of drives with effects besides their errors: their `gearing`, and the `table` of
+    the effects cell by cell."""
 
-    constants: tuple[TipGeometry, float, float, int, float]
+    gearing: Gearing
     table: CellTable
 
     @classmethod
@@ -186,23 +186,22 @@ class CellsOfTurn:
         """Of the effects of the table `added` in drives that are built as `drive`; `homogenization` is k_e."""
         from hdopt.simulation.cell_kernel import cell_table
 
-        constants = _constants(drive, homogenization)
-        _, _, advance, turns, scale = constants
-        cells = added.zones.shape[2] // (added.stride * turns)
-        splines = _spline_tables(added, advance, cells)
-        return cls(constants, cell_table(added.zones, added.beside, cells, turns, scale, splines))
+        gearing = gearing_of(drive, homogenization)
+        cells = added.zones.shape[2] // (added.stride * gearing.turns)
+        splines = _spline_tables(added, gearing.advance, cells)
+        table = cell_table(added.zones, added.beside, cells, gearing.turns, gearing.scale, splines)
+        return cls(gearing, table)
 
     def on_splines(self, added: AddedTable) -> CellsOfTurn:
         """The same with what `added` has on the splines."""
         cells = self.table.least.shape[2]
-        return replace(self, table=self.table._replace(splines=_spline_tables(added, self.constants[2], cells)))
+        return replace(self, table=self.table._replace(splines=_spline_tables(added, self.gearing.advance, cells)))
 
     def fill(self, rows: Array, out: Array) -> None:
         """Fill `out` (n,) with the peak-to-peak, arcmin, of drives with errors as `rows` (n, 12)."""
         from hdopt.simulation.cell_kernel import extended_block
 
-        tip, tan_alpha, advance, _, scale = self.constants
-        extended_block(tip, tan_alpha, advance, scale, rows, self.table, out)
+        extended_block(self.gearing, rows, self.table, out)
 
 
 def stacked_peak_to_peak_arcmin(drive: Drive, matrix: Array, added: AddedTable, homogenization: float = 1.0) -> Array:
@@ -306,7 +305,7 @@ def local_extremes(drive: Drive, row: Array, added: AddedTable, most: int) -> tu
     """
     from hdopt.simulation.walk_kernel import extended_walk
 
-    values = extended_walk(*_constants(drive), np.ascontiguousarray(row), added.walked)
+    values = extended_walk(gearing_of(drive), np.ascontiguousarray(row), added.walked)
     step = 2 * math.pi * drive.geometry.beat_phases / values.shape[1]
     found = []
     for sign in (1.0, -1.0):
@@ -329,15 +328,7 @@ def local_extremes(drive: Drive, row: Array, added: AddedTable, most: int) -> tu
 
 
 def _near(drive: Drive, row: Array, added: AddedTable, at: LocalExtremes, half: float) -> Array:
-    from hdopt.simulation.walk_kernel import extended_near
+    from hdopt.simulation.walk_kernel import Places, extended_near
 
-    row = np.ascontiguousarray(row)
-    return extended_near(*_constants(drive), row, added.every_place, at.way, at.theta, half, at.sign, LOCAL_STEPS)
-
-
-def _constants(drive: Drive, homogenization: float = 1.0) -> tuple[TipGeometry, float, float, int, float]:
-    """What the compiled walk knows of a drive besides its errors."""
-    gear = drive.geometry
-    advance = gear.flexspline_advance
-    scale = homogenization * gear.arcmin_per_mm
-    return tip_geometry(drive), math.tan(gear.pressure_angle), advance, gear.beat_phases, scale
+    places = Places(at.way, at.theta, half, at.sign, LOCAL_STEPS)
+    return extended_near(gearing_of(drive), np.ascontiguousarray(row), added.every_place, places)

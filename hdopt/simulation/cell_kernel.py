@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hdopt.arrays import Array
-from hdopt.kinematics.closed_form import TipGeometry
 from hdopt.kinematics.compiled_closed_form import allocating, compiled, entry, inlined, motion_at, rim_depth
+from hdopt.simulation.gearing import Gearing
 from hdopt.simulation.walk_kernel import EDGE, MOST_CUTS, WalkedDrive, drive_of, on_spline, on_splines, rims, rims_apart
 
 ROUNDS = 2
@@ -479,25 +479,17 @@ def sags(table: Array, length: int, ahead: int) -> Array:
 
 
 @entry
-def extended_block(
-    tip: TipGeometry,
-    tan_alpha: float,
-    advance: float,
-    scale: float,
-    matrix: Array,
-    tables: CellTable,
-    out: Array,
-) -> None:
+def extended_block(gearing: Gearing, matrix: Array, tables: CellTable, out: Array) -> None:
     """Fill `out` (n,) with the peak-to-peak (arcmin) of each row of `matrix` (n, 12), errors as in ERROR_NAMES.
 
-    `tip`, `tan_alpha` and `advance` (Z_CS/Z_FS) are the drive's; `scale` is arcmin per mm of arc, times k_e. `tables`
-    holds the effects with one more axis in front, that of the directions of motion.
+    The drives are of `gearing`; `tables` holds the effects with one more axis in front, that of the directions of
+    motion.
     """
     directions, _, edges, turns = tables.edges.shape
-    circle = _circle(edges - 1, turns, advance)
+    circle = _circle(edges - 1, turns, gearing.advance)
     grid, every_cut, least = np.empty((ROWS, edges)), np.empty(MOST_CUTS), np.empty(2)
     for row in range(matrix.shape[0]):
-        drive = drive_of(tip, tan_alpha, advance, turns, scale, matrix[row])
+        drive = drive_of(gearing, matrix[row])
         _fill_grid(drive, circle, tables.splines.cs, grid)
         cuts = every_cut[: _changes(drive, grid, every_cut)]
         least[:] = math.inf
@@ -512,4 +504,4 @@ def extended_block(
                 tables.splines,
             )
             _least_of_turns(drive, grid, cuts, table, circle, least)
-        out[row] = -scale * (least[0] + least[1])
+        out[row] = -gearing.scale * (least[0] + least[1])

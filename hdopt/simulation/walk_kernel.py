@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hdopt.arrays import Array, Index
-from hdopt.kinematics.closed_form import RigidMotion, RimConstants, TipGeometry
+from hdopt.kinematics.closed_form import RigidMotion, RimConstants
 from hdopt.kinematics.compiled_closed_form import (
     allocating,
     compiled,
@@ -25,6 +25,7 @@ from hdopt.kinematics.compiled_closed_form import (
     rim_depth,
     tooth_deviation,
 )
+from hdopt.simulation.gearing import Gearing
 
 GOLDEN = (math.sqrt(5) - 1) / 2
 CELLS, BISECTIONS, MOST_CUTS = 120, 34, 16
@@ -60,6 +61,17 @@ class Added(NamedTuple):
     beside: Array
     cs: Array
     fs: Array
+
+
+class Places(NamedTuple):
+    """Where least values of `sign` times the kinematic error are looked for: within `half` (rad) of each of the input
+    angles `theta` (k,), rad, in the direction of the index `way` (k,), by so many golden-section `steps`."""
+
+    way: Index
+    theta: Array
+    half: float
+    sign: float
+    steps: int
 
 
 @inlined
@@ -255,35 +267,27 @@ def _walk(drive: WalkedDrive, per_turn: int, turns: int, added: Added, grid: Arr
 
 
 @compiled
-def drive_of(tip: TipGeometry, tan_alpha: float, advance: float, turns: int, scale: float, e: Array) -> WalkedDrive:
-    """All that the kinematic error at one angle needs.
-
-    `tip`, `tan_alpha` and `advance` (Z_CS/Z_FS) are the drive's, `turns` the input turns of a full relative turn,
-    `scale` is arcmin per mm of arc, times k_e, and `e` (12,) holds the errors as in ERROR_NAMES.
-    """
-    motion, cs_cos, cs_sin = motion_of_row(tip, e)
-    span = 2 * math.pi * turns
-    return WalkedDrive(rim_constants(tip), motion, cs_cos, cs_sin, tan_alpha, e[10], e[11], advance, scale, span)
+def drive_of(gearing: Gearing, e: Array) -> WalkedDrive:
+    """All that the kinematic error at one angle needs, of a drive of `gearing` whose errors are `e` (12,), as in
+    ERROR_NAMES."""
+    motion, cs_cos, cs_sin = motion_of_row(gearing.tip, e)
+    rim, span = rim_constants(gearing.tip), 2 * math.pi * gearing.turns
+    tan_alpha, advance, scale = gearing.tan_alpha, gearing.advance, gearing.scale
+    return WalkedDrive(rim, motion, cs_cos, cs_sin, tan_alpha, e[10], e[11], advance, scale, span)
 
 
 @entry
-def extended_walk(
-    tip: TipGeometry,
-    tan_alpha: float,
-    advance: float,
-    turns: int,
-    scale: float,
-    row: Array,
-    added: Added,
-) -> Array:
-    """Kinematic error (arcmin) of one drive on the grid of the first walk, for each direction: shape (d, walked).
+def extended_walk(gearing: Gearing, row: Array, added: Added) -> Array:
+    """Kinematic error (arcmin) of one drive of `gearing` on the grid of the first walk, for each direction: shape
+    (d, walked).
 
-    `row` (12,) holds its errors as in ERROR_NAMES; `tip`, `tan_alpha`, `advance`, `turns`, `scale` as in
-    `cell_kernel.extended_block`; of `added` zones and beside have one more axis in front, that of the directions.
+    `row` (12,) holds its errors as in ERROR_NAMES; of `added` zones and beside have one more axis in front, that of the
+    directions.
     """
     directions, walked = added.beside.shape
+    turns = gearing.turns
     values, grid = np.empty((directions, walked)), np.empty((8, walked // turns))
-    drive = drive_of(tip, tan_alpha, advance, turns, scale, row)
+    drive = drive_of(gearing, row)
     for d in range(directions):
         of_direction = Added(added.zones[d], added.beside[d], added.cs, added.fs)
         _walk(drive, walked // turns, turns, of_direction, grid, values[d])
@@ -291,32 +295,19 @@ def extended_walk(
 
 
 @entry
-def extended_near(
-    tip: TipGeometry,
-    tan_alpha: float,
-    advance: float,
-    turns: int,
-    scale: float,
-    row: Array,
-    added: Added,
-    way: Index,
-    theta: Array,
-    half: float,
-    sign: float,
-    steps: int,
-) -> Array:
-    """Least of sign times the kinematic error (arcmin) within `half` (rad) of each of `theta` (k) in the direction
-    `way` (k), and where: shape (2, k).
+def extended_near(gearing: Gearing, row: Array, added: Added, places: Places) -> Array:
+    """Least of sign times the kinematic error (arcmin) near each of the k `places`, and where (rad): shape (2, k).
 
-    `row` (12,) holds the drive's errors as in ERROR_NAMES; `tip`, `tan_alpha`, `advance`, `turns`, `scale` and
-    `added` as in `extended_walk`. `steps` is the number of golden-section steps.
+    `gearing`, `row` and `added` as in `extended_walk`.
     """
-    found = np.empty((2, len(theta)))
-    drive = drive_of(tip, tan_alpha, advance, turns, scale, row)
+    found = np.empty((2, len(places.theta)))
+    drive = drive_of(gearing, row)
     every_cut = np.empty(MOST_CUTS)
     cuts = every_cut[: _switches(drive, every_cut)]
-    for k in range(len(theta)):
-        d = way[k]
+    for k in range(len(places.theta)):
+        d = places.way[k]
         of_direction = Added(added.zones[d], added.beside[d], added.cs, added.fs)
-        found[0, k], found[1, k] = _lowest_near(drive, cuts, theta[k], half, sign, of_direction, steps)
+        found[0, k], found[1, k] = _lowest_near(
+            drive, cuts, places.theta[k], places.half, places.sign, of_direction, places.steps
+        )
     return found
