@@ -9,8 +9,9 @@ zones); outer-race pass (n/2)(1 - r)(1 + 1/N); inner-race pass (n/2)(1 + r)(1 + 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from hdopt.effects.base import Effect, Keys
 from hdopt.effects.conditions import Conditions
 from hdopt.effects.declared import UM, Quantity, Sines, needed, number, smallest_set
 from hdopt.effects.estimate import FitEstimate, Parameter, counted
-from hdopt.effects.probe import Probe, best_terms
+from hdopt.effects.probe import Probe, best_terms, worth
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Shape, Term
 from hdopt.errors import HdoptError, MissingValue
@@ -256,32 +257,42 @@ class BearingPass(Effect):
             return []
         trials, samples = spectrum.trials, probe.samples
 
-        def ranked(shapes: Iterable[Shape]) -> list[Term]:
-            terms = [self.term(samples, s, trials=trials * (len(BALLS) if s["balls"] else 1)) for s in shapes]
-            return best_terms(probe, terms, len(terms))
-
-        def about(shape: Shape, steps: Sequence[float]) -> list[Shape]:
-            ratio = shape["ball_to_pitch_ratio"]
-            return [{**shape, "ball_to_pitch_ratio": ratio + d / samples.span_turns} for d in steps]
+        def closest(shape: Shape, steps: Sequence[float]) -> Term:
+            paid = trials * (len(BALLS) if shape["balls"] else 1)
+            ratios = [shape["ball_to_pitch_ratio"] + d / samples.span_turns for d in steps]
+            near = [self.term(samples, {**shape, "ball_to_pitch_ratio": r}, trials=paid) for r in ratios]
+            return best_terms(probe, near)[0]
 
         few, pair, many = ZONE_HARMONICS[0], ZONE_HARMONICS[2], ZONE_HARMONICS[5]
-        first = ranked(
-            {"ball_to_pitch_ratio": r, "balls": n, "zones": members}
-            for r in self._likely_ratios(samples.span_turns, ratios, spectrum)
-            for n, members in ((0, few), (0, pair), (0, many), (self._likely_balls(r, spectrum)[-1], pair))
-        )
-        best = ranked(about(first[0].shape, (-0.4, -0.2, 0.0, 0.2, 0.4)))[0].shape
+
+        def first_look(ratio: float) -> tuple[float, Shape]:
+            balls = self._likely_balls(ratio, spectrum)[-1]
+            return self._ranked_sets(probe, ratio, [(0, few), (0, pair), (0, many), (balls, pair)])[0]
+
+        first = map(first_look, self._likely_ratios(samples.span_turns, ratios, spectrum))
+        best = closest(max(first, key=itemgetter(0))[1], (-0.4, -0.2, 0.0, 0.2, 0.4)).shape
         likely = self._likely_balls(best["ball_to_pitch_ratio"], spectrum)
-        sets = ranked(
-            {**best, "balls": n, "zones": members}
-            for n in sorted({0, best["balls"], *likely})
-            for members in ZONE_HARMONICS
-            if n not in members
-        )
+        counted = sorted({0, best["balls"], *likely})
+        every = [(n, members) for n in counted for members in ZONE_HARMONICS if n not in members]
+        sets = [shape for _, shape in self._ranked_sets(probe, best["ball_to_pitch_ratio"], every)]
         # Of many waves some may be missing, and the set is no name; of few that are all there it is one.
-        of_few = next(term for term in sets if len(zone_orders(term.shape)) <= FEW_WAVES)
+        of_few = next(shape for shape in sets if len(zone_orders(shape)) <= FEW_WAVES)
         chosen = sets[:1] if of_few is sets[0] else [sets[0], of_few]
-        return [ranked(about(term.shape, (-0.1, -0.05, 0.0, 0.05, 0.1)))[0] for term in chosen]
+        return [closest(shape, (-0.1, -0.05, 0.0, 0.05, 0.1)) for shape in chosen]
+
+    def _ranked_sets(
+        self, probe: Probe, ball_ratio: float, sets: Sequence[tuple[int, tuple[int, ...]]]
+    ) -> list[tuple[float, Shape]]:
+        """What each of the `sets` of waves, beside that of so many balls, is worth for the residual of `probe` at one
+        `ball_ratio`, with its shape, the best first. All are parts of the columns of every wave among them."""
+        shapes: list[Shape] = [{"ball_to_pitch_ratio": ball_ratio, "balls": n, "zones": waves} for n, waves in sets]
+        every = sorted({h for shape in shapes for h in zone_orders(shape)})
+        wide = self.term(probe.samples, {"ball_to_pitch_ratio": ball_ratio, "balls": 0, "zones": tuple(every)})
+        at = {h: (2 * i, 2 * i + 1) for i, h in enumerate(every)}
+        parts = [[column for h in zone_orders(shape) for column in at[h]] for shape in shapes]
+        gains = probe.gains_of_parts(wide, parts)
+        scores = [worth(probe, gain, len(part) + len(wide.steps)) for gain, part in zip(gains, parts, strict=True)]
+        return sorted(zip(scores, shapes, strict=True), key=itemgetter(0), reverse=True)
 
     @staticmethod
     def _likely_ratios(span_turns: float, ratios: Array, spectrum: _Spectrum) -> list[float]:

@@ -42,6 +42,9 @@ class Probe(Protocol):
     def gains(self, terms: Sequence[Term]) -> list[float]:
         """The same drop of each of `terms` by itself."""
 
+    def gains_of_parts(self, term: Term, parts: Sequence[Sequence[int]]) -> list[float]:
+        """The same drop of those columns of `term` alone that each of `parts` lists."""
+
     def solve(self, term: Term) -> tuple[float, Array]:
         """That of one, and the coefficients (p,) that bring it."""
 
@@ -55,13 +58,17 @@ class Probe(Protocol):
         """
 
 
+def worth(probe: Probe, gain: float, freedom: int, odds: float = 0.0) -> float:
+    """A `gain` on the residual of `probe`, noise variances, less what so much `freedom` and `odds` against it pay."""
+    return gain - math.log(max(len(probe.residual), 2)) * freedom + 2 * odds
+
+
 def best_terms(probe: Probe, terms: Sequence[Term], keep: int = 1) -> list[Term]:
     """The `keep` of `terms` with the largest gain on the residual of `probe`, after paying for freedom and odds."""
     if len(terms) < 2:
         return list(terms)[:keep]
-    cost = math.log(max(len(probe.residual), 2))
     gains = zip(terms, probe.gains(terms), strict=True)
-    scores = [gain - cost * term.freedom + 2 * term.odds for term, gain in gains]
+    scores = [worth(probe, gain, term.freedom, term.odds) for term, gain in gains]
     ranked = sorted(range(len(terms)), key=scores.__getitem__, reverse=True)
     return [terms[i] for i in ranked[:keep]]
 

@@ -84,6 +84,20 @@ def test_the_gain_of_each_of_many_terms_is_the_drop_that_it_alone_brings(widths)
     assert probe.gains(terms) == pytest.approx([probe.gain(term) for term in terms], rel=1e-12)
 
 
+def test_the_gain_of_each_part_of_a_term_is_that_of_a_term_of_these_columns():
+    """In any order, alone and overlapping. Faults caught: moments of the first columns for those of a part, and what
+    the fit absorbs of others."""
+    rng = np.random.default_rng(6)
+    design, residual, weights = rng.normal(size=(N, 4)), rng.normal(size=N), rng.uniform(0.5, 2.0, N)
+    probe = probe_of(design, np.zeros(4), residual, weights)
+    columns = rng.normal(size=(N, 6)) + design[:, :1]
+    parts = [(0, 1), (4, 5), (1,), (2, 3, 0, 1), range(6)]
+    alone = [Term("bearing_pass", {}, columns=columns[:, list(part)]) for part in parts]
+    wide = Term("bearing_pass", {}, columns=columns)
+    assert probe.gains_of_parts(wide, parts) == pytest.approx(probe.gains(alone), rel=1e-9)
+    assert probe.gains_of_parts(wide, []) == []
+
+
 @pytest.mark.parametrize("kept", [(True, True, True), (True, False, True)])
 def test_what_is_remembered_of_terms_is_theirs_and_that_of_their_fit(kept):
     """Asked again, with other signs, beside another fit and in another order. Faults caught: a residual, or what a fit

@@ -165,6 +165,15 @@ class FitProbe:
             at = end
         return found
 
+    def gains_of_parts(self, term: Term, parts: Sequence[Sequence[int]]) -> list[float]:
+        """`gain` of those columns of `term` alone that each of `parts` lists: all are whitened and projected once."""
+        ((gram, absorbed, moment),) = self._products([term])
+        blocks = [np.ix_(part, part) for part in parts]
+        return [
+            self._solved(gram[block], absorbed[block], moment[list(part)])[0]
+            for part, block in zip(parts, blocks, strict=True)
+        ]
+
     @cached_property
     def _by_input(self) -> tuple[Array, float]:
         return self._fourier(self.rows.theta)
