@@ -22,11 +22,12 @@ OPTION = re.compile(r"(?:^|[\s'(])--?[a-z]")
 def placed(message: str, context: click.Context | None, work: FilesOfWork) -> str:
     """`message` with the options of the command and the values of the study that it speaks of before it; where it
     names neither an option nor a file, with the study's or the recordings' names."""
-    places = [] if context is None else list(dict.fromkeys(_options(message, context)))
+    said = _without_names(message, context, work)
+    places = [] if context is None else list(dict.fromkeys(_options(message, said, context)))
     of_study = work.facts.get("source", "") not in message and "--set " not in message
     if work.values is not None and of_study and not _begins_with_an_input(message, work):
-        of_options = () if context is None else _numbers_of_options(message, context)
-        places += work.values(without_numbers(message, of_options))
+        of_options = () if context is None else _numbers_of_options(said, context)
+        places += work.values(without_numbers(said, of_options))
     if places:
         return f"{'; '.join(places[:MOST_FILES])}: {message}"
     if OPTION.search(message) or FILE.search(message) or _names_an_input(message, context, work):
@@ -57,16 +58,16 @@ def _values(context: click.Context) -> Iterator[_Given]:
             yield _Given(option, option.lstrip("-").replace("-", "_"), one, default)
 
 
-def _options(message: str, context: click.Context) -> Iterator[str]:
-    """'-n 20' for every option whose name and value stand in the `message`, or whose text in quotes, and not yet its
-    spelling."""
+def _options(message: str, said: str, context: click.Context) -> Iterator[str]:
+    """'-n 20' for every option whose name and value stand in what the `message` has `said` beside names of files, or
+    whose text in quotes, and not yet its spelling."""
     for option, name, one, default in _values(context):
         if re.search(rf"{option}\b", message):
             continue
         text = one if isinstance(one, str) and not default else None
         if text is not None and repr(text) != shown(text) and shown(text) in message:
             yield option  # the message shows of its long text what there is room for
-        elif (text is not None and repr(text) in message) or shows(message, one, name):
+        elif (text is not None and repr(text) in message) or shows(said, one, name):
             yield f"{option} {one}" + (" (the default)" if default else "")
 
 
@@ -89,9 +90,28 @@ def _ends_of(path: Path) -> list[str]:
 
 def _names_an_input(message: str, context: click.Context | None, work: FilesOfWork) -> bool:
     """Whether `message` names a file, or what the user gave in place of one."""
-    names = {path.name for path in (*work.inputs, *work.outputs)} | {work.facts.get("source", "")}
+    names = {path.name for path in (*work.inputs, *work.outputs)} | _given_as_inputs(context, work)
+    return any(re.search(_standing_alone(name), message) for name in names if name)
+
+
+def _without_names(message: str, context: click.Context | None, work: FilesOfWork) -> str:
+    """`message` without the names of files that it has: their digits are no numbers of anything."""
+    ends = {end for path in (*work.inputs, *work.outputs) for end in _ends_of(path)}
+    for name in sorted(ends | _given_as_inputs(context, work), key=len, reverse=True):
+        message = re.sub(_standing_alone(name), "", message) if name else message
+    return message
+
+
+def _standing_alone(name: str) -> str:
+    """Pattern of `name` where it is no part of a longer one."""
+    return rf"(?<![\w.-]){re.escape(name)}(?![\w-])"
+
+
+def _given_as_inputs(context: click.Context | None, work: FilesOfWork) -> set[str]:
+    """What the user gave as the command's arguments, and where the study came from."""
+    names = {work.facts.get("source", "")}
     parameters = [] if context is None else [p for p in context.command.params if isinstance(p, click.Argument)]
     for parameter in parameters:
         value = context.params.get(parameter.name or "") if context else None
         names |= {str(one) for one in (value if isinstance(value, tuple) else (value,)) if one is not None}
-    return any(re.search(rf"(?<![\w.-]){re.escape(name)}(?![\w-])", message) for name in names if name)
+    return names

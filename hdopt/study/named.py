@@ -11,7 +11,8 @@ from hdopt.study.document import Document, leaves
 from hdopt.study.nearest import UNIT
 from hdopt.toml_lines import Keys
 
-NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+NUMBER = re.compile(r"(?<![\w./\\])(?<!\w-)[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+"""A number: digits of a name, as of csf-25-80 and of folders, are none."""
 EXAMPLE = re.compile(r"\b(?:such as|as in|as with|for example)\b[^;]*")
 """What a message shows for its reader to write: numbers there are nobody's."""
 LINE = re.compile(r"\blines? \d+(?:(?:, \d+)*(?:,? (?:and|to) \d+)?)")

@@ -93,10 +93,15 @@ def _names(recordings: Any) -> str:
     return ", ".join(names[:MOST_NAMED]) + (f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else "")
 
 
+_END_OF_NAME = re.compile(r"[:,]? ")
+_OF_FILES = re.compile(r"[./\\]")
+"""What names of files have, and words that a message begins with have not."""
+
+
 def _begins_with_a_file(message: str) -> bool:
-    """Whether `message` begins with the path of a file, 'cam.csv: ...' or 'cam.csv, line 3: ...'."""
-    name = message.partition(": ")[0].rpartition(", line ")
+    """Whether `message` begins with a file's path: 'cam.csv: ...', 'cam.csv, line 3: ...', 'my cam.csv has ...'."""
+    names = (message[: end.start()] for end in _END_OF_NAME.finditer(message))
     try:
-        return Path(name[0] or name[2]).is_file()
+        return any(_OF_FILES.search(name) and Path(name).is_file() for name in names)
     except (OSError, ValueError):  # longer than names may be
         return False

@@ -159,6 +159,14 @@ def test_a_line_of_another_file_and_a_letter_are_no_values():
     assert values_named(document, "102 teeth are too few") == ("s.toml, line 1, teeth",)
 
 
+def test_digits_of_a_name_are_no_values():
+    document = parse_document("teeth = 160\nplay = -162\n", "s.toml")
+    assert values_named(document, "cams-160/a.csv, runs/160/b.csv and csf-25-160, or v160, -162 of them") == (
+        "s.toml, line 2, play",
+    )
+    assert values_named(document, "cams-162 is no folder") == ()
+
+
 def test_a_value_of_a_key_that_is_named_is_that_keys():
     """Fault caught: a bore of 30 mm, named and refused, said to be a direction of 30 deg too."""
     document = parse_document("[errors]\ndirection_deg = 30\n[export]\nbore_mm = 30\n", "s.toml")
@@ -167,7 +175,9 @@ def test_a_value_of_a_key_that_is_named_is_that_keys():
     assert "errors.direction_deg" in places_named(document, "the direction of 30 is odd")[0]
 
 
-@pytest.mark.parametrize("where", ["cam.csv: ", "cam.csv, line 3: ", "{folder}/my cam.csv: "])
+@pytest.mark.parametrize(
+    "where", ["cam.csv: ", "cam.csv, line 3: ", "{folder}/my cam.csv: ", "my cam.csv has points: "]
+)
 def test_a_message_that_begins_with_a_file_points_to_no_study(where, tmp_path, monkeypatch):
     """In Python as on the command line: its numbers are of that file, whatever values of the study they equal."""
     monkeypatch.chdir(tmp_path)
@@ -188,6 +198,32 @@ def test_a_message_that_begins_with_a_file_points_to_no_study(where, tmp_path, m
         refused(study)
     with pytest.raises(HdoptError, match=rf"^--set wave_generator.width_mm: {said}$"):
         without_file(study)
+
+
+FOLDERS = ("0", "6", "160", "cams-162", "162-cams", "160 cams", "csf-25-160", "run 0.5", "0.0")
+"""Folders whose digits are values of the shipped study, or the defaults of options."""
+BROKEN = {
+    "compare": ("1,2\n", "angle_deg,radius_mm\n1,28\n", "angle_deg,radius_mm\n1,2\n3,x\n"),
+    "inspect": ("input_deg,output_deg\n1,2\n", "input_deg,output_deg\n" + "x,y\n" * 30),
+    "diagnose": ("", "time_s,input_deg\n1,2\n"),
+    "ke": ("drive = 3\n", 'drive = "csf-25-80"\n[errors]\ne1 = 3\n'),
+}
+
+
+@pytest.mark.parametrize("command", BROKEN)
+@pytest.mark.parametrize("relative", [False, True])
+def test_digits_of_a_folder_are_no_numbers(command, relative, tmp_path, monkeypatch, capsys):
+    """A refusal of a broken file begins with it, whatever its folder is called. Fault caught: a cam in a folder 160 was
+    refused with line 5 of the drive, which has 160 teeth, and one in a folder 0 with the radius of a probe."""
+    monkeypatch.chdir(tmp_path)
+    for folder in FOLDERS:
+        for text in BROKEN[command]:
+            path = tmp_path / folder / ("s.toml" if command == "ke" else "r.csv")
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text)
+            given = str(path.relative_to(tmp_path)) if relative else str(path)
+            said = refusal([command, given], capsys)
+            assert said.startswith((f"hdopt: {given}", f"hdopt: {path.name}")), said
 
 
 WORDS = st.sampled_from(
