@@ -8,7 +8,7 @@ a drive at home, that is no misfit of a shape, which would be left beside it. Su
 against the set that they complete. What many waves of the teeth leave of steps from tooth to tooth is a pulse, though:
 beside a term that bends to anything only sines of known orders and what does not turn with the drive complete a set.
 Beside terms that bend to nothing long waves of the teeth do too, where they take up most of what is left: the drive had
-taken up the rest of them.
+taken up the rest of them. So do waves in place of one such term, which stood for them beside a drive that is none.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from hdopt.diagnosis.search.candidates import (
 from hdopt.diagnosis.search.penalty import kind_of, leaves_nothing
 from hdopt.diagnosis.search.search_state import Names, SearchState, names_of
 from hdopt.diagnosis.search.several_for_one import has_bending
+from hdopt.effects.met import Waves
 from hdopt.effects.term import Term
 from hdopt.parallel.shared_memory import each
 
@@ -50,7 +51,12 @@ def completed(state: SearchState, candidates: list[Candidate]) -> list[Candidate
     if not first.fit.terms:
         return candidates
     found: dict[Names, Candidate] = {}
-    made = (*far_more_taken_up(state, candidates), *by_one_plain_effect(state, first), *by_waves(state, first))
+    made = (
+        *far_more_taken_up(state, candidates),
+        *with_waves_for_one(state, candidates),
+        *by_one_plain_effect(state, first),
+        *by_waves(state, first),
+    )
     for one in in_order(made):
         found.setdefault(names_of(one.fit), one)
     return in_order([*found.values(), *(one for one in candidates if names_of(one.fit) not in found)])
@@ -70,6 +76,27 @@ def far_more_taken_up(state: SearchState, candidates: list[Candidate]) -> list[C
         if set(first.effects) < set(candidate.effects) and all(may_complete(t, first.fit) for t in beside):
             if takes_up(candidate.fit, left, state):
                 found.append(without_inexactness(state, first, candidate))
+    return found
+
+
+def with_waves_for_one(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
+    """Of the `candidates` those that have many waves of the teeth for one effect of the first, which bends to nothing
+    and leaves far more than noise beside a drive outside its tolerances: beside a drive within them they take up nearly
+    all of that. `state` is where the work stands.
+    """
+    first = candidates[0]
+    left = state.above_noise(first.fit)
+    begun = not (first.outside or has_bending(first.fit)) and is_far_more_than_noise(left, state)
+    if not (begun and is_outside_tolerances(first.fit)):
+        return []
+    found = []
+    for candidate in candidates[1:]:
+        beside = [term for term in candidate.fit.terms if term.effect not in first.effects]
+        exchanged = len(candidate.effects) == len(first.effects) and len(beside) == 1
+        if exchanged and isinstance(beside[0].met, Waves) and not is_outside_tolerances(candidate.fit):
+            one = without_inexactness(state, first, candidate)
+            if takes_up(candidate.fit, left, state) and may_come_first(one, first, state):
+                found.append(one)
     return found
 
 
