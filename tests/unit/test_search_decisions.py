@@ -386,7 +386,7 @@ IN_PLACE = {"names": ("a", "teeth"), "left": 0.04} | dict.fromkeys(("far", "home
         ({"waves": False}, 0.6, False),
         ({"said": False}, 0.6, False),
         ({"left": 0.17}, 1.6, False),
-        ({"names": ("c", "teeth")}, 0.6, False),
+        ({"names": ("teeth", "c")}, 0.6, False),
         ({"names": ("teeth",)}, 0.6, False),
     ],
     ids=[
