@@ -80,7 +80,7 @@ def far_more_taken_up(state: SearchState, candidates: list[Candidate]) -> list[C
 
 
 def with_waves_for_one(state: SearchState, candidates: list[Candidate]) -> list[Candidate]:
-    """Of the `candidates` those that have many waves of the teeth for one effect of the first, which bends to nothing
+    """Of the `candidates` those that have waves of the teeth for one effect of the first, which bends to nothing
     and leaves far more than noise beside a drive outside its tolerances: beside a drive within them they take up nearly
     all of that. `state` is where the work stands.
     """
