@@ -95,13 +95,14 @@ def _names(recordings: Any) -> str:
 
 _END_OF_NAME = re.compile(r"[:,]? ")
 _OF_FILES = re.compile(r"[./\\]")
-"""What names of files have, and words that a message begins with have not."""
+"""What names of files have, and words that a message begins with have not: asked for where nothing but a space ends the
+name."""
 
 
 def _begins_with_a_file(message: str) -> bool:
     """Whether `message` begins with a file's path: 'cam.csv: ...', 'cam.csv, line 3: ...', 'my cam.csv has ...'."""
-    names = (message[: end.start()] for end in _END_OF_NAME.finditer(message))
+    ends = ((message[: end.start()], end[0] != " ") for end in _END_OF_NAME.finditer(message))
     try:
-        return any(_OF_FILES.search(name) and Path(name).is_file() for name in names)
+        return any((marked or _OF_FILES.search(name)) and Path(name).is_file() for name, marked in ends)
     except (OSError, ValueError):  # longer than names may be
         return False

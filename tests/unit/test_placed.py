@@ -176,12 +176,13 @@ def test_a_value_of_a_key_that_is_named_is_that_keys():
 
 
 @pytest.mark.parametrize(
-    "where", ["cam.csv: ", "cam.csv, line 3: ", "{folder}/my cam.csv: ", "my cam.csv has points: "]
+    "where",
+    ["cam.csv: ", "cam.csv, line 3: ", "{folder}/my cam.csv: ", "my cam.csv has points: ", "cam: ", "cam, line 3: "],
 )
 def test_a_message_that_begins_with_a_file_points_to_no_study(where, tmp_path, monkeypatch):
     """In Python as on the command line: its numbers are of that file, whatever values of the study they equal."""
     monkeypatch.chdir(tmp_path)
-    for name in ("cam.csv", "my cam.csv"):
+    for name in ("cam.csv", "my cam.csv", "cam"):
         (tmp_path / name).write_text("")
     said = "the points leave 102.5 deg of the cam out"
 

@@ -404,9 +404,9 @@ IN_PLACE = {"names": ("a", "teeth"), "left": 0.04} | dict.fromkeys(("far", "home
     ],
 )
 def test_waves_of_the_teeth_come_before_what_stood_for_them(in_rows, monkeypatch, other, first, comes_first):
-    """Lobes beside a drive of three times its tolerance left 1.4 of the noise's power above it, and waves of the teeth
-    beside a near one nothing; they paid 7,000 more for bending, since the drift beside them explained so much (case 50
-    of run-027, called unknown). They pay for their freedom alone."""
+    """Lobes beside a drive with an error of 0.045 mm left 1.4 of the noise's power above it, and waves of the teeth
+    beside a near one nothing; the lobes led by 7,900 in log evidence, which the waves paid for bending, since the drift
+    beside them explained so much (case 50 of run-027, called unknown). They pay for their freedom alone."""
     given = {"bends": False} | IN_PLACE | other
     monkeypatch.setattr(completing, "has_bending", lambda fit: given["bends"] and fit.outside > 0)
     monkeypatch.setattr(completing, "other_law", lambda fit, inflation: SimpleNamespace(log_evidence=0.0))
