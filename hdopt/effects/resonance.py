@@ -62,7 +62,7 @@ class Resonance(Effect):
     needs_base = True
     driven = True
     has_parts = True
-    acts = "beside, excited by KE with all effects of teeth and bearing but the mesh"
+    acts = "beside, excited by KE with all effects of teeth and bearing"
     bench_part = "the inertia that the bench hangs on the drive"
     needs: ClassVar[Mapping[str, str]] = {"speed": "speed_rpm"}
     separating = (

@@ -107,6 +107,7 @@ class ToothMesh(Effect):
     place = 30
     domain = "order"
     high_order = True
+    excites = True
     needs_strain_wave = True
     acts = "beside, or zones"
     separating = "sample more than twice per tooth, at two speeds: the mesh ripple stays at Z_CS cycles a turn"

@@ -226,3 +226,39 @@ def test_high_orders_begin_where_they_are_told_to(searched):
     assert searched().plan.order_range[0] == 20.0
     seen = searched(lowest=7.0, averaged=False)
     assert seen.plan.order_range == (7.0, DEFAULT.high_order.order_share * 400.0)
+
+
+@pytest.mark.parametrize("left", ["mesh", "noise", "no swing", "no waves"])
+def test_what_swings_is_tried_without_the_waves_beside_it(monkeypatch, left):
+    """Behind a spring waves of the teeth stand for a mesh in part: without them it is looked for above the averaged
+    rows, and kept where it explains more inside the zones. Faults caught: tried where nothing is left, or where nothing
+    swings; what is beside the waves taken out with them; kept where it leaves more."""
+    asked = []
+
+    def selection(recordings, found, nuisances, ruled_out, rng, lowest):
+        asked.append((found.best.fit, lowest))
+        return Selection("base", (Candidate(SimpleNamespace(terms=("m",), contributions="c"), 9.0, 1.0),), 1.0)
+
+    waves = Term("cs_tooth_harmonics", {"members": (2, 3)}, met=SimpleNamespace())
+    swing = Term("resonance", {}, columns=np.ones((3, 2)))
+    drift = Term("thermal_drift", {}, columns=np.ones((3, 1)))
+    terms = {"no swing": (waves, drift), "no waves": (swing, drift)}.get(left, (waves, swing, drift))
+    problem = SimpleNamespace(explanations=dict(EFFECTS), rows=SimpleNamespace(ratio=30.0), settings=DEFAULT)
+    fit = fit_of(problem, terms, [term.effect for term in terms])
+    found = Selection("base", (Candidate(fit, 9.0, 1.0),), 1.0)
+    monkeypatch.setattr(fitting, "evaluate", lambda problem, errors, offsets, terms, own: (terms, own))
+    monkeypatch.setattr(high_order, "refine", lambda fit, iterations: (*fit, iterations))
+    monkeypatch.setattr(high_order, "leaves_white_noise", lambda fit: left == "noise")
+    monkeypatch.setattr(high_order, "high_order_selection", selection)
+    monkeypatch.setattr(high_order, "gather", lambda recordings: None)
+    recorded = SimpleNamespace(rows=SimpleNamespace(error=np.array([-2.0, 2.0])))
+    monkeypatch.setattr(high_order, "left_as_recorded", lambda *about: recorded)
+    for size in (1.9, 2.1):
+        asked.clear()
+        inside = SimpleNamespace(fit=SimpleNamespace(residual=np.array([-size, size])), adds="added")
+        monkeypatch.setattr(high_order, "fit_in_zones", lambda *about, inside=inside: inside)
+        high, ripple = high_order.find_ripple((), found, None, (), None)
+        assert (high.best.fit, ripple) == (inside.fit, "added")
+        without = ([swing, drift], ["resonance", "thermal_drift"], DEFAULT.fit.settled_iterations)
+        tried = [(without, None)] if left == "mesh" else []
+        assert asked == tried + ([] if tried and size < 2 else [(fit, None)])

@@ -20,7 +20,7 @@ def probe_of(design, precision, residual, weights=None):
         whiten=lambda rows: (weights * np.asarray(rows).T).T,
         whitened=lambda blocks: weights[:, None] * np.column_stack(blocks),
     )
-    problem = SimpleNamespace(settings=DEFAULT, rows=SimpleNamespace(highest_order=9.0), noise=noise)
+    problem = SimpleNamespace(settings=DEFAULT, rows=SimpleNamespace(highest_order=9.0), noise=noise, behind=())
     fit = SimpleNamespace(terms=(), problem=problem, motion=None, residual=residual)
     fit.white_design = lambda keep: fit.problem.noise.whiten(design)
     problem.prior_precision = lambda width: precision

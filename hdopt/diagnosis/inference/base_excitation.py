@@ -48,13 +48,19 @@ def _driven(term: Term, rows: Rows, motion: Array) -> Term:
     return replace(term, shape=made.shape, columns=made.columns, steps=free)
 
 
-def transmitted(columns: Array, rows: Rows, terms: Sequence[Term], coefficients: Sequence[Array]) -> Array:
-    """Columns of the drive's motion (n, k) as the output shows them: with what the driven ones of `terms` add.
-    `columns` are in arcmin per coefficient. `rows` are those of the recordings. `coefficients` holds those of
-    each term.
+def answered(motion: Array, rows: Rows, weighed: Sequence[tuple[Term, Array]]) -> Array:
+    """What the driven ones of `weighed`, terms with their coefficients, add for the drive's `motion` (n,), arcmin, on
+    `rows`: (n,)."""
+    answer: Array = (transmitted(motion[:, None], rows, weighed) - motion[:, None])[:, 0]
+    return answer
+
+
+def transmitted(columns: Array, rows: Rows, weighed: Sequence[tuple[Term, Array]]) -> Array:
+    """Columns of the drive's motion (n, k) as the output shows them: with what the driven ones of `weighed`, terms with
+    their coefficients, add. `columns` are in arcmin per coefficient. `rows` are those of the recordings.
     """
     seen = columns
-    for term, c in zip(terms, coefficients, strict=True):
+    for term, c in weighed:
         if is_driven(term) and columns.shape[1]:
             seen = seen + properties_of(term.effect).response(rows, term.shape, c, columns)
     return seen

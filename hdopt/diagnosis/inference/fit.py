@@ -16,6 +16,7 @@ import numpy as np
 
 from hdopt.arrays import Array, Index, Mask
 from hdopt.diagnosis.inference.base_excitation import (
+    answered,
     driven_by,
     excites,
     has_memory,
@@ -46,7 +47,8 @@ class FitProblem:
     """What is fitted: `rows`, the `base` model (None for a gear without one), `nuisance` columns that are always free
     (n, q), arcmin per coefficient, the `noise`, and `prior_scale`, by which the base's prior is widened.
 
-    `settings` reach everything that is computed from the problem.
+    `settings` reach everything that is computed from the problem. `behind`, of problems without a base: driven terms
+    with their coefficients that are held, which answer to the motion of whatever is fitted and to nothing else.
     """
 
     rows: Rows
@@ -55,6 +57,7 @@ class FitProblem:
     noise: Noise
     prior_scale: float = 1.0
     settings: DiagnosisSettings = DEFAULT
+    behind: tuple[tuple[Term, Array], ...] = ()
 
     @cached_property
     def whitened(self) -> dict[tuple[int, ...], WhitenedTerms]:
@@ -183,16 +186,21 @@ class Fit:
         """What term `index` adds to the prediction, arcmin: with its zones' driving switched as fitted."""
         return term_columns(self.terms[index], self) @ self.coefficients[index]
 
+    def _swung_behind(self) -> Array:
+        """What the held terms of the problem add for the motion of those that are fitted, arcmin, (n,)."""
+        return answered(self.motion, self.problem.rows, self.problem.behind)
+
     @property
     def contributions(self) -> Array:
-        """What all terms add, arcmin."""
-        return sum((self.contribution(i) for i in range(len(self.terms))), np.zeros(len(self.problem.rows)))
+        """What all terms add, arcmin, with what swings behind them."""
+        none = np.zeros(len(self.problem.rows))
+        return sum((self.contribution(i) for i in range(len(self.terms))), none) + self._swung_behind()
 
     def seen(self, columns: Array, keep: Sequence[int] | None = None) -> Array:
         """Columns of the drive's motion (n, k) as its output shows them beside the terms of `keep`, all by default."""
         kept = range(len(self.terms)) if keep is None else keep
-        terms, coefficients = [self.terms[i] for i in kept], [self.coefficients[i] for i in kept]
-        return transmitted(columns, self.problem.rows, terms, coefficients)
+        weighed = [*((self.terms[i], self.coefficients[i]) for i in kept), *self.problem.behind]
+        return transmitted(columns, self.problem.rows, weighed)
 
     def columns_of(self, term: Term, keep: Sequence[int] | None = None) -> Array:
         """A term's columns as the output shows them beside the terms of `keep`, all by default, (n, p)."""
@@ -218,7 +226,7 @@ class Fit:
             if move_shapes and term.steps:
                 blocks.append(shape_columns(self, i))
             excite += [excites(term)] * (len(blocks) - len(excite))
-        if any(is_driven(term) for term in self.terms):
+        if self.problem.behind or any(is_driven(term) for term in self.terms):
             blocks = self._all_seen(blocks, excite, keep)
         return blocks
 
@@ -375,8 +383,11 @@ def evaluate(
             np.zeros(len(rows), np.int64),
             np.empty((len(rows), 0)),
         )
-    terms = driven_by(motion_of(base_value, terms, coefficients), rows, terms)
+    motion = motion_of(base_value, terms, coefficients)
+    terms = driven_by(motion, rows, terms)
     prediction = base_value + problem.nuisance @ offsets
+    if problem.behind:
+        prediction = prediction + answered(motion, rows, problem.behind)
     for term, c in zip(terms, coefficients, strict=True):
         if term.columns is not None:
             prediction = prediction + term.columns @ c

@@ -34,7 +34,7 @@ class FitProbe:
         self.motion = fit.motion
         self.order_range = order_range or (0.0, self.rows.highest_order)
         self.noise = fit.problem.noise
-        self.swings = any(is_driven(fit.terms[i]) for i in self.keep)
+        self.swings = bool(fit.problem.behind) or any(is_driven(fit.terms[i]) for i in self.keep)
         self.residual = fit.residual
         for i, term in enumerate(fit.terms):
             if i not in self.keep:

@@ -10,6 +10,7 @@ import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.diagnosis.inference import noise as noise_model
+from hdopt.diagnosis.inference.base_excitation import is_driven
 from hdopt.diagnosis.inference.catalogue import is_outside, properties_of
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate
 from hdopt.diagnosis.inference.noise import Noise
@@ -84,11 +85,15 @@ def on_rows_as_recorded(recordings: Sequence[Recording], fit: Fit, nuisances: Nu
 
 def left_of(as_recorded: Fit) -> FitProblem:
     """What a model `as_recorded` leaves of its rows, at the input angles at which by it the drive stood: a problem with
-    an offset alone beside it.
+    an offset alone beside it. What is found in it moves the foot of whatever swings behind the drive, as its own error
+    does.
     """
     left = replace(where_it_stood(as_recorded.problem.rows, as_recorded.ahead), error=as_recorded.residual)
     noise = Noise.white(left, float(np.std(left.error)))
-    return FitProblem(left, None, np.ones((len(left), 1)), noise, settings=as_recorded.problem.settings)
+    weighed = zip(as_recorded.terms, as_recorded.coefficients, strict=True)
+    behind = tuple((term, own) for term, own in weighed if is_driven(term))
+    settings = as_recorded.problem.settings
+    return FitProblem(left, None, np.ones((len(left), 1)), noise, settings=settings, behind=behind)
 
 
 def left_as_recorded(recordings: Sequence[Recording], fit: Fit, nuisances: Nuisances) -> FitProblem:

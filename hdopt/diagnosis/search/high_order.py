@@ -12,6 +12,7 @@ import numpy as np
 from hdopt.arrays import Array
 from hdopt.diagnosis.alternatives.in_angle import AnyOrder
 from hdopt.diagnosis.alternatives.in_time import Mains
+from hdopt.diagnosis.inference.base_excitation import is_driven
 from hdopt.diagnosis.inference.catalogue import explanations
 from hdopt.diagnosis.inference.descent import refine
 from hdopt.diagnosis.inference.fit import Fit, evaluate, with_terms
@@ -60,8 +61,10 @@ def find_ripple(
             gather(recordings), what.best.fit, nuisances, high.best.fit, copy.deepcopy(rng), told, others
         )
 
-    if (without_mesh := mesh_taken_out(found)) is not None:
-        high, inside = ripple_beside(*without_mesh)
+    for without in (mesh_taken_out(found), waves_taken_out(found)):
+        if without is None:
+            continue
+        high, inside = ripple_beside(*without)
         if high is not None and inside is not None:
             left = left_as_recorded(recordings, found.best.fit, nuisances).rows.error
             if np.var(inside.fit.residual) < np.var(left):
@@ -90,6 +93,20 @@ def mesh_taken_out(found: Selection) -> tuple[Selection, float] | None:
             without = with_terms(fit, fit.all_but(at))
             return found.with_best_fit(without), lowest_order([term], fit.problem.rows.ratio)
     return None
+
+
+def waves_taken_out(found: Selection) -> tuple[Selection, None] | None:
+    """Of what was `found` in rows too coarse to hold a mesh: what swings behind the drive without the waves of the
+    teeth beside it, where both leave more than noise. A spring lets little of a mesh through but what is slow, heights
+    that differ from tooth to tooth and bulges where the zones change: waves of the teeth stand for these in part. None
+    else.
+    """
+    fit = found.best.fit
+    left = [at for at, term in enumerate(fit.terms) if not term.in_zones]
+    if len(left) == len(fit.terms) or not any(is_driven(term) for term in fit.terms) or leaves_white_noise(fit):
+        return None
+    iterations = fit.problem.settings.fit.settled_iterations
+    return found.with_best_fit(refine(with_terms(fit, left), iterations)), None
 
 
 def lowest_order(terms: Sequence[Term], ratio: float) -> float:

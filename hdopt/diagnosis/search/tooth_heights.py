@@ -9,11 +9,13 @@ Where all of this leaves more than noise, other drives are drawn beside the free
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from hdopt.arrays import Array, Index
+from hdopt.diagnosis.inference.base_excitation import is_driven
 from hdopt.diagnosis.inference.base_fit import drawn, with_offsets
 from hdopt.diagnosis.inference.descent import refine
 from hdopt.diagnosis.inference.fit import Fit, evaluate
@@ -60,7 +62,7 @@ def of_other_drives(fit: Fit, rng: np.random.Generator) -> Fit:
     """
     settings = fit.problem.settings.high_order
     beside, forms = len(fit.terms) - 1, _forms_of(fit.terms[-1])
-    held = [replace(one, steps={}) for one in fit.terms[:beside]]
+    held = held_but_driven(fit.terms[:beside])
     alike = np.full(len(forms.heights), usual(heights_of(fit)))
     every = np.eye(len(alike))
 
@@ -76,7 +78,7 @@ def of_other_drives(fit: Fit, rng: np.random.Generator) -> Fit:
         free = replace(skewed, met=replace(forms, heights=every, skew=skew), steps={})
         there = evaluate(fit.problem, errors, fit.offsets, [*held, free], [*fit.coefficients[:beside], alike])
         base = fit.problem.settings.base
-        return refine(with_offsets(there), base.start_iterations, base.start_tolerance, move_shapes=False), skewed
+        return refine(with_offsets(there), base.start_iterations, base.start_tolerance), skewed
 
     def mended(found: tuple[Fit, Term]) -> Fit:
         there, skewed = found
@@ -110,13 +112,19 @@ def _with_heights(fit: Fit, beside: int, term: Term, basis: Array, own: Array) -
     a free form.
     """
     settings = fit.problem.settings
-    others = [replace(one, steps={}) for one in fit.terms[:beside]]
+    others = held_but_driven(fit.terms[:beside])
     free = replace(term, met=replace(_forms_of(term), heights=basis), steps={})
     fit = evaluate(fit.problem, fit.errors, fit.offsets, [*others, free], [*fit.coefficients[:beside], own])
-    fit = refine(fit, settings.base.full_iterations, move_shapes=False)
+    fit = refine(fit, settings.base.full_iterations)
     heights = basis @ fit.coefficients[-1]
     fit = evaluate(fit.problem, fit.errors, fit.offsets, *_of_heights(fit, term, heights))
     return refine(fit, settings.high_order.skew_iterations)
+
+
+def held_but_driven(terms: Sequence[Term]) -> list[Term]:
+    """`terms` at the shapes that they have, but for those of what the drive's motion swings: these were found beside
+    the motion without the mesh."""
+    return [one if is_driven(one) else replace(one, steps={}) for one in terms]
 
 
 def _of_heights(fit: Fit, term: Term, heights: Array) -> tuple[list[Term], list[Array]]:

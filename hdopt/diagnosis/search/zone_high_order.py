@@ -159,7 +159,8 @@ def _step_by_step(
         found.append(fit)
     found += _tooth_by_tooth(thin, low, found, effect, rng)
     best = min(found, key=_score)
-    terms = [*(term for term, _ in beside), effect.term(problem.rows, best.terms[-1].shape)]
+    others = (replace(term, shape=own.shape) for (term, _), own in zip(beside, best.terms, strict=False))
+    terms = [*others, effect.term(problem.rows, best.terms[-1].shape)]
     whole = evaluate(problem, best.errors, best.offsets, terms, best.coefficients)
     return refine(whole, settings.fit.known_iterations, move_shapes=False)
 
