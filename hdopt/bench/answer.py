@@ -2,7 +2,8 @@
 
 `COMMAND REC... --drive NAME --json FILE` writes each answer to DIR/answers/<id>.json; answers that exist are kept, so
 that a run can be continued. With `--minutes` no case is begun after that time. DIR/answers.json says how many were
-begun, how long it took and which program answered. Nothing here opens DIR/sealed.
+begun, how long it took, all sittings of one program together, and which program answered. Nothing here opens
+DIR/sealed.
 """
 
 from __future__ import annotations
@@ -44,6 +45,13 @@ def answer(folder: Path, out: Path, command: Sequence[str], limit_s: float = 300
     return ""
 
 
+def _told_before(file: Path, program: str) -> dict[str, float]:
+    """What `file` says of earlier sittings of the same `program`: how many cases were begun, and how long it took."""
+    told = json.loads(file.read_text()) if file.exists() else {}
+    same = told.get("program") == program
+    return {"begun": told["begun"] if same else 0, "seconds": told["seconds"] if same else 0.0}
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Answer the cases that `arguments` name; status 1 where one that was begun has no answer."""
     parser = argparse.ArgumentParser(prog="python -m hdopt.bench.answer", description=__doc__)
@@ -68,7 +76,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if hashes()["program"] != program:
         print("the program changed while it answered: these answers are of no single program", file=sys.stderr)
         return 1
-    told = {"begun": len(said), "seconds": time.monotonic() - begun_at, "program": program}
+    before = _told_before(options.dir / "answers.json", program)
+    seconds = before["seconds"] + time.monotonic() - begun_at
+    told = {"begun": max(before["begun"], len(said)), "seconds": seconds, "program": program}
     (options.dir / "answers.json").write_text(json.dumps(told) + "\n")
     problems = [problem for problem in said if problem]
     for problem in problems:

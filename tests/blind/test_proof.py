@@ -58,7 +58,15 @@ def test_the_commands_in_a_row(tmp_path, capsys):
     scores = score(*read(tmp_path))
     assert scores.false_alarms.hits == 1 and scores.invalid == ("case-0002: no answer",)
     assert answer.main(["--dir", str(tmp_path), "--minutes", "0", "--", sys.executable, str(stand_in)]) == 0
-    assert json.loads((tmp_path / "answers.json").read_text())["begun"] == 0  # no case is begun when the time is over
+    # No case is begun when the time is over; what an earlier sitting of the same program did stays.
+    assert json.loads((tmp_path / "answers.json").read_text())["begun"] == 2
+    told = tmp_path / "answers.json"
+    told.write_text(json.dumps(json.loads(told.read_text()) | {"seconds": 100.0}))
+    for others, seconds in (({}, 100.0), ({"program": "another"}, 0.0)):
+        told.write_text(json.dumps(json.loads(told.read_text()) | others))
+        answer.main(["--dir", str(tmp_path), "--minutes", "0", "--", sys.executable, str(stand_in)])
+        assert seconds < json.loads(told.read_text())["seconds"] < seconds + 50
+        assert json.loads(told.read_text())["begun"] == (0 if others else 2)
 
 
 def test_shares_keep_a_part_of_every_family():
