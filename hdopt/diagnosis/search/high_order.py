@@ -61,8 +61,8 @@ def find_ripple(
             gather(recordings), what.best.fit, nuisances, high.best.fit, copy.deepcopy(rng), told, others
         )
 
-    for without in (mesh_taken_out(found), waves_taken_out(found)):
-        if without is None:
+    for taken_out in (mesh_taken_out, waves_taken_out):
+        if (without := taken_out(found)) is None:
             continue
         high, inside = ripple_beside(*without)
         if high is not None and inside is not None:
@@ -103,7 +103,10 @@ def waves_taken_out(found: Selection) -> tuple[Selection, None] | None:
     """
     fit = found.best.fit
     left = [at for at, term in enumerate(fit.terms) if not term.in_zones]
-    if len(left) == len(fit.terms) or not any(is_driven(term) for term in fit.terms) or leaves_white_noise(fit):
+    swings = any(is_driven(term) for term in fit.terms)
+    if len(left) == len(fit.terms) or not swings:
+        return None
+    if not fit.problem.rows.are_averages or leaves_white_noise(fit):
         return None
     iterations = fit.problem.settings.fit.settled_iterations
     return found.with_best_fit(refine(with_terms(fit, left), iterations)), None
