@@ -52,12 +52,15 @@ def test_waves_of_both_splines_teeth_pay_once_for_bending():
 
     circular = teeth("cs_tooth_harmonics", Spline.CIRCULAR)
     flexspline = teeth("fs_tooth_harmonics", Spline.FLEX)
-    mesh = Term("tooth_mesh", {}, columns=np.zeros((4, COSTS.many_coefficients)))
+    mesh, bearing = (
+        Term(effect, {}, columns=np.zeros((4, COSTS.many_coefficients))) for effect in ("tooth_mesh", "bearing_pass")
+    )
     for pair, inexact in [
         ([circular], 1),
         ([circular, flexspline], 2),
         ([circular, teeth("fs_tooth_harmonics", Spline.FLEX, 2)], 2),
         ([circular, flexspline, term("bearing_pass")], 3),
+        ([circular, bearing], 3),
         ([circular, mesh], 2 + COSTS.other_kind / COSTS.discrepancy),
     ]:
         own = sum(one.width * np.log(100.0) / 2 + COSTS.effect_cost for one in pair)
