@@ -264,21 +264,36 @@ class BearingPass(Effect):
             return best_terms(probe, near)[0]
 
         few, pair, many = ZONE_HARMONICS[0], ZONE_HARMONICS[2], ZONE_HARMONICS[5]
+        each_alone = [(0, (wave,)) for wave in many if (wave,) != few]
 
-        def first_look(ratio: float) -> tuple[float, Shape]:
+        def first_look(ratio: float) -> list[tuple[float, Shape]]:
             balls = self._likely_balls(ratio, spectrum)[-1]
-            return self._ranked_sets(probe, ratio, [(0, few), (0, pair), (0, many), (balls, pair)])[0]
+            return self._ranked_sets(probe, ratio, [(0, few), (0, pair), (0, many), (balls, pair), *each_alone])
 
-        first = map(first_look, self._likely_ratios(samples.span_turns, ratios, spectrum))
-        best = closest(max(first, key=itemgetter(0))[1], (-0.4, -0.2, 0.0, 0.2, 0.4)).shape
-        likely = self._likely_balls(best["ball_to_pitch_ratio"], spectrum)
-        counted = sorted({0, best["balls"], *likely})
-        every = [(n, members) for n in counted for members in ZONE_HARMONICS if n not in members]
-        sets = [shape for _, shape in self._ranked_sets(probe, best["ball_to_pitch_ratio"], every)]
-        # Of many waves some may be missing, and the set is no name; of few that are all there it is one.
-        of_few = next(shape for shape in sets if len(zone_orders(shape)) <= FEW_WAVES)
-        chosen = sets[:1] if of_few is sets[0] else [sets[0], of_few]
-        return [closest(shape, (-0.1, -0.05, 0.0, 0.05, 0.1)) for shape in chosen]
+        def over_one_wave(sets: list[tuple[float, Shape]]) -> float:
+            of_one = next(score for score, shape in sets if len(zone_orders(shape)) == 1)
+            return next(score for score, shape in sets if shape["zones"] == many) - of_one
+
+        def from_here(shape: Shape) -> list[Term]:
+            best = closest(shape, (-0.4, -0.2, 0.0, 0.2, 0.4)).shape
+            likely = self._likely_balls(best["ball_to_pitch_ratio"], spectrum)
+            counted = sorted({0, best["balls"], *likely})
+            every = [(n, members) for n in counted for members in ZONE_HARMONICS if n not in members]
+            sets = [shape for _, shape in self._ranked_sets(probe, best["ball_to_pitch_ratio"], every)]
+            # Of many waves some may be missing, and the set is no name; of few that are all there it is one.
+            of_few = next(shape for shape in sets if len(zone_orders(shape)) <= FEW_WAVES)
+            chosen = sets[:1] if of_few is sets[0] else [sets[0], of_few]
+            return [closest(shape, (-0.1, -0.05, 0.0, 0.05, 0.1)) for shape in chosen]
+
+        looks = [first_look(ratio) for ratio in self._likely_ratios(samples.span_turns, ratios, spectrum)]
+        sets_to_begin_with = (look for sets in looks for look in sets if look[1]["zones"] in (few, pair, many))
+        best = max(sets_to_begin_with, key=itemgetter(0))[1]
+        found = from_here(best)
+        # One strong line is a wave of some bearing: where many waves stand out at another ratio, that is looked at too.
+        of_many = max(looks, key=over_one_wave)
+        shape = of_many[0][1]
+        apart = abs(shape["ball_to_pitch_ratio"] - best["ball_to_pitch_ratio"]) * samples.span_turns > 1
+        return found + from_here(shape) if apart and over_one_wave(of_many) > 0 else found
 
     def _ranked_sets(
         self, probe: Probe, ball_ratio: float, sets: Sequence[tuple[int, tuple[int, ...]]]
