@@ -53,6 +53,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.nodeid in listed:
             item.add_marker(pytest.mark.timed)
+    # First what compiles a kernel to look at it: all others load it then.
+    items.sort(key=lambda item: item.get_closest_marker("compiles") is None)
 
 
 def pytest_collection_finish() -> None:
