@@ -15,7 +15,7 @@ from hdopt.kinematics.kernel import describe, design_of
 from hdopt.kinematics.lanes.motion import FS, LANES
 from hdopt.simulation import EffectValues, Operation, batch
 from hdopt.simulation.batch import matrix_peak_to_peak_arcmin, stacked_peak_to_peak_arcmin, tabulate
-from hdopt.simulation.turn import ripple, rows
+from hdopt.simulation.turn import kernel, ripple, rows
 from hdopt.simulation.turn.effects import turn_of
 from hdopt.simulation.turn.scan import fill_parts
 from hdopt.study import load_study
@@ -86,6 +86,18 @@ def test_a_drive_counts_for_itself_alone(effect):
     found, order = stacked_peak_to_peak_arcmin(DRIVE, rows, table), np.random.default_rng(0).permutation(300)
     assert (stacked_peak_to_peak_arcmin(DRIVE, rows[order], table) == found[order]).all()
     assert (stacked_peak_to_peak_arcmin(DRIVE, rows[7:8], table) == found[7:8]).all()
+
+
+def test_parts_are_looked_at_whenever_there_is_no_more_room(monkeypatch):
+    """To the bit what room for the parts of many cells gives. Faults caught: a cell left out, or listed twice as if it
+    were the first, where the list was full before it."""
+    table = tabulate(DRIVE, [values_of("tooth_mesh", IN_ZONES)], FORWARD)
+    rows = random_errors(400, seed=4, scale=3.0).to_matrix()
+    found = []
+    for cells in (1, 2, 50):
+        monkeypatch.setattr(kernel, "ROOMS", cells)
+        found.append(stacked_peak_to_peak_arcmin(DRIVE, rows, table))
+    assert found[0].tolist() == found[1].tolist() == found[2].tolist()
 
 
 def test_both_directions_share_one_range():

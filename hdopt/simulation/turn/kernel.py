@@ -19,11 +19,15 @@ from hdopt.simulation.turn.crests import find_greatest_of_waves
 from hdopt.simulation.turn.effects import Turn
 from hdopt.simulation.turn.lows import find_least
 from hdopt.simulation.turn.places import Found, room_for
-from hdopt.simulation.turn.ripple import find_greatest_of_parts, find_least_of_parts
+from hdopt.simulation.turn.ripple import CASES, find_greatest_of_parts, find_least_of_parts
 from hdopt.simulation.turn.rows import BOUNDS, GREATEST, LEAST
 from hdopt.simulation.turn.scan import fill_parts, scan
 from hdopt.simulation.turn.tops import find_greatest
 from hdopt.simulation.turn.troughs import find_least_of_waves
+from hdopt.simulation.turn.waiting import Waiting, room_to_wait
+
+ROOMS = 2
+"""Room for the parts of so many cells at least before they are looked at."""
 
 
 def extremes_block(design: Design, matrix: Array, turn: Turn, out: Array) -> None:
@@ -36,16 +40,18 @@ def extremes_block(design: Design, matrix: Array, turn: Turn, out: Array) -> Non
     waves = turn.waves
     rows = max(2 * len(turn.scan.below), len(waves.troughs.turns), len(waves.crests.turns))
     work = np.zeros(BOUNDS + LANES * rows, np.float32)
-    lanes, near = np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
+    lanes, waiting = np.zeros(LANES, np.int64), room_to_wait(ROOMS * CASES * turn.fine.parts * LANES)
     if not len(waves.troughs.turns):
-        fill = _fill_by_parts if turn.fine.parts else _fill
-        fill(design, matrix, turn, out, work, lanes, near)
+        if turn.fine.parts:
+            _fill_by_parts(design, matrix, turn, out, work, waiting)
+        else:
+            _fill(design, matrix, turn, out, work, lanes)
         return
     steep, before = np.zeros(len(matrix), np.int64), out.copy()
     _fill_by_waves(design, matrix, turn, out, work, lanes, room_for(waves), steep)
     if (rest := np.flatnonzero(steep)).size:
         again = before[rest]
-        _fill_by_parts(design, np.ascontiguousarray(matrix[rest]), turn, again, work, lanes, near)
+        _fill_by_parts(design, np.ascontiguousarray(matrix[rest]), turn, again, work, waiting)
         out[rest] = again
 
 
@@ -72,7 +78,7 @@ def _end(work: Singles, out: Array, start: int, count: int) -> None:
 
 
 @entry
-def _fill(design: Design, matrix: Array, turn: Turn, out: Array, work: Singles, lanes: Index, near: Index) -> None:
+def _fill(design: Design, matrix: Array, turn: Turn, out: Array, work: Singles, lanes: Index) -> None:
     """The same with room, whose cells tell all."""
     errors = np.zeros(matrix.shape[1] * LANES)
     for start in range(0, len(matrix), LANES):
@@ -84,16 +90,14 @@ def _fill(design: Design, matrix: Array, turn: Turn, out: Array, work: Singles, 
 
 
 @entry
-def _fill_by_parts(
-    design: Design, matrix: Array, turn: Turn, out: Array, work: Singles, lanes: Index, near: Index
-) -> None:
+def _fill_by_parts(design: Design, matrix: Array, turn: Turn, out: Array, work: Singles, waiting: Waiting) -> None:
     """The same where cells have parts."""
     errors = np.zeros(matrix.shape[1] * LANES)
     for start in range(0, len(matrix), LANES):
         count = _begin(design, matrix, turn, start, errors, work)
         scan(work, turn)
-        find_least_of_parts(work, lanes, near, design, turn)
-        find_greatest_of_parts(work, lanes, near, design, turn)
+        find_least_of_parts(work, waiting, design, turn)
+        find_greatest_of_parts(work, waiting, design, turn)
         _end(work, out, start, count)
 
 

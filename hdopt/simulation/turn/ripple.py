@@ -19,7 +19,6 @@ from hdopt.kinematics.lanes.single import HALF, HUGE, ONE, TURN, TWO, ZERO, narr
 from hdopt.simulation.turn import lows, tops
 from hdopt.simulation.turn.effects import Turn
 from hdopt.simulation.turn.rows import (
-    ANGLE,
     BOUNDS,
     D_0,
     D_COS,
@@ -32,7 +31,6 @@ from hdopt.simulation.turn.rows import (
     HIGHEST_AT,
     LEAST,
     LEAST_SEEN,
-    LIST,
     LOW,
     LOWEST_AT,
     M_THEN,
@@ -59,6 +57,10 @@ from hdopt.simulation.turn.rows import (
     offsets,
 )
 from hdopt.simulation.turn.scan import least_of_cell
+from hdopt.simulation.turn.waiting import Waiting, has_room, put, put_crest, put_lowest, take
+
+CASES = 4
+"""Zones times rims: what may drive in a part."""
 
 
 @compiled
@@ -176,126 +178,126 @@ def _bound_high(work: Singles, count: int, design: Design, turn: Turn, e: int) -
 
 
 @compiled
-def _lowest_parts(work: Singles, near: Index, design: Design, turn: Turn) -> None:
-    """Fill the part of the lowest bound in each drive's cell of the lowest bound."""
-    for i in range(LANES):
+def _list_low_parts(work: Singles, waiting: Waiting, first: int, design: Design, turn: Turn) -> tuple[int, int]:
+    """List the parts of cells from the `first` on that may hold less than was seen, as far as there is room; before the
+    first cell (-1), each drive's part of the lowest bound in its cell of the lowest. How many these are, and which cell
+    is next."""
+    parts, every, cells, near = turn.fine.parts, len(turn.fine.below), len(turn.scan.below), waiting.near
+    listed, best = 0, first < 0
+    for i in range(LANES if best else 0):
         work[LEAST_SEEN + i] = HUGE
-    for cell in range(len(turn.scan.below)):
-        count = 0
+    for cell in range(max(first, 0), cells):
+        if not has_room(waiting, listed, parts * LANES):
+            return listed, cell
+        slot, at, count = BOUNDS + 2 * LANES * cell, narrowed(cell), 0
         for i in range(LANES):
-            if work[LOWEST_AT + i] == narrowed(cell):
-                near[count] = i
-                count += 1
-        if count == 0:
-            continue
-        padded, first = _describe(work, near, count, turn.fine.width), cell * turn.fine.parts
-        for e in range(first, first + turn.fine.parts + 1):
-            _bound_low(work, padded, design, turn, e)
-            for k in range(count if e > first else 0):
-                if work[NEAR + LOW + k] < work[LEAST_SEEN + near[k]]:
-                    work[LEAST_SEEN + near[k]], work[FINE_AT + near[k]] = work[NEAR + LOW + k], narrowed(e - 1)
-
-
-@compiled
-def find_least_of_parts(work: Singles, lanes: Index, near: Index, design: Design, turn: Turn) -> None:
-    """Fill the least of the drives of `work`, mm of arc, whose cells of the `turn` are bounded, under a `design`;
-    `lanes` and `near` (LANES,) are room for lists."""
-    parts, every, waiting = turn.fine.parts, len(turn.fine.below), 0
-    _lowest_parts(work, near, design, turn)
-    for i in range(LANES):
-        work[LEAST + i] = HUGE
-        work[LIST + ANGLE + i], lanes[i] = middle(work[FINE_AT + i], every), i
-    lows.look_at_list(work, lanes, LANES, design, turn)
-    for i in range(LANES):
-        work[LEAST_SEEN + i] = work[LEAST + i] + work[MARGIN + i]
-    for cell in range(len(turn.scan.below)):
-        slot, count = BOUNDS + 2 * LANES * cell, 0
-        for i in range(LANES):
-            if work[slot + i] < work[LEAST_SEEN + i]:
+            if (work[LOWEST_AT + i] == at) if best else (work[slot + i] < work[LEAST_SEEN + i]):
                 near[count] = i
                 count += 1
         padded = _describe(work, near, count, turn.fine.width) if count else 0
         for e in range(cell * parts, cell * parts + (parts + 1 if count else 0)):
             _bound_low(work, padded, design, turn, e)
             for k in range(count if e > cell * parts else 0):
-                i = near[k]
-                if work[NEAR + LOW + k] < work[LEAST_SEEN + i] and work[FINE_AT + i] != narrowed(e - 1):
-                    work[LIST + ANGLE + waiting], lanes[waiting] = middle(narrowed(e - 1), every), i
-                    waiting += 1
-                    if waiting == LANES:
-                        lows.look_at_list(work, lanes, waiting, design, turn)
-                        waiting = 0
-    if waiting:
-        lows.look_at_list(work, lanes, waiting, design, turn)
-    lows.look_again(work, lanes, design, turn)
-
-
-@compiled
-def _highest_parts(work: Singles, near: Index, design: Design, turn: Turn) -> None:
-    """Fill the part of the highest bound in each drive's cell of the highest bound, and which zone and rim drive."""
+                i, part = near[k], narrowed(e - 1)
+                if work[NEAR + LOW + k] < work[LEAST_SEEN + i]:
+                    if best:
+                        work[LEAST_SEEN + i], work[FINE_AT + i] = work[NEAR + LOW + k], part
+                    elif work[FINE_AT + i] != part:
+                        put(waiting, listed, middle(part, every), i)
+                        listed += 1
+    if not best:
+        return listed, cells
     for i in range(LANES):
-        work[GREATEST_SEEN + i] = -HUGE
-    for cell in range(len(turn.scan.below)):
-        count = 0
-        for i in range(LANES):
-            if work[HIGHEST_AT + i] == narrowed(cell):
-                near[count] = i
-                count += 1
-        if count == 0:
-            continue
-        padded, first = _describe(work, near, count, turn.fine.width), cell * turn.fine.parts
-        for e in range(first, first + turn.fine.parts + 1):
-            _bound_high(work, padded, design, turn, e)
-            for k in range(count if e > first else 0):
-                i = near[k]
-                if work[NEAR + HIGH + k] > work[GREATEST_SEEN + i]:
-                    work[GREATEST_SEEN + i], work[FINE_AT + i] = work[NEAR + HIGH + k], narrowed(e - 1)
-                    work[ZONE_AT + i], work[RIM_AT + i] = work[NEAR + ZONE + k], work[NEAR + RIM + k]
+        put(waiting, i, middle(work[FINE_AT + i], every), i)
+    return LANES, 0
 
 
 @compiled
-def _list_part(work: Singles, lanes: Index, waiting: int, turn: Turn, k: int, i: int, g: int) -> int:
+def find_least_of_parts(work: Singles, waiting: Waiting, design: Design, turn: Turn) -> None:
+    """Fill the least of the drives of `work`, mm of arc, whose cells of the `turn` are bounded, under a `design`;
+    `waiting` is room for lists. At last the best is looked at once more, as `lows.look_again`
+    does."""
+    cells, cell, looks = len(turn.scan.below), -1, lows.LOOKS
+    while cell <= cells:
+        if cell == 0:
+            for i in range(LANES):
+                work[LEAST_SEEN + i] = work[LEAST + i] + work[MARGIN + i]
+        if cell < cells:
+            count, following = _list_low_parts(work, waiting, cell, design, turn)
+        else:
+            count, following, looks = put_lowest(work, waiting), cells + 1, 1
+        for i in range(LANES if cell < 0 or cell == cells else 0):
+            work[LEAST + i] = HUGE
+        for start in range(0, count, LANES):
+            here = min(LANES, count - start)
+            take(work, waiting, start, here)
+            lows.look_at_list(work, waiting.at_hand, here, design, turn, looks)
+        cell = following
+
+
+@compiled
+def _list_part(work: Singles, waiting: Waiting, listed: int, turn: Turn, k: int, i: int, g: int) -> int:
     """Append every zone and rim of part g and of lane i, the k-th of the third area, that may reach what was seen; how
     many the list has."""
     above, first = work[NEAR + HIGH + k] - work[GREATEST_SEEN + i], work[FINE_AT + i] == narrowed(g)
     s, r, zones, rims = work[NEAR + ZONE + k], work[NEAR + RIM + k], work[NEAR + OFF + k], work[NEAR + OFFSET + k]
-    for case in range(4):
+    for case in range(CASES):
         less = (zones if case & 1 else ZERO) + (rims if case & 2 else ZERO)
         zone, rim = (-s if case & 1 else s), (-r if case & 2 else r)
         seen = first and zone == work[ZONE_AT + i] and rim == work[RIM_AT + i]
         if less < above and not seen:
-            work[LIST + ANGLE + waiting], lanes[waiting] = middle(narrowed(g), len(turn.fine.below)), i
-            work[LIST + ZONE + waiting], work[LIST + RIM + waiting] = zone, rim
-            waiting += 1
-    return waiting
+            put_crest(waiting, listed, middle(narrowed(g), len(turn.fine.below)), i, zone, rim)
+            listed += 1
+    return listed
 
 
 @compiled
-def find_greatest_of_parts(work: Singles, lanes: Index, near: Index, design: Design, turn: Turn) -> None:
-    """Fill the greatest of the drives of `work`, with `lanes`, `near`, `design` and `turn` as for the least."""
-    parts, every, waiting = turn.fine.parts, len(turn.fine.below), 0
-    _highest_parts(work, near, design, turn)
-    for i in range(LANES):
-        work[GREATEST + i] = -HUGE
-        work[LIST + ANGLE + i], lanes[i] = middle(work[FINE_AT + i], every), i
-        work[LIST + ZONE + i], work[LIST + RIM + i] = work[ZONE_AT + i], work[RIM_AT + i]
-    tops.look_at_list(work, lanes, LANES, design, turn)
-    for i in range(LANES):
-        work[GREATEST_SEEN + i] = work[GREATEST + i] - work[MARGIN + i]
-    for cell in range(len(turn.scan.below)):
-        slot, count = BOUNDS + 2 * LANES * cell + LANES, 0
+def _list_high_parts(work: Singles, waiting: Waiting, first: int, design: Design, turn: Turn) -> tuple[int, int]:
+    """List the zones and rims of parts of cells from the `first` on that may reach what was seen, as far as there is
+    room; before the first cell (-1), each drive's part of the highest bound in its cell of the highest, with what
+    drives there. How many these are, and which cell is next."""
+    parts, every, cells, near = turn.fine.parts, len(turn.fine.below), len(turn.scan.below), waiting.near
+    listed, best = 0, first < 0
+    for i in range(LANES if best else 0):
+        work[GREATEST_SEEN + i] = -HUGE
+    for cell in range(max(first, 0), cells):
+        if not has_room(waiting, listed, CASES * parts * LANES):
+            return listed, cell
+        slot, at, count = BOUNDS + 2 * LANES * cell + LANES, narrowed(cell), 0
         for i in range(LANES):
-            if work[slot + i] > work[GREATEST_SEEN + i]:
+            if (work[HIGHEST_AT + i] == at) if best else (work[slot + i] > work[GREATEST_SEEN + i]):
                 near[count] = i
                 count += 1
         padded = _describe(work, near, count, turn.fine.width) if count else 0
         for e in range(cell * parts, cell * parts + (parts + 1 if count else 0)):
             _bound_high(work, padded, design, turn, e)
             for k in range(count if e > cell * parts else 0):
-                if work[NEAR + HIGH + k] > work[GREATEST_SEEN + near[k]]:
-                    waiting = _list_part(work, lanes, waiting, turn, k, near[k], e - 1)
-                    if waiting + 4 > LANES:
-                        tops.look_at_list(work, lanes, waiting, design, turn)
-                        waiting = 0
-    if waiting:
-        tops.look_at_list(work, lanes, waiting, design, turn)
+                i = near[k]
+                if work[NEAR + HIGH + k] > work[GREATEST_SEEN + i]:
+                    if best:
+                        work[GREATEST_SEEN + i], work[FINE_AT + i] = work[NEAR + HIGH + k], narrowed(e - 1)
+                        work[ZONE_AT + i], work[RIM_AT + i] = work[NEAR + ZONE + k], work[NEAR + RIM + k]
+                    else:
+                        listed = _list_part(work, waiting, listed, turn, k, i, e - 1)
+    if not best:
+        return listed, cells
+    for i in range(LANES):
+        put_crest(waiting, i, middle(work[FINE_AT + i], every), i, work[ZONE_AT + i], work[RIM_AT + i])
+    return LANES, 0
+
+
+@compiled
+def find_greatest_of_parts(work: Singles, waiting: Waiting, design: Design, turn: Turn) -> None:
+    """Fill the greatest of the drives of `work`, with `waiting`, `design` and `turn` as for the least."""
+    cells, cell = len(turn.scan.below), -1
+    for i in range(LANES):
+        work[GREATEST + i] = -HUGE
+    while cell < cells:
+        if cell == 0:
+            for i in range(LANES):
+                work[GREATEST_SEEN + i] = work[GREATEST + i] - work[MARGIN + i]
+        count, cell = _list_high_parts(work, waiting, cell, design, turn)
+        for start in range(0, count, LANES):
+            here = min(LANES, count - start)
+            take(work, waiting, start, here)
+            tops.look_at_list(work, waiting.at_hand, here, design, turn)
