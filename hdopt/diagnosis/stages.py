@@ -194,9 +194,16 @@ def oriented(state: State, undecided: Callable[[State, State], State]) -> State:
             preferred = preferences_beside(preferred, state, beside_smooth(clean), rng)
     turned = replace(turned, orientation=Orientation(-1, -output, "data"))
     state = replace(state, orientation=Orientation(1, output, "data"))
-    if is_decisive(preferred, settings.orientation):
-        return state if preferred[0] > 0 else fit_base_in_noise(turned)
+    way = state if preferred[0] > 0 else turned
+    if is_decisive(preferred, settings.orientation) and not is_told_otherwise(way):
+        return way if way is state else fit_base_in_noise(way)
     return undecided(state, turned)
+
+
+def is_told_otherwise(way: State) -> bool:
+    """Whether what was found on other rows of the recordings was found counted the other way than this `way`: a large
+    effect bends both bases, and which of them it bends more is no matter of the drive."""
+    return any(guess.turned != way.orientation.turned for guess in way.guesses)
 
 
 def preferences_beside(alone: Sequence[float], state: State, turned: Fit, rng: np.random.Generator) -> list[float]:
@@ -245,13 +252,15 @@ def smooth_model(
 
 def better_way(state: State, turned: State) -> State:
     """Of `state` and its `turned` counterpart the one whose effects and base explain more together; `state`, by
-    convention, where that is a tie. A first look decides where it is clear enough.
+    convention, where that is a tie. A first look decides where it is clear enough, and what was found on other rows
+    does not speak against it: that is no part of a first look.
     """
     other, settings = fit_base_in_noise(turned), state.settings.orientation
     ways = [with_first_look(way) for way in in_one_noise(state, other)]
     gap = gap_at_first_look(ways)
-    if abs(gap) > settings.first_look:
-        return ways[0] if gap > 0 else other
+    clearer = ways[0] if gap > 0 else other
+    if abs(gap) > settings.first_look and not is_told_otherwise(clearer):
+        return clearer
     ways = [search_effects(way) for way in ways]
     scores = [explained(way) - unexplained(way) for way in ways]
     if abs(scores[0] - scores[1]) < settings.tie:

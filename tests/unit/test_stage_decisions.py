@@ -63,21 +63,28 @@ def state_of(base, clean=None, output_reversed=False, drift=False, taken=None, i
     return State((record,), nuisances, (), base, clean, inflation=inflation, **(fields | more))
 
 
+def guess_turned(turned):
+    """A guess that was found on recordings turned round, or on them as counted."""
+    return Guess(np.zeros(12), (), (), turned)
+
+
 @pytest.fixture
 def ways(monkeypatch):
     """`of(as counted, turned, clean as counted, clean turned)`: what the bases leave, bare and beside smooth columns;
     what was chosen by the base, or by `effects` where it leaves that open. Bare, a clean base says the contrary."""
     left = {}
 
-    def of(as_counted, turned, clean, clean_turned, output_reversed=False):
+    def of(as_counted, turned, clean, clean_turned, output_reversed=False, found_turned=()):
         left.update(clean=clean, turned_clean=clean_turned)
         bare = [Told("clean", clean_turned), Told("turned_clean", clean)]
-        monkeypatch.setattr(stages, "begin_turned", lambda state: state_of(Told("turned", turned)))
+        guesses = tuple(guess_turned(one) for one in found_turned)
+        begun = replace(state_of(Told("turned", turned)), guesses=guesses)
+        monkeypatch.setattr(stages, "begin_turned", lambda state: begun)
         monkeypatch.setattr(stages, "fit_base", lambda problem, rng, near: replace(near, problem=problem))
         monkeypatch.setattr(stages, "fit_clean_base", lambda problem, rng: bare[1])
         monkeypatch.setattr(stages, "beside_smooth", lambda fit: Told(fit.name, left[fit.name]))
         monkeypatch.setattr(stages, "fit_base_in_noise", lambda state: replace(state, inflation=7.0))
-        state = state_of(Told("as counted", as_counted), bare[0], output_reversed)
+        state = replace(state_of(Told("as counted", as_counted), bare[0], output_reversed), guesses=guesses)
         return stages.oriented(state, lambda *both: ("effects", *both))
 
     return of
@@ -94,6 +101,36 @@ def test_the_base_alone_decides_where_it_is_clear(ways):
     assert turned.inflation == 7.0
     assert ways(3.0, 1.0, 1.0, 5.0, output_reversed=True).orientation == Orientation(-1, 1, "data")
     assert ways(1.0, 3.0, 1.0, 5.0, output_reversed=True).orientation == Orientation(1, -1, "data")
+
+
+def test_the_base_does_not_decide_against_what_other_rows_showed(ways):
+    """Faults caught: a windup of 4 arcmin bent the base so that a recording was turned round, which a part of the turns
+    had explained to the noise as it was counted; what was found asked of the way that lost."""
+    assert ways(3.0, 1.0, 1.0, 5.0, found_turned=[False])[0] == "effects"
+    assert ways(1.0, 3.0, 5.0, 1.0, found_turned=[False, True])[0] == "effects"
+    assert ways(3.0, 1.0, 1.0, 5.0, found_turned=[True]).base.name == "turned"
+    assert ways(1.0, 3.0, 5.0, 1.0, found_turned=[False]).base.name == "as counted"
+
+
+@pytest.mark.parametrize(("gap", "found_turned", "searched"), [(501.0, True, True), (501.0, False, False)])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_first_look_does_not_decide_against_what_other_rows_showed(monkeypatch, gap, found_turned, searched, sign):
+    """What was found there is no part of a first look. Faults caught: the first look alone decides; it never does; the
+    other way asked."""
+    guesses = (guess_turned(found_turned if sign > 0 else not found_turned),)
+    one = replace(state_of(Told("one", 2.0)), orientation=Orientation(1, 1, "data"), guesses=guesses)
+    two = replace(state_of(Told("two", 2.0)), orientation=Orientation(-1, -1, "data"), guesses=guesses)
+    asked = []
+    monkeypatch.setattr(stages, "fit_base_in_noise", lambda turned: two)
+    monkeypatch.setattr(stages, "in_one_noise", lambda state, turned: [one, two])
+    monkeypatch.setattr(stages, "with_first_look", lambda way: way)
+    monkeypatch.setattr(stages, "gap_at_first_look", lambda both: sign * gap)
+    monkeypatch.setattr(stages, "search_effects", lambda way: asked.append(way.base.name) or way)
+    monkeypatch.setattr(stages, "unexplained", lambda way: 0.0)
+    monkeypatch.setattr(stages, "explained", lambda way: 0.0)
+    after = stages.better_way(one, two)
+    assert asked == (["one", "two"] if searched else [])
+    assert after.base.name == ("one" if searched or sign > 0 else "two")
 
 
 def test_where_it_is_not_the_bases_beside_smooth_columns_must_agree(ways):
