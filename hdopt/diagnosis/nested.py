@@ -23,6 +23,7 @@ from hdopt.diagnosis.inference.descent import refine
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate
 from hdopt.diagnosis.inference.hidden_turns import NestedHeldOut, hidden_samples, shares_of_samples, without_samples
 from hdopt.diagnosis.inference.read_angle import where_it_stood
+from hdopt.diagnosis.inference.zeros import freed_of_zeros
 from hdopt.diagnosis.orientation import turn_round
 from hdopt.diagnosis.search.guess import Guess
 from hdopt.diagnosis.search.high_order import subtract
@@ -129,8 +130,7 @@ def as_seen(recordings: Sequence[Recording], hidden: Sequence[Mask], state: Stat
     way of counting.
     """
     taken, turned = state.nuisances.taken, state.orientation.turned
-    middle = float(np.median(recordings[0].error_arcmin[~hidden[0]]))
-    seen = tuple(replace(one, error_arcmin=one.error_arcmin - middle) for one in recordings)
+    seen = freed_of_zeros(recordings, state.settings.nuisance, hidden)
     if taken is not None:
         seen = (taken.turned if turned else taken).take_out(seen)
     return turn_round(seen) if turned else seen

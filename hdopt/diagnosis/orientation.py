@@ -55,6 +55,7 @@ def turn_round(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
             error_arcmin=-one.error_arcmin,
             torque=None if one.torque is None else -one.torque,
             scatter_arcmin=None if one.scatter_arcmin is None else -one.scatter_arcmin,
+            output_zero_arcmin=-one.output_zero_arcmin,
         )
         for one in recordings
     )

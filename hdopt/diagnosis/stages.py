@@ -28,6 +28,7 @@ from hdopt.diagnosis.inference.normal_equations import least_squares
 from hdopt.diagnosis.inference.nuisance import nuisances_for, with_time_warp
 from hdopt.diagnosis.inference.residual_noise import measure_noise
 from hdopt.diagnosis.inference.settled_shapes import settled
+from hdopt.diagnosis.inference.zeros import freed_of_zeros
 from hdopt.diagnosis.orientation import Orientation, is_decisive, preference, turn_round
 from hdopt.diagnosis.search.at_home import brought_home
 from hdopt.diagnosis.search.candidates import Candidate, paid_for_freedom, penalty_scale
@@ -63,9 +64,7 @@ def begin(
     `settings` are the thresholds. A large slope of the error by the angle is taken out first.
     """
     rng = np.random.default_rng(seed)
-    # Offsets of thousands of arcmin are zeros of encoders; without them the numbers keep their digits.
-    middle = float(np.median(recordings[0].error_arcmin))
-    recordings = tuple(replace(r, error_arcmin=r.error_arcmin - middle) for r in recordings)
+    recordings = freed_of_zeros(recordings, settings.nuisance)
     taken = common_slope(recordings, settings.nuisance)
     if taken is None:
         return first_fit(recordings, base, rng, settings, nuisance)

@@ -37,7 +37,8 @@ class Recording:
     how the file was read, a plain sentence each. `sensor_arcmin` is the encoders' standard uncertainty at the output, 0
     where nobody stated it; `output_reversed` says that the output was counted against the input. `scatter_arcmin` is
     what of the error tells nothing of where the output stood, or None: whole steps of a coarse encoder, a few samples
-    of many. A wave of the output angle that took them for motion could follow them one by one.
+    of many. A wave of the output angle that took them for motion could follow them one by one. `output_zero_arcmin` is
+    what of the error is a zero that was set anew, and no motion of the output.
     """
 
     name: str
@@ -56,6 +57,7 @@ class Recording:
     sensor_arcmin: float = 0.0
     output_reversed: bool = False
     scatter_arcmin: Array | None = None
+    output_zero_arcmin: float = 0.0
 
     def __len__(self) -> int:
         return len(self.input_angle)
@@ -64,7 +66,7 @@ class Recording:
     def output_angle(self) -> Array:
         """Where the output stood, (n,) rad, from a zero of its own."""
         error = self.error_arcmin if self.scatter_arcmin is None else self.error_arcmin - self.scatter_arcmin
-        return self.input_angle / self.ratio - error * ARCMIN
+        return self.input_angle / self.ratio - (error - self.output_zero_arcmin) * ARCMIN
 
     @property
     def turns(self) -> float:
