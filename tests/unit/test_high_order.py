@@ -228,11 +228,12 @@ def test_high_orders_begin_where_they_are_told_to(searched):
     assert seen.plan.order_range == (7.0, DEFAULT.high_order.order_share * 400.0)
 
 
-@pytest.mark.parametrize("left", ["mesh", "noise", "no swing", "no waves", "fine rows"])
+@pytest.mark.parametrize("left", ["mesh", "noise", "no swing", "no waves", "lobes", "fine rows"])
 def test_what_swings_is_tried_without_the_waves_beside_it(monkeypatch, left):
     """Behind a spring waves of the teeth stand for a mesh in part: without them it is looked for above the averaged
-    rows, and kept where it explains more inside the zones. Faults caught: tried where nothing is left or swings, or
-    where the rows are no averages; what is beside the waves taken out with them; kept where it leaves more."""
+    rows, and kept where it explains more inside the zones. Faults caught: tried where nothing is left or swings,
+    beside lobes, which stand for no mesh, or where the rows are no averages; what is beside the waves taken out with
+    them; kept where it leaves more."""
     asked = []
 
     def selection(recordings, found, nuisances, ruled_out, rng, lowest):
@@ -242,7 +243,9 @@ def test_what_swings_is_tried_without_the_waves_beside_it(monkeypatch, left):
     waves = Term("cs_tooth_harmonics", {"members": (2, 3)}, met=SimpleNamespace())
     swing = Term("resonance", {}, columns=np.ones((3, 2)))
     drift = Term("thermal_drift", {}, columns=np.ones((3, 1)))
-    terms = {"no swing": (waves, drift), "no waves": (swing, drift)}.get(left, (waves, swing, drift))
+    lobes = Term("circular_spline_lobing", {"lobes": 2}, met=SimpleNamespace())
+    others = {"no swing": (waves, drift), "no waves": (swing, drift), "lobes": (lobes, swing, drift)}
+    terms = others.get(left, (waves, swing, drift))
     rows = SimpleNamespace(ratio=30.0, are_averages=left != "fine rows")
     problem = SimpleNamespace(explanations=dict(EFFECTS), rows=rows, settings=DEFAULT)
     fit = fit_of(problem, terms, [term.effect for term in terms])

@@ -14,6 +14,7 @@ from hdopt.diagnosis.alternatives.in_angle import AnyOrder
 from hdopt.diagnosis.alternatives.in_time import Mains
 from hdopt.diagnosis.inference.base_excitation import is_driven
 from hdopt.diagnosis.inference.catalogue import explanations
+from hdopt.diagnosis.inference.clean_base import CS_TEETH, FS_TEETH
 from hdopt.diagnosis.inference.descent import refine
 from hdopt.diagnosis.inference.fit import Fit, evaluate, with_terms
 from hdopt.diagnosis.inference.nuisance import Nuisances
@@ -97,14 +98,15 @@ def mesh_taken_out(found: Selection) -> tuple[Selection, float] | None:
 
 def waves_taken_out(found: Selection) -> tuple[Selection, None] | None:
     """Of what was `found` in rows too coarse to hold a mesh: what swings behind the drive without the waves of the
-    teeth beside it, where both leave more than noise. A spring lets little of a mesh through but what is slow, heights
-    that differ from tooth to tooth and bulges where the zones change: waves of the teeth stand for these in part. None
-    else.
+    teeth beside it and what else acts in the zones, where all leave more than noise. A spring lets little of a mesh
+    through but what is slow, heights that differ from tooth to tooth and bulges where the zones change: waves of the
+    teeth stand for these in part, which lobes alone do not. None else.
     """
     fit = found.best.fit
     left = [at for at, term in enumerate(fit.terms) if not term.in_zones]
     swings = any(is_driven(term) for term in fit.terms)
-    if len(left) == len(fit.terms) or not swings:
+    of_teeth = any(term.effect in (CS_TEETH, FS_TEETH) for term in fit.terms)
+    if not (swings and of_teeth):
         return None
     if not fit.problem.rows.are_averages or leaves_white_noise(fit):
         return None
