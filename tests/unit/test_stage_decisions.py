@@ -112,25 +112,25 @@ def test_the_base_does_not_decide_against_what_other_rows_showed(ways):
     assert ways(1.0, 3.0, 5.0, 1.0, found_turned=[False]).base.name == "as counted"
 
 
-@pytest.mark.parametrize(("gap", "found_turned", "searched"), [(501.0, True, True), (501.0, False, False)])
+@pytest.mark.parametrize("otherwise", [True, False])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_a_first_look_does_not_decide_against_what_other_rows_showed(monkeypatch, gap, found_turned, searched, sign):
+def test_a_first_look_does_not_decide_against_what_other_rows_showed(monkeypatch, otherwise, sign):
     """What was found there is no part of a first look. Faults caught: the first look alone decides; it never does; the
     other way asked."""
-    guesses = (guess_turned(found_turned if sign > 0 else not found_turned),)
+    guesses = (guess_turned((sign > 0) == otherwise),)
     one = replace(state_of(Told("one", 2.0)), orientation=Orientation(1, 1, "data"), guesses=guesses)
     two = replace(state_of(Told("two", 2.0)), orientation=Orientation(-1, -1, "data"), guesses=guesses)
     asked = []
     monkeypatch.setattr(stages, "fit_base_in_noise", lambda turned: two)
     monkeypatch.setattr(stages, "in_one_noise", lambda state, turned: [one, two])
     monkeypatch.setattr(stages, "with_first_look", lambda way: way)
-    monkeypatch.setattr(stages, "gap_at_first_look", lambda both: sign * gap)
+    monkeypatch.setattr(stages, "gap_at_first_look", lambda both: sign * 501.0)
     monkeypatch.setattr(stages, "search_effects", lambda way: asked.append(way.base.name) or way)
     monkeypatch.setattr(stages, "unexplained", lambda way: 0.0)
     monkeypatch.setattr(stages, "explained", lambda way: 0.0)
     after = stages.better_way(one, two)
-    assert asked == (["one", "two"] if searched else [])
-    assert after.base.name == ("one" if searched or sign > 0 else "two")
+    assert asked == (["one", "two"] if otherwise else [])
+    assert after.base.name == ("one" if otherwise or sign > 0 else "two")
 
 
 def test_where_it_is_not_the_bases_beside_smooth_columns_must_agree(ways):

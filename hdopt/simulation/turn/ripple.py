@@ -215,8 +215,7 @@ def _list_low_parts(work: Singles, waiting: Waiting, first: int, design: Design,
 @compiled
 def find_least_of_parts(work: Singles, waiting: Waiting, design: Design, turn: Turn) -> None:
     """Fill the least of the drives of `work`, mm of arc, whose cells of the `turn` are bounded, under a `design`;
-    `waiting` is room for lists. At last the best is looked at once more, as `lows.look_again`
-    does."""
+    `waiting` is room for lists. At last the best is looked at once more, as `lows.look_again` does."""
     cells, cell, looks = len(turn.scan.below), -1, lows.LOOKS
     while cell <= cells:
         if cell == 0:
