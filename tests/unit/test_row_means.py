@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import ceil
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,12 +12,19 @@ from effect_examples import EXAMPLES, NAMES
 from test_effect_physics import GEAR, RATIO, moving
 
 from hdopt.diagnosis import diagnose
+from hdopt.diagnosis.inference.catalogue import explanations
+from hdopt.diagnosis.inference.fit import FitProblem, evaluate
+from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.row_means import as_sampled, part_left
+from hdopt.diagnosis.search.as_recorded import left_as_recorded
 from hdopt.effects import EFFECTS
 from hdopt.effects.conditions import TURN
+from hdopt.effects.declared import Shaft
 from hdopt.effects.estimate import FitEstimate
 from hdopt.effects.met import Spline
 from hdopt.kinematics.cartesian import CartesianModel, to_cartesian
+from hdopt.recordings.recording import Recording
+from hdopt.recordings.rows import gather
 from hdopt.study import load_study
 from tests.unit.test_diagnosis import bench
 
@@ -156,3 +164,22 @@ def test_lobes_are_said_as_large_as_they_are():
     assert named.id == "circular_spline_lobing" and named.parameters["lobes"].value == 8
     assert amplitude.value == pytest.approx(3.0, rel=2e-3)
     assert amplitude.high - amplitude.low < 0.06
+
+
+def test_a_fit_to_means_leaves_nothing_of_its_waves_on_the_rows_as_recorded():
+    """A wave of 40 an input turn, 292 samples a turn, of which two make a row: their means leave 0.909 of it, so that
+    0.0053 arcmin of 0.0583 would stand in the rows as recorded, where orders above those of the means are looked for.
+    Fault caught: coefficients as the means want them."""
+    rate, sizes = 292, np.array([0.05, -0.03])
+    theta = np.arange(4 * rate) * TURN / rate
+    error = np.column_stack([np.sin(40 * theta), np.cos(40 * theta)]) @ sizes
+    record = Recording("record", RATIO, theta, error)
+    rows = gather([record], 2)
+    problem = FitProblem(rows, None, np.ones((len(rows), 1)), Noise.white(rows, 1.0))
+    term = explanations()["encoder_interpolation"].term(rows, {"lines": 40, "shaft": Shaft.INPUT, "cycles": (1,)})
+    dimmed, *_ = np.linalg.lstsq(term.columns, rows.error, rcond=None)
+    assert np.hypot(*dimmed) == pytest.approx(np.cos(np.pi * 40 / rate) * np.hypot(*sizes), rel=1e-9)
+    fit = evaluate(problem, np.zeros(0), np.zeros(1), [term], [dimmed])
+    nuisances = SimpleNamespace(columns=lambda rows: np.ones((len(rows), 1)))
+    left = left_as_recorded([record], fit, nuisances).rows.error
+    np.testing.assert_allclose(left, 0, atol=1e-9)

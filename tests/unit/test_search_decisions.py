@@ -797,6 +797,7 @@ def gone_through(monkeypatch):
 
         monkeypatch.setattr(subset_search, "STAGES_AGAIN", (again,))
         monkeypatch.setattr(subset_search, "STAGES", (lambda state: through.append("all") or state,))
+        monkeypatch.setattr(subset_search, "STAGES_AFTER_AGAIN", (lambda state: through.append("rest") or state,))
         monkeypatch.setattr(subset_search, "in_last_order", lambda state, candidates: candidates)
         monkeypatch.setattr(subset_search, "completed", lambda state, candidates: candidates)
         return through, subset_search.select_from(state)
@@ -806,8 +807,8 @@ def gone_through(monkeypatch):
 
 def test_a_search_goes_on_from_what_was_known_until_another_set_leads(weighed, gone_through):
     """All stages where nothing is known; those of a search that goes on where the first of what is known leads still;
-    both where another set leads, or nothing. Faults caught: the whole search done again in every noise, and what a
-    search that goes on finds taken without one.
+    both where another set leads, or nothing. Faults caught: the whole search done again in every noise, what a search
+    that goes on finds taken without one, and the same base looked about twice.
     """
     first, second = of(50.0, "tooth"), of(40.0, "delay")
     known = SearchPlan(known=(first, second))
@@ -815,9 +816,9 @@ def test_a_search_goes_on_from_what_was_known_until_another_set_leads(weighed, g
     through, selection = gone_through(state_of(plan=known), first, second)
     assert through == ["again"]
     assert selection.best.effects == ("tooth",)
-    assert gone_through(state_of(plan=known), of(55.0, "tooth"), of(60.0, "tooth", "delay"))[0] == ["again", "all"]
-    assert gone_through(state_of(plan=known), replace(first, evidence=30.0), second)[0] == ["again", "all"]
-    assert gone_through(state_of(plan=known), of(-5.0, "tooth"))[0] == ["again", "all"]
+    assert gone_through(state_of(plan=known), of(55.0, "tooth"), of(60.0, "tooth", "delay"))[0] == ["again", "rest"]
+    assert gone_through(state_of(plan=known), replace(first, evidence=30.0), second)[0] == ["again", "rest"]
+    assert gone_through(state_of(plan=known), of(-5.0, "tooth"))[0] == ["again", "rest"]
 
 
 def test_of_what_is_known_the_better_fit_stays(weighed, monkeypatch):
@@ -840,6 +841,8 @@ def test_a_search_that_goes_on_leaves_out_what_looks_for_sets_of_other_kinds():
         "plain_for_waves",
     }
     assert subset_search.STAGES_AGAIN[0] is subset_search.refit_known
+    once = [stage for stage in subset_search.STAGES if stage not in subset_search.STAGES_AFTER_AGAIN]
+    assert once == [subset_search.explore_clean_base]
 
 
 def test_the_look_beside_a_far_drive_follows_the_search_about_the_leader():

@@ -1,7 +1,8 @@
 """Amplitudes as the samples had them, from a fit to rows that are means of neighbouring samples.
 
 The mean of m even samples over an angle w leaves sin(k w/2) / (m sin(k w/(2 m))) of a sine of order k. The fit is made
-on the rows, so that its columns are as they are; only what is said of an amplitude is that of the samples.
+on the rows, so that its columns are as they are; what is said of an amplitude is that of the samples, and so is what a
+fit makes of the rows as recorded.
 """
 
 from __future__ import annotations
@@ -31,6 +32,19 @@ def part_left(rows: Conditions, orders: Sequence[float], least: float = DEFAULT.
     return np.asarray(np.maximum(left.mean(0), least))
 
 
+def before_means(
+    coefficients: Array,
+    rows: Conditions,
+    orders: Sequence[float],
+    least: float = DEFAULT.verdict.least_left_by_means,
+) -> Array:
+    """`coefficients` (w,) fitted to `rows`, a sine and a cosine of each of `orders` (cycles an input turn) the first of
+    them, as they are on the samples behind these rows. `least` as for `part_left`."""
+    left = np.ones(len(coefficients))
+    left[: 2 * len(orders)] = np.repeat(part_left(rows, orders, least), 2)
+    return coefficients / left
+
+
 def as_sampled(
     estimate: FitEstimate,
     rows: Conditions,
@@ -40,11 +54,9 @@ def as_sampled(
     """`estimate` with its first coefficients, a sine and a cosine of each of `orders` (cycles an input turn), as the
     samples had them before means of these made the `rows`; the same object where no samples were averaged. `least` as
     for `part_left`."""
-    left = part_left(rows, orders, least)
-    if np.all(left == 1):
+    scale = before_means(np.ones(len(estimate.values)), rows, orders, least)
+    if np.all(scale == 1):
         return estimate
-    scale = np.ones(len(estimate.values))
-    scale[: 2 * len(left)] = np.repeat(1 / left, 2)
     profiles = {at: (low * float(scale[at]), high * float(scale[at])) for at, (low, high) in estimate.profiles.items()}
     return replace(
         estimate,

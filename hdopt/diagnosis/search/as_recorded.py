@@ -17,8 +17,11 @@ from hdopt.diagnosis.inference.noise import Noise
 from hdopt.diagnosis.inference.nuisance import Nuisances
 from hdopt.diagnosis.inference.read_angle import where_it_stood
 from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.inference.row_means import before_means
+from hdopt.effects.base import Effect
 from hdopt.effects.probe import strongest_orders
 from hdopt.effects.sines import sine_columns
+from hdopt.effects.term import Term
 from hdopt.recordings.read import Recording
 from hdopt.recordings.rows import Rows, gather
 
@@ -73,14 +76,25 @@ def power_of_steps(values: Array, cut: float) -> float:
 
 
 def on_rows_as_recorded(recordings: Sequence[Recording], fit: Fit, nuisances: Nuisances) -> Fit:
-    """The model of `fit`, made on averaged rows, on the rows of `recordings` as they are. `nuisances` are the columns
-    that are always free.
+    """The model of `fit`, made on averaged rows, on the rows of `recordings` as they are, where its waves are as large
+    as they were before means dimmed them. `nuisances` are the columns that are always free.
     """
     raw, old = gather(recordings), fit.problem
     problem = replace(old, rows=raw, nuisance=nuisances.columns(raw), noise=Noise.white(raw, 1.0))
     base_value = np.zeros(len(raw)) if old.base is None else old.base.evaluate_at(problem.rotation, fit.errors)[0]
     terms = [problem.explanations[t.effect].term(raw, t.shape, base_value) for t in fit.terms]
-    return evaluate(problem, fit.errors, fit.offsets, terms, fit.coefficients)
+    sizes = [
+        before_means(own, old.rows, _orders_of_columns(term, problem))
+        for term, own in zip(fit.terms, fit.coefficients, strict=True)
+    ]
+    return evaluate(problem, fit.errors, fit.offsets, terms, sizes)
+
+
+def _orders_of_columns(term: Term, problem: FitProblem) -> list[float]:
+    """Orders (cycles an input turn) of the sines that the columns of `term` begin with in `problem`; none where it has
+    none."""
+    effect = problem.explanations[term.effect]
+    return effect.orders_of_columns(term, problem.rows.ratio) if isinstance(effect, Effect) else []
 
 
 def left_of(as_recorded: Fit) -> FitProblem:

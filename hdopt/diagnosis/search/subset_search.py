@@ -97,7 +97,7 @@ def select_from(state: SearchState) -> Selection:
     if state.plan.known:
         state = through(STAGES_AGAIN, state)
     if not leads_still(state):
-        state = through(STAGES, state)
+        state = through(STAGES_AFTER_AGAIN if state.plan.known else STAGES, state)
     candidates = acceptable_first(ranked(state), state.settings.close_behind)
     return Selection(state.base, tuple(complete_and_wide(state, candidates)), state.inflation)
 
@@ -398,6 +398,9 @@ FOR_OTHER_KINDS = (
 
 STAGES_AGAIN = (refit_known, *(stage for stage in STAGES if stage not in FOR_OTHER_KINDS))
 """The search where an earlier one, on other rows or in another noise, has looked for those."""
+
+STAGES_AFTER_AGAIN = tuple(stage for stage in STAGES if stage is not explore_clean_base)
+"""The search after that, where another set leads: the base less bent is still the same, and was looked about."""
 
 
 def ranked(state: SearchState) -> list[Candidate]:
