@@ -481,3 +481,14 @@ def test_what_is_named_is_not_below_detection(searched):
     assert [found.id for found in diagnosis.effects] == ["encoder_input_eccentricity"]
     assert "encoder_input_eccentricity" not in diagnosis.below_detection
     assert "output_coupling" in diagnosis.below_detection
+
+
+def test_no_size_is_said_of_what_no_size_of_would_show(searched):
+    """Of four turns, lobes would have been seen from 62,063 arcmin on, by what the drive's own errors leave of them:
+    that they cannot be seen is told. Fault caught: the number beside it."""
+    evidence = assess(searched)
+    limits = evidence.below_detection | {"circular_spline_lobing": 62_063.0, "channel_delay": 0.02}
+    diagnosis = draw_verdict(replace(evidence, below_detection=limits), ())
+    assert "circular_spline_lobing" not in diagnosis.below_detection
+    assert any(note.startswith("circular_spline_lobing cannot be seen here") for note in diagnosis.warnings)
+    assert diagnosis.below_detection["channel_delay"] == 0.02

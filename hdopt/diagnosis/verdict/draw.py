@@ -36,7 +36,7 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
     selection = evidence.selection
     across = evidence.across_conditions
     model = selection.best.fit if findings.facts.named else selection.base
-    said = {found.id for found in conclusion.effects}
+    told = {*taken_up(evidence), *(found.id for found in conclusion.effects)}
     return Diagnosis(
         verdict=conclusion.verdict,
         rule=rule.name,
@@ -46,7 +46,7 @@ def draw_verdict(evidence: Evidence, warnings: tuple[str, ...]) -> Diagnosis:
         base=base_estimate(model),
         fit=fit_numbers(evidence),
         below_detection={
-            name: limit for name, limit in evidence.below_detection.items() if is_effect(name) and name not in said
+            name: limit for name, limit in evidence.below_detection.items() if is_effect(name) and name not in told
         },
         warnings=(
             *warnings,
@@ -175,16 +175,22 @@ def base_notes(model: Fit) -> tuple[str, ...]:
     )
 
 
-def taken_up_notes(evidence: Evidence) -> tuple[str, ...]:
+def taken_up(evidence: Evidence) -> list[str]:
     """Effects that would not have been seen if they made all of the error recorded: the drive's own errors make the
     same, as a tilted wave generator does of an eccentric input encoder. `evidence` is that of the diagnosis.
     """
     most = float(np.std(evidence.rows.error))
+    hidden = [name for name, limit in evidence.below_detection.items() if limit > most]
+    return [name for name in hidden if is_effect(name) and name not in evidence.selection.best.effects]
+
+
+def taken_up_notes(evidence: Evidence) -> tuple[str, ...]:
+    """What is said of those that the drive's own errors would take up. `evidence` is that of the diagnosis."""
+    most = float(np.std(evidence.rows.error))
     return tuple(
         f"{name} cannot be seen here: of a size that made the whole error ({most:.2g} arcmin rms) the drive's own "
         "errors would take it up"
-        for name, limit in evidence.below_detection.items()
-        if is_effect(name) and limit > most and name not in evidence.selection.best.effects
+        for name in taken_up(evidence)
     )
 
 
