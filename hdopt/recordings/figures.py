@@ -15,6 +15,7 @@ import numpy as np
 from hdopt.arrays import Array, Index
 from hdopt.recordings.passes import find_passes
 from hdopt.recordings.recording import OF_ROUNDING, TURN, Recording
+from hdopt.recordings.rows import recorded_turns
 
 CELLS_PER_TURN = 180
 """Cells an input turn: 2 deg, finer than the width of one tooth (2.2 deg for 162 teeth)."""
@@ -63,8 +64,7 @@ class Return:
 def cells_of(recording: Recording, per_turn: int = CELLS_PER_TURN) -> Cells:
     """The cells of one `recording`, at most `per_turn` of them an input turn, fewer where samples are sparse."""
     passes = find_passes(recording.input_angle)
-    travel = float(np.abs(np.diff(recording.input_angle)).sum()) / TURN
-    samples = len(recording) / max(travel, 1e-9)
+    samples = len(recording) / max(recorded_turns(recording), 1e-9)
     per_turn = max(8, int(min(per_turn, samples, max(samples / SAMPLES_PER_CELL, FEWEST_CELLS))))
     width = TURN / per_turn
     place = np.floor(recording.input_angle / width).astype(np.int64)

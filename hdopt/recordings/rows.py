@@ -29,8 +29,16 @@ def neighbours_for(recordings: Sequence[Recording]) -> int:
     `recordings` of one drive.
     """
     rows = sum(len(recording) for recording in recordings)
-    turns = sum(float(np.abs(np.diff(recording.input_angle)).sum()) / TURN for recording in recordings)
+    turns = sum(recorded_turns(recording) for recording in recordings)
     return max(1, min(round(rows / MOST_ROWS), int(rows / max(turns, 1.0) / FEWEST_ROWS_PER_TURN)))
+
+
+def recorded_turns(recording: Recording) -> float:
+    """Input turns, to and fro, of which `recording` has samples: what it passed over at a gap has none."""
+    moved = np.abs(np.diff(recording.input_angle))
+    if recording.segment is not None:
+        moved = moved[np.diff(recording.segment) == 0]
+    return float(moved.sum()) / TURN
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,7 +21,7 @@ from hdopt.compensation.zones import MOST_TERMS, formed, formed_damaged
 from hdopt.drive.geometry import Drive
 from hdopt.effects.tooth_mesh import mesh_order
 from hdopt.recordings.recording import TURN, Recording
-from hdopt.recordings.rows import Rows, neighbours_for
+from hdopt.recordings.rows import Rows, neighbours_for, recorded_turns
 from hdopt.workflow.compensation_samples import Samples
 from hdopt.workflow.waveform_fit import WaveformFit, fit_rows, offset_columns
 
@@ -50,7 +50,7 @@ def neighbours_of(recordings: Sequence[Recording]) -> int:
     """How many neighbouring samples of these `recordings` make a row: fewer than elsewhere, where a record of no more
     than `MOST_ROWS` rows can so show single teeth; none are averaged where it shows the teeth's mesh."""
     samples = sum(len(recording) for recording in recordings)
-    turns = sum(float(np.abs(np.diff(recording.input_angle)).sum()) / TURN for recording in recordings)
+    turns = sum(recorded_turns(recording) for recording in recordings)
     usual = neighbours_for(recordings)
     if samples <= MOST_ROWS and samples > turns * ROWS_PER_TOOTH * mesh_order(recordings[0].ratio):
         return 1

@@ -28,7 +28,8 @@ from hdopt.diagnosis.stages import begin, fit_base_in_noise
 from hdopt.drive.geometry import ARCMIN
 from hdopt.kinematics.cartesian import CartesianModel
 from hdopt.recordings.read import recording_from_table
-from hdopt.recordings.rows import gather, neighbours_for
+from hdopt.recordings.recording import Recording
+from hdopt.recordings.rows import gather, neighbours_for, recorded_turns
 from hdopt.study import load_study
 
 TURN = 2 * np.pi
@@ -160,6 +161,19 @@ def test_the_figure_is_of_means_of_as_many_samples_as_that_of_all_turns():
     assert [neighbours_for(of) for of in ([recording], without_samples([recording], hidden_of(recording)))] == [2, 1]
     nested = diagnosis_of_a_part([recording], base_alone, 1, DEFAULT).held_out
     assert nested.base == pytest.approx(NOISE / np.sqrt(2), rel=0.05)  # 10 turns of 200 rows: 1.6 %
+
+
+def test_what_is_passed_over_at_a_gap_is_no_turn():
+    """300 turns of 400 samples, of which two in three are hidden: what is left are 100 turns, and of their 40,000
+    samples 4 make a row. Fault caught: the way over the gaps counted with them, 133 samples a turn, of which 2 make
+    one, and a diagnosis of a part that works on twice the rows.
+    """
+    theta = np.arange(300 * 400) * TURN / 400
+    whole = Recording("record", RATIO, theta, np.zeros(len(theta)))
+    (left,) = without_samples([whole], [np.arange(len(theta)) // 400 % 3 > 0])
+    assert recorded_turns(whole) == pytest.approx(300, abs=0.01)
+    assert recorded_turns(left) == pytest.approx(100 * 399 / 400, abs=0.01)
+    assert [neighbours_for([one]) for one in (whole, left)] == [6, 4]
 
 
 def test_a_choice_that_overfits_shows_in_the_nested_figure_alone():
