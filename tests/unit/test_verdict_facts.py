@@ -401,6 +401,10 @@ def test_what_is_described_better_or_follows_no_contact_is_likened(monkeypatch):
     assert (said.verdict, said.effects, said.where["domain"]) == ("unknown", (), "reversal")
     assert said.where["rms_arcmin"] == pytest.approx(0.5)
     assert "most resembles hysteresis; but a description without physics" in said.says
+    said = rules.of_one_course(SimpleNamespace(evidence=found))
+    assert (said.verdict, said.effects, said.where["rms_arcmin"]) == ("unknown", (), pytest.approx(0.5))
+    assert "most resembles hysteresis; but one smooth course of time" in said.says
+    assert "to and fro" in said.separating_test
     said = rules.no_contact(SimpleNamespace(evidence=found, facts=replace(NAMED, contact=0.31)))
     assert (said.verdict, said.effects, said.where["domain"]) == ("unknown", (), "reversal")
     assert said.where["rms_arcmin"] == pytest.approx(0.4)
@@ -578,15 +582,17 @@ def test_facts_are_drawn_from_what_measures_them(monkeypatch):
     no |= dict.fromkeys(("own_gain", "power_together", "unseen_gain", "unseen_rms", "left_over_passes"), 0.0)
     no |= {"unsteady": None, "far_errors": "", "left_over_floor": 0.0, "beside_told": (None, 0.0), "hum_as_good": None}
     no |= {"as_right_as_such_names": (), "effects_said": (), "shared_with_imitators": ()}
-    measured = {"varying_contact": [0.2, 0.4, 0.4], "ahead_without_physics": 7.0}
+    measured = {"varying_contact": [0.2, 0.4, 0.4], "ahead_without_physics": 7.0, "told_by_a_course": 8.0}
     for name, value in {**no, **measured}.items():
         monkeypatch.setattr(facts_module, name, lambda *about, value=value, **more: value)
-    found = evidence(candidate({"hysteresis": 1.0}), noise_floor=1.0, remainder=SimpleNamespace(t=0.0))
+    more = {"noise_floor": 1.0, "remainder": SimpleNamespace(t=0.0), "inflation": 1.0}
+    found = evidence(candidate({"hysteresis": 1.0}), **more)
     for by_power, by_gain in ((0.1, 0.3), (0.3, 0.1)):
         monkeypatch.setattr(facts_module, "outside_share", lambda best, share=by_power: share)
         monkeypatch.setattr(facts_module, "gained_without_physics", lambda best, share=by_gain: share)
         drawn = find(found).facts
-        assert (drawn.outside_share, drawn.contact, drawn.described_better) == (0.3, pytest.approx(0.6), 7.0)
+        assert (drawn.outside_share, drawn.contact) == (0.3, pytest.approx(0.6))
+        assert (drawn.described_better, drawn.course) == (7.0, 8.0)
 
 
 def test_what_a_part_may_be_is_another_explanation(monkeypatch):
@@ -598,8 +604,10 @@ def test_what_a_part_may_be_is_another_explanation(monkeypatch):
     no |= {"unsteady": None, "far_errors": "", "left_over_floor": 0.0, "beside_told": (None, 0.0), "hum_as_good": None}
     no |= {"as_right_as_such_names": (), "effects_said": (), "shared_with_imitators": (), "confounded_pairs": ()}
     no |= {"varying_contact": [], "ahead_without_physics": 0.0, "outside_share": 0.0, "gained_without_physics": 0.0}
+    no |= {"told_by_a_course": 0.0}
     lists = ("rivals", "placebo_as_good", "imitating_sets", "sets_with_a_part")
-    found = evidence(candidate({"hysteresis": 1.0}), noise_floor=1.0, remainder=SimpleNamespace(t=0.0))
+    more = {"noise_floor": 1.0, "remainder": SimpleNamespace(t=0.0), "inflation": 1.0}
+    found = evidence(candidate({"hysteresis": 1.0}), **more)
     for name, value in {**no, **{one: ((one,),) for one in lists}}.items():
         monkeypatch.setattr(facts_module, name, lambda *about, value=value, **more: value)
     monkeypatch.setattr(facts_module.Facts, "named", property(lambda facts: True))

@@ -89,6 +89,8 @@ FIRED = [
     ("contact varies too much", replace(CLEAN, false_alarm_p=0.002, contact=0.3), {"turns_suffice": False}),
     ("described better", replace(NAMED, described_better=6.0), {"described_better": 4.0}),
     ("described better", replace(NAMED, described_better=6.0), {"own_gain": 0.0}),
+    ("one course tells all", replace(NAMED, course=6.0), {"course": 4.0}),
+    ("one course tells all", replace(NAMED, course=6.0), {"own_gain": 0.0}),
     ("others are as good", replace(NAMED, rivals=(("lost_motion",),)), {"rivals": ()}),
     ("named", NAMED, {"own_gain": 0.01}),
     ("named", NAMED, {"unseen_gain": 0.01}),

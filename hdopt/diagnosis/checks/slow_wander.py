@@ -55,12 +55,10 @@ class _Means:
 
 def lost_in_wander(fit: Fit, index: int, penalty: float) -> bool:
     """Whether term `index` of `fit` is slow and does not pay its `penalty` (log evidence) against the wander left."""
-    rows, settings = fit.problem.rows, fit.problem.settings.wander
-    if rows.locked:
+    if not is_slow(fit, index):
         return False
-    quarters = _Means(rows, settings)
-    if len(quarters) < settings.fewest_means or not _is_slow(fit.contribution(index), quarters, settings):
-        return False
+    settings = fit.problem.settings.wander
+    quarters = _Means(fit.problem.rows, settings)
     means = quarters.of(fit.contribution(index))
 
     def columns(numbers: Sequence[int]) -> list[Array]:
@@ -78,8 +76,15 @@ def lost_in_wander(fit: Fit, index: int, penalty: float) -> bool:
     return bool((without - complete) / variance / 2 < penalty)
 
 
-def _is_slow(contribution: Array, means: _Means, settings: WanderSettings) -> bool:
-    """Whether means over a few turns still hold most of the power of `contribution` (n,)."""
+def is_slow(fit: Fit, index: int) -> bool:
+    """Whether means over a few turns still hold most of the power of term `index` of `fit`; never of a locked input, or
+    of a record of few turns."""
+    rows, settings = fit.problem.rows, fit.problem.settings.wander
+    if rows.locked:
+        return False
+    contribution, means = fit.contribution(index), _Means(rows, settings)
+    if len(means) < settings.fewest_means:
+        return False
     longer = np.arange(len(means)) // (settings.means_a_turn * settings.slow_turns)
     weight = np.bincount(longer, means.count)
     over_turns = np.bincount(longer, means.of(contribution) * means.count) / weight

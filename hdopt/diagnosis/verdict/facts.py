@@ -10,6 +10,7 @@ import numpy as np
 
 from hdopt.diagnosis.checks.assessment import Evidence
 from hdopt.diagnosis.checks.confounding import Confounding
+from hdopt.diagnosis.checks.slow_course import told_by_a_course
 from hdopt.diagnosis.inference.base_fit import far_errors
 from hdopt.diagnosis.inference.catalogue import TOLD, VARYING_CONTACT
 from hdopt.diagnosis.inference.fit import Fit
@@ -62,8 +63,9 @@ class Facts:
     record cannot say even that the base is adequate. `rivals`: other sets that are as good, placebo and perfect
     imitations among them; `scale_as_good`: so is a ratio or gain that is off, alone, and `hum_as_good`: hum of the
     mains in an effect's place. `described_better`: log evidence by which a description without physics explains more
-    than the best set, if the shapes of that are exact. `contact`: the waves of a k_e that varies round the turn,
-    together, as the best set has them. `far_base`: the drive that is fitted beside what is said lies far outside the
+    than the best set, if the shapes of that are exact; `course`: that by which one smooth course of time does instead
+    of all that is slow in it. `contact`: the waves of a k_e that varies round the turn, together, as the best set has
+    them. `far_base`: the drive that is fitted beside what is said lies far outside the
     tolerances of its kind; `together`: power of what the best set's effects do together, over the sum of what each
     does. `heldout_over_floor`: error on turns that were hidden from the fit (cross-validated where none could be
     spared) over what a generic basis leaves; `found_again`: what is said is preferred without those turns too;
@@ -92,6 +94,7 @@ class Facts:
     scale_as_good: bool = False
     hum_as_good: bool = False
     described_better: float = 0.0
+    course: float = 0.0
     contact: float = 0.0
     far_base: bool = False
     together: float = 1.0
@@ -204,6 +207,7 @@ def find(evidence: Evidence) -> Findings:
         scale_as_good=scale_is_as_good(evidence),
         hum_as_good=hum is not None,
         described_better=ahead_without_physics(evidence),
+        course=told_by_a_course(best.fit, evidence.inflation),
         contact=math.hypot(*varying_contact(best.fit)),
         far_base=far_errors(best.fit) != "",
         together=power_together(best),

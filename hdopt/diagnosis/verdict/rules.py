@@ -190,6 +190,13 @@ def is_described_better(facts: Facts) -> bool:
     return facts.named and facts.described_better > facts.settings.tie
 
 
+def one_course_tells_all(facts: Facts) -> bool:
+    """Effects are named, and one smooth course of time tells all that is slow in them with less. `facts` are those of
+    the recording.
+    """
+    return facts.named and facts.course > facts.settings.tie
+
+
 def others_are_as_good(facts: Facts) -> bool:
     """Effects are named, and another set explains as well. `facts` are those of the recording."""
     return facts.said and bool(facts.rivals)
@@ -353,6 +360,19 @@ def described(findings: Findings) -> Conclusion:
     return no_more_than_like(best, sum(effect_powers(best)), but, MORE_TURNS, findings.evidence)
 
 
+def of_one_course(findings: Findings) -> Conclusion:
+    """Something slow is there, and what it resembles are several effects that bend to anything together. `findings`
+    hold the facts and the evidence behind them.
+    """
+    best = findings.evidence.selection.best
+    but = "; but one smooth course of time tells all that is slow in these, with fewer coefficients"
+    test = (
+        "pass the same output turns again, to and fro: what hangs on the output comes again there, what goes with time "
+        "does not"
+    )
+    return no_more_than_like(best, sum(effect_powers(best)), but, test, findings.evidence)
+
+
 def no_more_than_like(candidate: Candidate, power: float, but: str, test: str, evidence: Evidence) -> Conclusion:
     """Something of a `power` (arcmin^2) is in the `evidence` that most resembles the effects of `candidate`, and why
     that is no name (`but`, a part of the sentence); the `test` would tell what it is.
@@ -494,6 +514,7 @@ RULES = (
     Rule("drive is far", drive_is_far, beside_a_far_drive),
     Rule("contact varies too much", contact_varies_too_much, no_contact),
     Rule("described better", is_described_better, described),
+    Rule("one course tells all", one_course_tells_all, of_one_course),
     Rule("others are as good", others_are_as_good, ambiguous),
     Rule("named", lambda facts: facts.said, named),
     Rule("more than is told", more_than_is_told, more),

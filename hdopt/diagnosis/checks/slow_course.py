@@ -1,0 +1,62 @@
+"""Several slow effects against one smooth course of time.
+
+A record of one pass over little more than an output turn meets no angle of the output twice. There an eccentric output
+encoder, a drift and a ratio that is off are three smooth curves, which together bend to any other: to a power of the
+time, of which a parabola is all that shows. Each of them alone has a form that a parabola has not; together they have
+as many coefficients as a polynomial that tells the same with fewer.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from hdopt.arrays import Array
+from hdopt.diagnosis.checks.slow_wander import is_slow
+from hdopt.diagnosis.inference.catalogue import is_effect
+from hdopt.diagnosis.inference.fit import Fit
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.numerical import HALF, TINY
+from hdopt.effects.conditions import Conditions
+from hdopt.effects.term import Term
+
+
+def told_by_a_course(fit: Fit, inflation: float) -> float:
+    """By how much log evidence a polynomial of the time, of fewer coefficients, explains better than all slow terms of
+    `fit` together, in noise rougher by `inflation`; 0 where none does, where only one of its terms is slow or none of
+    these is an effect, and where nobody knows the time.
+    """
+    slow = [i for i, term in enumerate(fit.terms) if term.columns is not None and is_slow(fit, i)]
+    rows = fit.problem.rows
+    if len(slow) < 2 or not any(is_effect(fit.terms[i].effect) for i in slow) or rows.time is None:
+        return 0.0
+    probe = FitProbe(fit, keep=[i for i in range(len(fit.terms)) if i not in slow])
+    terms = [fit.terms[i] for i in slow]
+    freedom = sum(term.freedom for term in terms)
+    each = math.log(fit.problem.weighed_rows)
+
+    def evidence(columns: Array, coefficients: int) -> float:
+        return HALF * (probe.gain(_plain(terms[0], columns)) / inflation - coefficients * each)
+
+    own = evidence(np.column_stack([fit.columns_of(term) for term in terms]), freedom)
+    course = course_of_time(rows, freedom - 1)
+    tried = math.log(freedom - 1)
+    return max(0.0, *(evidence(course[:, :degree], degree) - own - tried for degree in range(1, freedom)))
+
+
+def course_of_time(rows: Conditions, degree: int) -> Array:
+    """Polynomials of the time since each recording of `rows` began, of the first to this `degree`, (n, degree): those
+    of Legendre on the longest recording."""
+    elapsed = rows.known_time.copy()
+    for record in range(rows.records):
+        own = rows.record == record
+        elapsed[own] -= elapsed[own].min()
+    along = 2 * elapsed / max(float(elapsed.max()), TINY) - 1
+    return np.asarray(np.polynomial.legendre.legvander(along, degree)[:, 1:])
+
+
+def _plain(term: Term, columns: Array) -> Term:
+    """`term` as `columns` (n, k) alone."""
+    return replace(term, columns=columns, met=None, zones=None, steps={}, kept=False)
