@@ -429,6 +429,9 @@ class SearchSettings:
     most_plain: int = threshold(3, "1", "choice: plain terms tried in place of a wide one")
     slow_cost: float = threshold(20.0, "1", "choice: log evidence of a slow term against the wander beside it")
     slow_freedom: float = threshold(2.0, "1", "choice: the same for each of its coefficients")
+    one_reading: float = threshold(
+        0.9, "1", "choice: share of a term's power in one row from which it is a reading that is off and no effect"
+    )
 
 
 @dataclass(frozen=True)

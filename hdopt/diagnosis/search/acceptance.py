@@ -2,7 +2,7 @@
 
 A slow term must stand against slow wander (`checks.slow_wander`); a term of several lines must show more of them than
 any line and its double would give it (the effect's own `every_part_shows`); what swings behind a pulse or a wave must
-be more than their inexact shapes may leave.
+be more than their inexact shapes may leave; and no effect is one reading alone.
 """
 
 from __future__ import annotations
@@ -25,7 +25,17 @@ def is_acceptable(fit: Fit) -> bool:
                 return False
     if any(lost_in_misfit(fit, i) for i, term in enumerate(fit.terms) if is_driven(term)):
         return False
+    if any(is_one_reading(fit, i) for i in range(len(fit.terms))):
+        return False
     return not any(lost_in_wander(fit, i, slow_penalty(fit, term)) for i, term in enumerate(fit.terms))
+
+
+def is_one_reading(fit: Fit, index: int) -> bool:
+    """Whether nearly all that term `index` of `fit` adds, it adds to one row: a pulse narrower than the rows are apart,
+    met once, is a reading that is off, by a whole step of a coarse encoder or by an outlier.
+    """
+    power = fit.contribution(index) ** 2
+    return bool(power.max() > fit.problem.settings.search.one_reading * power.sum())
 
 
 def slow_penalty(fit: Fit, term: Term) -> float:
