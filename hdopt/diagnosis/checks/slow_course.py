@@ -1,9 +1,9 @@
 """Several slow effects against one smooth course of time.
 
-A record of one pass over little more than an output turn meets no angle of the output twice. There an eccentric output
-encoder, a drift and a ratio that is off are three smooth curves, which together bend to any other: to a power of the
-time, of which a parabola is all that shows. Each of them alone has a form that a parabola has not; together they have
-as many coefficients as a polynomial that tells the same with fewer.
+A record of one pass over little more than an output turn meets few angles of the output twice. There an eccentric
+output encoder, a drift and a ratio that is off are three smooth curves, which together bend to any other, as to a power
+of the time, of which no more than a parabola shows. Each alone has a form of its own; where a polynomial of the time
+tells what they tell together, and with fewer coefficients, that form has not shown.
 """
 
 from __future__ import annotations

@@ -65,16 +65,15 @@ class Facts:
     mains in an effect's place. `described_better`: log evidence by which a description without physics explains more
     than the best set, if the shapes of that are exact; `course`: that by which one smooth course of time does instead
     of all that is slow in it. `contact`: the waves of a k_e that varies round the turn, together, as the best set has
-    them. `far_base`: the drive that is fitted beside what is said lies far outside the
-    tolerances of its kind; `together`: power of what the best set's effects do together, over the sum of what each
-    does. `heldout_over_floor`: error on turns that were hidden from the fit (cross-validated where none could be
-    spared) over what a generic basis leaves; `found_again`: what is said is preferred without those turns too;
-    `noise_over_neighbours`: cross-validated error over the noise that neighbouring samples and the sensors' steps
-    show; `walk`: what is left is as rough at every scale as a walk, which noise may be; `left_over_passes`: what is
-    left over what differs from pass to pass of one angle; `left_over_floor`: cross-validated error over what a
-    generic basis leaves, 1 where what is between is less than sensors and model resolve; `other_law`: log evidence by
-    which another law than an effect's own explains better. `above_resolution`: some effect is larger than what
-    sensors and model resolve.
+    them. `far_base`: the drive that is fitted beside what is said lies far outside the tolerances of its kind;
+    `together`: power of what the best set's effects do together, over the sum of what each does. `heldout_over_floor`:
+    error on turns that were hidden from the fit (cross-validated where none could be spared) over what a generic basis
+    leaves; `found_again`: what is said is preferred without those turns too; `noise_over_neighbours`: cross-validated
+    error over the noise that neighbouring samples and the sensors' steps show; `walk`: what is left is as rough at
+    every scale as a walk, which noise may be; `left_over_passes`: what is left over what differs from pass to pass of
+    one angle; `left_over_floor`: cross-validated error over what a generic basis leaves, 1 where what is between is
+    less than sensors and model resolve; `other_law`: log evidence by which another law than an effect's own explains
+    better. `above_resolution`: some effect is larger than what sensors and model resolve.
     """
 
     settings: VerdictSettings
