@@ -46,11 +46,15 @@ def test_means_are_of_quarters_of_a_turn_and_end_at_reversals_and_gaps():
 @pytest.mark.parametrize(("cycles", "slow"), [(1.0, True), (8.0, True), (20.0, False), (40.0, False)])
 def test_slow_is_what_means_over_two_turns_still_hold_half_of(cycles, slow):
     """Waves of so many cycles in forty turns: the mean over two turns keeps sinc^2(cycles/20) of their power, half of
-    it at nine."""
+    it at nine. Fault caught: a locked input, of which nothing is slow, and another term than the one asked of."""
     rows = rows_of()
-    means = slow_wander._Means(rows, WANDER)
+    rows.locked = False
     wave = np.sin(TURN * cycles * np.arange(len(rows)) / len(rows) + 0.3) + 2.0
-    assert slow_wander._is_slow(wave, means, WANDER) is slow
+    problem = SimpleNamespace(rows=rows, settings=SimpleNamespace(wander=WANDER))
+    fit = SimpleNamespace(problem=problem, contribution=[np.zeros(len(rows)), wave].__getitem__)
+    assert slow_wander.is_slow(fit, 1) is slow
+    rows.locked = True
+    assert not slow_wander.is_slow(fit, 1)
 
 
 def line_of(size, cycles=20, n=400, seed=0):
