@@ -9,13 +9,12 @@ tells what they tell together, and with fewer coefficients, that form has not sh
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
 from hdopt.arrays import Array
 from hdopt.diagnosis.checks.slow_wander import is_slow
-from hdopt.diagnosis.inference.catalogue import is_effect
+from hdopt.diagnosis.inference.catalogue import SCALE, is_effect
 from hdopt.diagnosis.inference.fit import Fit
 from hdopt.diagnosis.inference.residual_gains import FitProbe
 from hdopt.diagnosis.numerical import HALF, TINY
@@ -37,13 +36,14 @@ def told_by_a_course(fit: Fit, inflation: float) -> float:
     freedom = sum(term.freedom for term in terms)
     each = math.log(fit.problem.weighed_rows)
 
-    def evidence(columns: Array, coefficients: int) -> float:
-        return HALF * (probe.gain(_plain(terms[0], columns)) / inflation - coefficients * each)
+    def evidence(gain: float, coefficients: int) -> float:
+        return HALF * (gain / inflation - coefficients * each)
 
-    own = evidence(np.column_stack([fit.columns_of(term) for term in terms]), freedom)
-    course = course_of_time(rows, freedom - 1)
-    tried = math.log(freedom - 1)
-    return max(0.0, *(evidence(course[:, :degree], degree) - own - tried for degree in range(1, freedom)))
+    own = evidence(probe.gain(_as_term(np.column_stack([fit.columns_of(term) for term in terms]))), freedom)
+    degrees = range(1, freedom)
+    gains = probe.gains_of_parts(_as_term(course_of_time(rows, freedom - 1)), [range(degree) for degree in degrees])
+    best = max(evidence(gain, degree) for gain, degree in zip(gains, degrees, strict=True))
+    return max(0.0, best - own - math.log(len(degrees)))
 
 
 def course_of_time(rows: Conditions, degree: int) -> Array:
@@ -57,6 +57,6 @@ def course_of_time(rows: Conditions, degree: int) -> Array:
     return np.asarray(np.polynomial.legendre.legvander(along, degree)[:, 1:])
 
 
-def _plain(term: Term, columns: Array) -> Term:
-    """`term` as `columns` (n, k) alone."""
-    return replace(term, columns=columns, met=None, zones=None, steps={}, kept=False)
+def _as_term(columns: Array) -> Term:
+    """`columns` (n, k) as they are: a scale is no error of a reading, and has no shape."""
+    return Term(SCALE, {}, columns=columns)

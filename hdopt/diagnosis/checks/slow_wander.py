@@ -55,10 +55,9 @@ class _Means:
 
 def lost_in_wander(fit: Fit, index: int, penalty: float) -> bool:
     """Whether term `index` of `fit` is slow and does not pay its `penalty` (log evidence) against the wander left."""
-    if not is_slow(fit, index):
+    quarters, settings = _quarters(fit), fit.problem.settings.wander
+    if quarters is None or not _is_slow(fit.contribution(index), quarters, settings):
         return False
-    settings = fit.problem.settings.wander
-    quarters = _Means(fit.problem.rows, settings)
     means = quarters.of(fit.contribution(index))
 
     def columns(numbers: Sequence[int]) -> list[Array]:
@@ -79,12 +78,21 @@ def lost_in_wander(fit: Fit, index: int, penalty: float) -> bool:
 def is_slow(fit: Fit, index: int) -> bool:
     """Whether means over a few turns still hold most of the power of term `index` of `fit`; never of a locked input, or
     of a record of few turns."""
+    quarters = _quarters(fit)
+    return quarters is not None and _is_slow(fit.contribution(index), quarters, fit.problem.settings.wander)
+
+
+def _quarters(fit: Fit) -> _Means | None:
+    """Means over parts of a turn of what belongs to `fit`; None of a locked input, and where they are few."""
     rows, settings = fit.problem.rows, fit.problem.settings.wander
     if rows.locked:
-        return False
-    contribution, means = fit.contribution(index), _Means(rows, settings)
-    if len(means) < settings.fewest_means:
-        return False
+        return None
+    quarters = _Means(rows, settings)
+    return quarters if len(quarters) >= settings.fewest_means else None
+
+
+def _is_slow(contribution: Array, means: _Means, settings: WanderSettings) -> bool:
+    """Whether means over a few turns still hold most of the power of `contribution` (n,)."""
     longer = np.arange(len(means)) // (settings.means_a_turn * settings.slow_turns)
     weight = np.bincount(longer, means.count)
     over_turns = np.bincount(longer, means.of(contribution) * means.count) / weight
