@@ -1,8 +1,9 @@
-"""Numbers in sentences: how many of what, and a nought that rounding has moved."""
+"""Numbers and lists in sentences: how many of what, one and another, and a nought that rounding has moved."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 ROUNDING = 1e-9
 """Below it a quantity in mm, deg, arcmin, N, MPa or h, or a share, is what rounding has left of nought."""
@@ -15,6 +16,14 @@ def counted(number: int | str, one: str, many: str | None = None) -> str:
     `one` is the word for a single one, `many` for more (None: `one` with an s): counted(n, "row was", "rows were").
     """
     return f"{number} {one if str(number) == '1' else many or f'{one}s'}"
+
+
+def listed(words: Sequence[str]) -> str:
+    """'a', 'a and b', 'a, b and c'; nothing of no words."""
+    if not words:
+        return ""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def settled(value: float) -> float:

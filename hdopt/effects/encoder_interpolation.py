@@ -27,6 +27,7 @@ from hdopt.effects.probe import Probe, best_terms
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Shape, Term
 from hdopt.effects.tooth_mesh import ToothMesh, mesh_order
+from hdopt.words import listed
 
 LOWEST_ORDER = 8.0
 LOWEST_PAIR = 3.0
@@ -248,20 +249,22 @@ class EncoderInterpolation(Effect):
     def parameters(self, term: Term, estimate: FitEstimate) -> dict[str, Parameter]:
         lines, other = term.shape["lines"], term.shape[OTHER]
         both = [float(number) for number in (lines, other or lines)]
-        return {
-            "lines": replace(counted(lines), low=min(both), high=max(both)),
-            "amplitude_arcmin": estimate.amplitude(0, 1),
-            "phase_deg": estimate.phase_deg(0, 1),
-        }
+        found = {"lines": replace(counted(lines), low=min(both), high=max(both))}
+        for i, cycle in enumerate(term.shape["cycles"]):
+            amplitude, phase = SINES.members[cycle]
+            found |= {amplitude: estimate.amplitude(2 * i, 2 * i + 1), phase: estimate.phase_deg(2 * i, 2 * i + 1)}
+        return found
 
     def sentence(self, shape: Shape, parameters: Mapping[str, Parameter], rms_arcmin: float) -> str:
         lines, other = f"{parameters['lines'].value:.0f}", shape.get(OTHER)
         shaft = Shaft.INPUT if shape["shaft"] == Shaft.OUTPUT else Shaft.OUTPUT
         instead = f" (or the {shaft} encoder between its {other:.0f}, at the same orders)" if other else ""
-        return (
-            f"The {shape['shaft']} encoder interpolates unevenly between its {lines} lines{instead}: "
-            f"{parameters['amplitude_arcmin'].value:.2g} arcmin at the output."
-        )
+        cycles = [str(cycle) for cycle in shape["cycles"]]
+        sizes = [f"{parameters[SINES.members[cycle][0]].value:.2g}" for cycle in shape["cycles"]]
+        said = f"{listed(sizes)} arcmin at the output"
+        if cycles != ["1"]:
+            said += f" in {listed(cycles)} cycles a line"
+        return f"The {shape['shaft']} encoder interpolates unevenly between its {lines} lines{instead}: {said}."
 
 
 def _with_neighbours(strongest: set[float], lines: Array, per: float, samples: Conditions) -> list[float]:

@@ -8,7 +8,8 @@ from typing import Any  # Any: results of steps, JSON-ready
 from hdopt.report import Ruling, Section
 from hdopt.report.cells import in_words
 from hdopt.report.sections.verdict import verdict_section
-from hdopt.report.sections.words import in_sentence, label, listed, percent
+from hdopt.report.sections.words import in_sentence, label, percent
+from hdopt.words import listed
 from hdopt.workflow.requirement import Verdict
 
 Found = Mapping[str, Mapping[str, Any]]

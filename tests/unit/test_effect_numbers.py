@@ -12,6 +12,7 @@ import pytest
 from test_effect_physics import RATE, RATIO, TURN, moving, spanned
 
 from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.orientation import as_counted
 from hdopt.diagnosis.search.candidates import in_order, joint_fit, penalty_scale, weigh
 from hdopt.diagnosis.settings import DEFAULT
 from hdopt.diagnosis.stages import begin
@@ -402,6 +403,25 @@ def test_lines_that_stand_at_the_same_orders_on_the_other_shaft_are_said(lines, 
     assert (number.value, number.low, number.high) == (lines, *sorted((lines, other or lines)))
     said = effect.sentence(term.shape, found, 0.1)
     assert (f"between its {lines} lines" in said) and ((f"its {other}, at the same orders" in said) is bool(other))
+
+
+def test_every_cycle_of_an_encoders_line_is_said():
+    """0.3 arcmin of offsets, one cycle a line, and 0.1 of unequal gains, two: each with its phase, and in the sentence.
+    Turned round in both angles each keeps its size, and its phase changes its sign."""
+    effect = EFFECTS["encoder_interpolation"]
+    values = np.array([0.3 * math.cos(0.5), 0.3 * math.sin(0.5), 0.1 * math.cos(2.0), 0.1 * math.sin(2.0)])
+    term = effect.term(moving(), {"lines": 20, "shaft": Shaft.INPUT, "cycles": (1, 2)})
+    found = effect.parameters(term, FitEstimate(values, 1e-8 * np.eye(4)))
+    sizes = {"amplitude_arcmin": 0.3, "amplitude_2_arcmin": 0.1}
+    phases = {"phase_deg": math.degrees(0.5), "phase_2_deg": math.degrees(2.0)}
+    assert {name: one.value for name, one in found.items()} == pytest.approx({"lines": 20} | sizes | phases)
+    said = effect.sentence(term.shape, found, 0.1)
+    assert said.endswith(": 0.3 and 0.1 arcmin at the output in 1 and 2 cycles a line.")
+    turned = {name: one.value for name, one in as_counted(found, term).items()}
+    assert turned == pytest.approx({"lines": 20} | sizes | {name: -phase for name, phase in phases.items()})
+    alone = effect.term(moving(), {"lines": 20, "shaft": Shaft.INPUT, "cycles": (1,)})
+    found = effect.parameters(alone, FitEstimate(values[:2], 1e-8 * np.eye(2)))
+    assert effect.sentence(alone.shape, found, 0.1).endswith(": 0.3 arcmin at the output.")
 
 
 def test_lobes_of_a_ring_act_by_the_tangent_there_and_back():

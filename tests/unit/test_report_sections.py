@@ -21,7 +21,8 @@ from hdopt.report.sections.published import published_section
 from hdopt.report.sections.structures import structures_section
 from hdopt.report.sections.tornado import sensitivities_section
 from hdopt.report.sections.waveform import waveform_section
-from hdopt.report.sections.words import in_sentence, label, listed
+from hdopt.report.sections.words import in_sentence, label
+from hdopt.words import listed
 
 
 def item(section: Section, key: str) -> Figure | Table:

@@ -10,8 +10,8 @@ import numpy as np
 
 from hdopt.arrays import Array, Mask
 from hdopt.report import Figure, Section
-from hdopt.report.sections.words import listed
 from hdopt.report.theme import GREEN, GREY, INK, ORANGE, PAPER, PURPLE, SEQUENTIAL, SKY, VERMILLION, faded, figure
+from hdopt.words import listed
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 from hdopt.report import Figure, Item, KeyFigures, Report, Section, Table, Text
 from hdopt.report.cells import NAMES, UNITS
 from hdopt.report.sections.diagnosis_residual import extended_name, plain_numbers, residual_section
-from hdopt.report.sections.words import in_sentence, label, listed, short
+from hdopt.report.sections.words import in_sentence, label, short
 from hdopt.report.theme import BLUE, GREEN, GREY, figure
+from hdopt.words import listed
 
 if TYPE_CHECKING:
     from hdopt.diagnosis.verdict.diagnosis import Diagnosis

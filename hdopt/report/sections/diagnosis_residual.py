@@ -14,8 +14,9 @@ from hdopt.recordings.passes import synchronous_average
 from hdopt.recordings.read import TURN
 from hdopt.recordings.rows import Rows
 from hdopt.report import Figure, Item, Section, Table
-from hdopt.report.sections.words import listed, short
+from hdopt.report.sections.words import short
 from hdopt.report.theme import BLUE, GREY, VERMILLION, figure
+from hdopt.words import listed
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

@@ -9,8 +9,8 @@ import numpy as np
 
 from hdopt.arrays import Array, Mask
 from hdopt.report import Figure, Item, Section, Table, Text
-from hdopt.report.sections.words import listed
 from hdopt.report.theme import PALETTE, figure
+from hdopt.words import listed
 
 if TYPE_CHECKING:
     import pandas as pd

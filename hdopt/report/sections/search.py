@@ -27,9 +27,9 @@ from hdopt.report.sections.design_map import Design, design_map, words_on_limits
 from hdopt.report.sections.design_map import Limit as MapLimit
 from hdopt.report.sections.profiles import profiles_section
 from hdopt.report.sections.regions import region_items
-from hdopt.report.sections.words import in_sentence, label, listed
+from hdopt.report.sections.words import in_sentence, label
 from hdopt.report.theme import GREY, INK, PALETTE, PAPER, VERMILLION, faded, figure
-from hdopt.words import counted
+from hdopt.words import counted, listed
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

@@ -8,8 +8,9 @@ import numpy as np
 
 from hdopt.report import Figure, Item, KeyFigures, Section, Table, Text
 from hdopt.report.cells import EACH, NAMES, ROW, in_words, minus
-from hdopt.report.sections.words import in_sentence, listed, percent
+from hdopt.report.sections.words import in_sentence, percent
 from hdopt.report.theme import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, faded, figure
+from hdopt.words import listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdopt.report import Figure, Section, Table
-from hdopt.report.sections.words import in_sentence, listed
+from hdopt.report.sections.words import in_sentence
 from hdopt.report.theme import BLUE, INK, ORANGE, figure
+from hdopt.words import listed
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from hdopt.effects import EFFECTS
 
@@ -61,14 +60,6 @@ def in_sentence(name: str) -> str:
 def short(value: float) -> str:
     """`value` in three digits, and a large number written out: '0.0153', '1784'."""
     return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
-
-
-def listed(words: Sequence[str]) -> str:
-    """'a', 'a and b', 'a, b and c'; nothing of no words."""
-    if not words:
-        return ""
-    *first, last = words
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 def percent(share: float) -> str:
