@@ -23,9 +23,11 @@ test:
 	$(TEST_VENV)/bin/ruff check .
 	$(MAKE) -j 2 types every-test VENV=$(TEST_VENV)
 
-# Beside the types, which take a minute on one core where nothing of them is known yet.
+# Beside the types, which take a minute on one core where nothing of them is known yet. First the kernels, which all
+# other tests load then: what two workers meet before it is compiled, either compiles for itself.
 every-test:
-	$(VENV)/bin/python -m pytest -n 2 --dist worksteal -m "not measurement" --benchmark-disable $(PYTEST_ARGS)
+	$(VENV)/bin/python -m pytest -q -n 2 -m compiles tests/unit/test_compiled_kernels.py
+	$(VENV)/bin/python -m pytest -n 2 --dist worksteal -m "not measurement and not compiles" --benchmark-disable $(PYTEST_ARGS)
 
 check: lint types
 	$(VENV)/bin/python -m pytest -q -m "not slow and not timed and not browser and not measurement" --benchmark-disable -x -n 2 $(PYTEST_ARGS)
