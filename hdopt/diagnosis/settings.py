@@ -147,7 +147,6 @@ class BaseSettings:
     full_iterations: int = threshold(10, "1", "choice: effort of a minimum on all rows")
     measured_iterations: int = threshold(6, "1", "choice: effort of the base's last fit before the search")
     joint_within: float = threshold(1.02, "1", "choice: objective over the best from which a new drive is worth a fit")
-    slope_step_mm: float = threshold(1e-6, "mm", "choice: step of the Cartesian errors' derivative")
     open_share: float = threshold(0.01, "1", "choice: variance over the prior's from which a combination is open")
     open_member: float = threshold(0.3, "1", "choice: share of the largest member from which an error is listed")
     open_members: int = threshold(4, "1", "choice: errors listed of a combination")

@@ -27,7 +27,7 @@ class Parameter:
 
     @property
     def undefined(self) -> bool:
-        """Whether it is an angle of which nothing is known, as the direction of an error that is nil: its interval
+        """Whether it is an angle of which nothing is known, as the direction of an error that may be nil: its interval
         takes in the whole turn."""
         return self.unit == "deg" and self.high - self.low >= 360
 

@@ -267,8 +267,12 @@ class LocalToothDefect(Effect):
         return {**parameters, "angle_deg": there}
 
     def sentence(self, shape: Shape, parameters: Mapping[str, Parameter], rms_arcmin: float) -> str:
-        angle = parameters["angle_deg"].value % 360
-        where = f"{angle:.1f} deg"
+        angle = parameters["angle_deg"].value
+        if shape["on"] is Seat.OUTPUT:  # met once in N turns of the wave generator, at one of their angles
+            where = f"{angle:.1f} deg of wave-generator travel"
+        else:
+            angle %= 360
+            where = f"{angle:.1f} deg"
         if shape["on"].in_zones:  # the ends of the wave generator are alike, and so are drives half a turn apart
             where = f"{angle % 180:.1f} or {angle % 180 + 180:.1f} deg"
         return (

@@ -127,8 +127,8 @@ def test_far_is_over_its_prior_or_surely_twice_its_tolerance():
 
 
 def test_intervals_of_a_length_and_its_direction_are_those_of_its_two_parts():
-    """An eccentricity of 0.02 mm along x (direction 90 deg): its length is as uncertain as x, its direction as y over
-    the length; 1.96 standard deviations, lengths in mm and angles in deg."""
+    """An eccentricity of 0.02 mm along x (direction 90 deg): its length is as uncertain as x, and its direction lies
+    between the rays that touch the ellipse of 1.96 standard deviations; lengths in mm and angles in deg."""
     spread = np.full(12, 1e-6)
     spread[:2] = 0.003, 0.001
     errors = np.full(12, 0.01)
@@ -138,7 +138,8 @@ def test_intervals_of_a_length_and_its_direction_are_those_of_its_two_parts():
     assert (length.value, length.unit) == (pytest.approx(0.02), "mm")
     assert (length.low, length.high) == (pytest.approx(0.02 - 1.96 * 0.003), pytest.approx(0.02 + 1.96 * 0.003))
     assert (direction.value, direction.unit) == (pytest.approx(90.0), "deg")
-    assert direction.high - direction.value == pytest.approx(np.degrees(1.96 * 0.001 / 0.02))
+    touching = math.atan(1.96 * 0.001 / math.sqrt(0.02**2 - (1.96 * 0.003) ** 2))
+    assert (direction.low, direction.high) == pytest.approx((90 - math.degrees(touching), 90 + math.degrees(touching)))
 
 
 def test_a_tilt_is_its_lift_over_half_the_width():
@@ -149,16 +150,38 @@ def test_a_tilt_is_its_lift_over_half_the_width():
     assert found.high - found.value == pytest.approx(np.degrees(1.96 * 0.001 / HALF_WIDTH), rel=1e-4)
 
 
-def test_a_length_is_not_below_zero_and_a_direction_passes_the_half_turn():
-    """Along -y the direction jumps from 180 to -180 deg: its slope does not."""
-    spread = np.full(12, 1e-6)
-    spread[:2] = 0.001, 0.03
-    errors = np.full(12, 0.01)
-    errors[:2] = 0.0, -0.02
+PAIRS = {
+    "axis_eccentricity_mm": ("axis_eccentricity_direction_deg", 1, 0),
+    "wg_eccentricity_mm": ("wg_eccentricity_direction_deg", 4, 5),
+    "cs_tooth_amplitude_mm": ("cs_tooth_phase_deg", 8, 9),
+    "fs_tooth_amplitude_mm": ("fs_tooth_phase_deg", 10, 11),
+}
+"""Sizes: their angle, and the Cartesian errors along its nought and a quarter turn on."""
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_a_direction_passes_the_half_turn(name):
+    """Against its nought the angle jumps from 180 to -180 deg: its interval does not. Faults caught: another pair's
+    errors, a pair the other way round."""
+    angle, along, across = PAIRS[name]
+    spread, errors = np.full(12, 1e-6), np.full(12, 0.01)
+    spread[across], errors[along], errors[across] = 0.001, -0.02, 0.0
+    direction = estimated(errors, spread).parameters[angle]
+    assert direction.value == pytest.approx(180.0)
+    assert direction.high - direction.low == pytest.approx(2 * math.degrees(math.atan(1.96 * 0.001 / 0.02)), rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-57, 0.02])
+@pytest.mark.parametrize("name", PAIRS)
+def test_what_is_not_seen_is_not_said_to_be_nought(name, size):
+    """Both parts known to 0.03 mm, as of eccentricities that a structure takes away: from nought to as large as that,
+    in any direction. Fault caught: an interval by the slopes of a length at nought, which are none."""
+    angle, along, across = PAIRS[name]
+    spread, errors = np.full(12, 1e-6), np.full(12, 0.01)
+    spread[[along, across]], errors[along], errors[across] = 0.03, size, 0.0
     found = estimated(errors, spread).parameters
-    assert found["axis_eccentricity_mm"].low == 0.0
-    direction = found["axis_eccentricity_direction_deg"]
-    assert direction.high - direction.value == pytest.approx(np.degrees(1.96 * 0.001 / 0.02), rel=1e-3)
+    assert (found[name].low, found[name].high) == (0.0, pytest.approx(size + 1.96 * 0.03, rel=1e-6))
+    assert found[angle].undefined and found[angle].high - found[angle].low == 360.0
 
 
 def test_what_is_left_open_is_a_part_of_the_prior():

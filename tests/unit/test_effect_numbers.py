@@ -405,6 +405,22 @@ def test_lines_that_stand_at_the_same_orders_on_the_other_shaft_are_said(lines, 
     assert (f"between its {lines} lines" in said) and ((f"its {other}, at the same orders" in said) is bool(other))
 
 
+@pytest.mark.parametrize(
+    ("seat", "angle", "where"),
+    [
+        (Seat.OUTPUT, 740.9, "at 740.9 deg of wave-generator travel"),
+        (Seat.CIRCULAR_SPLINE_ONCE, 380.0, "at 20.0 deg"),
+        (Seat.CIRCULAR_SPLINE, 303.3, "at 123.3 or 303.3 deg"),
+    ],
+)
+def test_a_damaged_tooth_is_said_where_it_is_met(seat, angle, where):
+    """One at the output is met once in N turns of the wave generator: its angle is not taken back into the first. Teeth
+    that the driving zone meets may be met by either end."""
+    numbers = {"angle_deg": Parameter(angle, angle, angle, "deg"), "width_deg": Parameter(5.0, 5.0, 5.0, "deg")}
+    said = EFFECTS["local_tooth_defect"].sentence({"on": seat}, numbers, 0.1)
+    assert f"{where} makes a pulse" in said
+
+
 def test_every_cycle_of_an_encoders_line_is_said():
     """0.3 arcmin of offsets, one cycle a line, and 0.1 of unequal gains, two: each with its phase, and in the sentence.
     Turned round in both angles each keeps its size, and its phase changes its sign."""

@@ -16,10 +16,10 @@ from hdopt.arrays import Array, Mask
 from hdopt.diagnosis.inference.descent import refine
 from hdopt.diagnosis.inference.fit import Fit, FitProblem, evaluate
 from hdopt.diagnosis.inference.normal_equations import least_squares
-from hdopt.diagnosis.numerical import HALF, NORMAL_95, SMALLEST_POWER
+from hdopt.diagnosis.numerical import HALF, SMALLEST_POWER
 from hdopt.diagnosis.settings import DEFAULT, BaseSettings
-from hdopt.drive.errors import ERROR_NAMES, DriveErrors
-from hdopt.effects.estimate import Parameter
+from hdopt.drive.errors import DriveErrors
+from hdopt.effects.estimate import FitEstimate, Parameter
 from hdopt.effects.sines import sine_columns
 from hdopt.effects.term import Term
 from hdopt.kinematics.cartesian import CARTESIAN_NAMES, PARAMETERS, to_drive_errors
@@ -188,30 +188,44 @@ def base_estimate(fit: Fit) -> BaseEstimate:
     rms = float(np.std(fit.base_value)) if base is not None else 0.0
     if base is None:
         return BaseEstimate(DriveErrors(), {}, (), rms)
-    half_width, step = base.half_width, fit.problem.settings.base.slope_step_mm
+    half_width = base.half_width
     covariance = fit.covariance()[:PARAMETERS, :PARAMETERS]
-    errors = to_drive_errors(fit.errors, half_width)
-    values = errors.to_matrix()[0]
-    jacobian = np.empty((PARAMETERS, PARAMETERS))
-    for i in range(PARAMETERS):
-        up, down = fit.errors.copy(), fit.errors.copy()
-        up[i] += step
-        down[i] -= step
-        change = to_drive_errors(up, half_width).to_matrix()[0] - to_drive_errors(down, half_width).to_matrix()[0]
-        change = np.where(np.abs(change) > np.pi, change - np.sign(change) * 2 * np.pi, change)
-        jacobian[:, i] = change / (2 * step)
-    spread = NORMAL_95 * np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0))
-    parameters = {}
-    for name, value, half in zip(ERROR_NAMES, values, spread, strict=True):
-        length = name in ("axis_eccentricity", "wg_eccentricity", "cs_tooth_amplitude", "fs_tooth_amplitude")
-        factor, unit, suffix = (1.0, "mm", "mm") if length else (math.degrees(1), "deg", "deg")
-        low = value - half
-        if length:
-            low = max(low, 0.0)
-        parameters[f"{name}_{suffix}"] = Parameter(factor * value, factor * low, factor * (value + half), unit)
     return BaseEstimate(
-        errors, parameters, open_combinations(covariance, fit.problem.prior, fit.problem.settings.base), rms
+        to_drive_errors(fit.errors, half_width),
+        parameters_of(FitEstimate(fit.errors, covariance), half_width),
+        open_combinations(covariance, fit.problem.prior, fit.problem.settings.base),
+        rms,
     )
+
+
+def parameters_of(cartesian: FitEstimate, half_width: float) -> dict[str, Parameter]:
+    """Sizes (mm), directions, phases and tilts (deg) of a drive's errors, in the order of ERROR_NAMES by their study
+    keys, from its `cartesian` errors (12), mm; `half_width` is b/2 of the wave generator, mm.
+
+    The interval of a size begins at zero where its direction is open: what a recording does not see is no error of
+    nought, it may be as large as drives of its kind have it.
+    """
+
+    def tilt(name: str, rises: str) -> dict[str, Parameter]:
+        rise = cartesian.parameter(CARTESIAN_NAMES.index(rises), "mm")
+        value, low, high = (math.degrees(math.atan(x / half_width)) for x in (rise.value, rise.low, rise.high))
+        return {name: Parameter(value, low, high, "deg")}
+
+    def pair(size: str, angle: str, along: str, across: str) -> dict[str, Parameter]:
+        at = CARTESIAN_NAMES.index(along), CARTESIAN_NAMES.index(across)
+        return {size: cartesian.amplitude(*at, unit="mm"), angle: cartesian.phase_deg(*at)}
+
+    on_axis, on_wg = "axis eccentricity ", "wave-generator eccentricity along its "
+    return {
+        **pair("axis_eccentricity_mm", "axis_eccentricity_direction_deg", f"{on_axis}y", f"{on_axis}x"),
+        **tilt("axis_tilt_y_deg", "axis tilt y"),
+        **tilt("axis_tilt_x_deg", "axis tilt x"),
+        **pair("wg_eccentricity_mm", "wg_eccentricity_direction_deg", f"{on_wg}major axis", f"{on_wg}minor axis"),
+        **tilt("wg_tilt_major_deg", "wave-generator tilt major"),
+        **tilt("wg_tilt_minor_deg", "wave-generator tilt minor"),
+        **pair("cs_tooth_amplitude_mm", "cs_tooth_phase_deg", "CS tooth sine", "CS tooth cosine"),
+        **pair("fs_tooth_amplitude_mm", "fs_tooth_phase_deg", "FS tooth sine", "FS tooth cosine"),
+    }
 
 
 def open_combinations(covariance: Array, prior: Array, settings: BaseSettings = DEFAULT.base) -> tuple[str, ...]:

@@ -116,7 +116,7 @@ class Diagnosis(ShownAsTable):
 
     def to_frame(self) -> pd.DataFrame:
         """One row a parameter, of the effects that were named and of the base model, with its interval; an angle that
-        is undefined, as the direction of an error that is nil, has no numbers."""
+        is undefined, as the direction of an error that may be nil, has no numbers."""
         import pandas as pd
 
         found = [(effect.id, effect.confidence, effect.parameters) for effect in self.effects]

@@ -236,7 +236,7 @@ def limits_section(diagnosis: Diagnosis) -> Section:
     if base:
         caption = "With 95 % intervals."
         if any(parameter.undefined for parameter in diagnosis.base.parameters.values()):
-            caption += " A direction without a number is undefined: its error is nil, or as good as nil."
+            caption += " A direction without a number is open: its error may be nil."
         if diagnosis.base.open_combinations:
             caption += f" The recording leaves open: {'; '.join(diagnosis.base.open_combinations)}."
         items.append(Table("diagnosis-base", "The drive's errors as fitted", pd.DataFrame(base), caption, NUMBERS))
