@@ -428,8 +428,8 @@ class SearchSettings:
     most_plain: int = threshold(3, "1", "choice: plain terms tried in place of a wide one")
     slow_cost: float = threshold(20.0, "1", "choice: log evidence of a slow term against the wander beside it")
     slow_freedom: float = threshold(2.0, "1", "choice: the same for each of its coefficients")
-    one_reading: float = threshold(
-        0.9, "1", "choice: share of a term's power in one row from which it is a reading that is off and no effect"
+    fewest_rows: float = threshold(
+        2.0, "1", "choice: rows of the same share in a term's power, which must be more: two are readings that are off"
     )
 
 
@@ -675,8 +675,8 @@ class VerdictSettings:
     other_law_inexact: float = threshold(
         1e-3,
         "1",
-        "choice: share of what a term explains that its own form may leave to another law; laws of the speed a seventh "
-        "apart differ by 1.4e-3",
+        "choice: share of what a term explains that its own form may leave to another law, or to a drive outside its "
+        "tolerances; laws of the speed a seventh apart differ by 1.4e-3",
     )
     together: float = threshold(
         0.125,

@@ -269,7 +269,7 @@ def test_a_term_that_slow_wander_could_be_is_not_named(lost, said, monkeypatch):
     """Of whichever term; would catch an acceptance that asks nothing of slow terms, or of the first alone."""
     monkeypatch.setattr(acceptance, "properties_of", lambda effect: SimpleNamespace(has_parts=False))
     monkeypatch.setattr(acceptance, "is_driven", lambda term: False)
-    monkeypatch.setattr(acceptance, "is_one_reading", lambda fit, i: False)
+    monkeypatch.setattr(acceptance, "borne_by_few_rows", lambda fit, i: False)
     monkeypatch.setattr(acceptance, "slow_penalty", lambda fit, term: 10.0 * term.number)
     monkeypatch.setattr(acceptance, "lost_in_wander", lambda fit, i, needed: lost[i] and needed == 10.0 * i)
     terms = [SimpleNamespace(effect="thermal_drift", number=i) for i in range(2)]
@@ -278,12 +278,20 @@ def test_a_term_that_slow_wander_could_be_is_not_named(lost, said, monkeypatch):
 
 @pytest.mark.parametrize(
     ("pulses", "said"),
-    [([0.0, 5.0, 0.0, 0.0], False), ([0.0, 5.0, 0.0, 2.0], True), ([0.0, -5.0, -4.0, 0.0], True)],
+    [
+        ([0.0, 5.0, 0.0, 0.0], False),
+        ([0.0, 4.46, 0.0, 2.03], False),
+        ([0.0, -5.0, -5.0, 0.0], False),
+        ([1.0, -5.0, 1.0, 1.0], False),
+        ([0.0, 5.0, 3.0, 5.0], True),
+        ([4.0, -5.0, -4.0, 0.0], True),
+    ],
 )
-def test_one_reading_is_no_effect(pulses, said, monkeypatch):
-    """A pulse narrower than the rows are apart, met once, is a reading that is off by a step: 5.1 arcmin of a 12-bit
-    encoder were a damaged tooth (42 of run-029). Met twice, or by two rows, it is one. Of whichever term. Faults
-    caught: an acceptance that does not ask, or of the first term alone; the size for the power."""
+def test_a_reading_or_two_are_no_effect(pulses, said, monkeypatch):
+    """A pulse narrower than the rows are apart, met once or there and back, is readings that are off by a step: 5.1
+    arcmin of a 12-bit encoder were a damaged tooth (42 of run-029), and 4.5 and 2.0 at one angle (83 of run-030). By
+    more than two rows it is one. Of whichever term. Faults caught: an acceptance that does not ask, or of the first
+    term alone; the size for the power; the largest row for all that bear it."""
     monkeypatch.setattr(acceptance, "properties_of", lambda effect: SimpleNamespace(has_parts=False))
     monkeypatch.setattr(acceptance, "is_driven", lambda term: False)
     monkeypatch.setattr(acceptance, "slow_penalty", lambda fit, term: 0.0)

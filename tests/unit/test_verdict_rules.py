@@ -46,6 +46,8 @@ CLEAN = Facts(
 )
 NAMED = replace(CLEAN, explained=True, false_alarm_p=0.002, own_gain=1.0)
 
+LEFT = replace(CLEAN, left_over_floor=1.2, generic_t=2.1, false_alarm_p=0.002)
+
 FIRED = [
     ("happened once", replace(NAMED, momentary=True), {"momentary": False}),
     ("happened once", replace(NAMED, momentary=True), {"turns_suffice": False}),
@@ -102,10 +104,12 @@ FIRED = [
     ("more than is told", replace(CLEAN, beside_told=70.0), {"beside_told": 12.0}),
     ("more than is told", replace(CLEAN, beside_told=70.0), {"turns_suffice": False}),
     ("more than is told", replace(CLEAN, beside_told=70.0), {"high": True}),
-    ("something is left", replace(CLEAN, left_over_floor=1.2, generic_t=2.1), {"left_over_floor": 1.1}),
-    ("something is left", replace(CLEAN, left_over_floor=1.2, generic_t=2.1), {"generic_t": 1.9}),
-    ("something is left", replace(CLEAN, left_over_floor=1.2, generic_t=2.1), {"turns_suffice": False}),
-    ("something is left", replace(CLEAN, left_over_floor=1.2, generic_t=2.1), {"high": True}),
+    ("something is left", LEFT, {"left_over_floor": 1.1}),
+    ("something is left", LEFT, {"generic_t": 1.9}),
+    ("something is left", LEFT, {"turns_suffice": False}),
+    ("something is left", LEFT, {"high": True}),
+    ("something is left", LEFT, {"false_alarm_p": 0.17}),
+    ("something is left", replace(LEFT, false_alarm_p=0.17, generic_t=6.5), {"generic_t": 5.5}),
     ("too little", replace(CLEAN, too_little=True), {"too_little": False}),
     ("adequate", CLEAN, {"too_little": True}),
 ]

@@ -2,7 +2,7 @@
 
 A slow term must stand against slow wander (`checks.slow_wander`); a term of several lines must show more of them than
 any line and its double would give it (the effect's own `every_part_shows`); what swings behind a pulse or a wave must
-be more than their inexact shapes may leave; and no effect is one reading alone.
+be more than their inexact shapes may leave; and no effect is a reading or two alone.
 """
 
 from __future__ import annotations
@@ -25,17 +25,20 @@ def is_acceptable(fit: Fit) -> bool:
                 return False
     if any(lost_in_misfit(fit, i) for i, term in enumerate(fit.terms) if is_driven(term)):
         return False
-    if any(is_one_reading(fit, i) for i in range(len(fit.terms))):
+    if any(borne_by_few_rows(fit, i) for i in range(len(fit.terms))):
         return False
     return not any(lost_in_wander(fit, i, slow_penalty(fit, term)) for i, term in enumerate(fit.terms))
 
 
-def is_one_reading(fit: Fit, index: int) -> bool:
-    """Whether nearly all that term `index` of `fit` adds, it adds to one row: a pulse narrower than the rows are apart,
-    met once, is a reading that is off, by a whole step of a coarse encoder or by an outlier.
+def borne_by_few_rows(fit: Fit, index: int) -> bool:
+    """Whether no more than a row or two bear term `index` of `fit`: a pulse narrower than the rows are apart, met once,
+    or there and back at the same angle, is readings that are off, by a whole step of a coarse encoder or by outliers.
+
+    Rows that bear it count by the inverse of the sum of squares of their shares in its power (the participation
+    ratio): one where one has all, n where n have alike.
     """
     power = fit.contribution(index) ** 2
-    return bool(power.max() > fit.problem.settings.search.one_reading * power.sum())
+    return bool(power.sum() ** 2 <= fit.problem.settings.search.fewest_rows * np.sum(power**2))
 
 
 def slow_penalty(fit: Fit, term: Term) -> float:

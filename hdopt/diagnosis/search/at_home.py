@@ -14,6 +14,8 @@ import numpy as np
 from hdopt.diagnosis.inference.base_fit import beyond_tolerances, fit_base, is_far
 from hdopt.diagnosis.inference.descent import refine
 from hdopt.diagnosis.inference.fit import Fit, evaluate
+from hdopt.diagnosis.inference.residual_gains import FitProbe
+from hdopt.diagnosis.search.penalty import leaves_nothing
 
 
 def is_outside_tolerances(fit: Fit) -> bool:
@@ -23,8 +25,8 @@ def is_outside_tolerances(fit: Fit) -> bool:
 
 def brought_home(fit: Fit, inflation: float, rng: np.random.Generator) -> Fit:
     """`fit`, or where its drive lies outside the tolerances of its kind the best one of its terms beside a drive within
-    them, if that leaves hardly more. `inflation` says how much rougher the noise is than its model; drives are drawn by
-    `rng`.
+    them, if that leaves hardly more: what noise makes, and what inexact shapes leave, which any drive may take up.
+    `inflation` says how much rougher the noise is than its model; drives are drawn by `rng`.
     """
     if not is_outside_tolerances(fit):
         return fit
@@ -32,7 +34,16 @@ def brought_home(fit: Fit, inflation: float, rng: np.random.Generator) -> Fit:
     if (free := refine(home)).objective < home.objective and not is_outside_tolerances(free):
         home = free
     more = (home.objective - fit.objective) / home.problem.noise.sigma**2 / inflation
-    return fit if more > fit.problem.settings.search.home_within or is_outside_tolerances(home) else home
+    hardly = fit.problem.settings.search.home_within + left_by_shapes(fit) / inflation
+    return fit if more > hardly or is_outside_tolerances(home) else home
+
+
+def left_by_shapes(fit: Fit) -> float:
+    """What the terms of `fit` may leave because their shapes are inexact, in noise variances: a small share of what
+    each of these explains beside the others."""
+    shapes = [i for i, term in enumerate(fit.terms) if not leaves_nothing(term)]
+    explained = sum(FitProbe(fit, keep=fit.all_but(i)).gain(fit.terms[i]) for i in shapes)
+    return fit.problem.settings.verdict.other_law_inexact * explained
 
 
 def fitted_within(fit: Fit, rng: np.random.Generator) -> Fit:

@@ -82,12 +82,19 @@ def changes_in_time(facts: Facts) -> bool:
     return facts.turns_suffice and facts.unsteady
 
 
-def generic_basis_wins(facts: Facts) -> bool:
-    """A basis without physics predicts unseen turns clearly better than what explains, and something else speaks for
-    structure too, or the win is large. `facts` are those of the recording.
+def is_no_memory(facts: Facts) -> bool:
+    """Something else speaks for structure than a basis without physics that predicts held-out turns, or that does so
+    by far: of noise with a memory of turns it predicts some from the turns beside. `facts` are those of the recording.
     """
     other = facts.explained or facts.high or facts.significant
-    return facts.turns_suffice and facts.generic_wins and (other or facts.generic_t > facts.settings.remainder_t_alone)
+    return other or facts.generic_t > facts.settings.remainder_t_alone
+
+
+def generic_basis_wins(facts: Facts) -> bool:
+    """A basis without physics predicts unseen turns clearly better than what explains, and that is no memory of the
+    noise. `facts` are those of the recording.
+    """
+    return facts.turns_suffice and facts.generic_wins and is_no_memory(facts)
 
 
 def more_than_noise_is_left(facts: Facts) -> bool:
@@ -143,11 +150,11 @@ def more_than_is_told(facts: Facts) -> bool:
 
 def something_is_left(facts: Facts) -> bool:
     """Nothing is said, but a basis without physics predicts held-out turns better than the base and what is told do, by
-    more than any clean recording shows. `facts` are those of the recording.
+    more than any clean recording shows, and that is no memory of the noise. `facts` are those of the recording.
     """
     s = facts.settings
     much = facts.left_over_floor > s.adequate_over_floor and facts.generic_t > s.placebo_t
-    return facts.turns_suffice and not facts.said and much
+    return facts.turns_suffice and not facts.said and much and is_no_memory(facts)
 
 
 def another_law_explains(facts: Facts) -> bool:
