@@ -175,12 +175,14 @@ def test_a_direction_passes_the_half_turn(name):
 @pytest.mark.parametrize("name", PAIRS)
 def test_what_is_not_seen_is_not_said_to_be_nought(name, size):
     """Both parts known to 0.03 mm, as of eccentricities that a structure takes away: from nought to as large as that,
-    in any direction. Fault caught: an interval by the slopes of a length at nought, which are none."""
+    in any direction. Faults caught: an interval by the slopes of a length at nought, which are none; what rounding left
+    of nought, said."""
     angle, along, across = PAIRS[name]
     spread, errors = np.full(12, 1e-6), np.full(12, 0.01)
     spread[[along, across]], errors[along], errors[across] = 0.03, size, 0.0
     found = estimated(errors, spread).parameters
     assert (found[name].low, found[name].high) == (0.0, pytest.approx(size + 1.96 * 0.03, rel=1e-6))
+    assert found[name].value == (0.02 if size == 0.02 else 0.0)
     assert found[angle].undefined and found[angle].high - found[angle].low == 360.0
 
 

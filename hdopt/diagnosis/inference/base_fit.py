@@ -25,6 +25,7 @@ from hdopt.effects.term import Term
 from hdopt.kinematics.cartesian import CARTESIAN_NAMES, PARAMETERS, to_drive_errors
 from hdopt.parallel.shared_memory import each
 from hdopt.recordings.rows import Rows
+from hdopt.words import settled
 
 SIZES = {
     "axis_eccentricity_mm": "axis eccentricity x",
@@ -213,7 +214,8 @@ def parameters_of(cartesian: FitEstimate, half_width: float) -> dict[str, Parame
 
     def pair(size: str, angle: str, along: str, across: str) -> dict[str, Parameter]:
         at = CARTESIAN_NAMES.index(along), CARTESIAN_NAMES.index(across)
-        return {size: cartesian.amplitude(*at, unit="mm"), angle: cartesian.phase_deg(*at)}
+        found = cartesian.amplitude(*at, unit="mm")
+        return {size: replace(found, value=settled(found.value)), angle: cartesian.phase_deg(*at)}
 
     on_axis, on_wg = "axis eccentricity ", "wave-generator eccentricity along its "
     return {
