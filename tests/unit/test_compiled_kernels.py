@@ -94,6 +94,16 @@ def over_the_beat(profile):
     return found
 
 
+def one_drive_exactly():
+    """The extremes over all input turns of one drive after the other, by the exact geometry."""
+    import numba  # noqa: F401  # without it a few drives are gone through as Python
+
+    from hdopt.drive.errors import DriveErrors
+    from hdopt.kinematics.extremes import extremes_arcmin
+
+    return np.array([extremes_arcmin(drive(), DriveErrors.from_matrix(row), "exact") for row in rows_of(5)])
+
+
 def in_one_pass(points):
     """Asks for a stack in one pass, of ready `points` or of Sobol' points that it makes."""
 
@@ -152,10 +162,11 @@ KERNELS = {
     "one pass of ready points": Kernel("tolerance.fused_kernel.points_block", in_one_pass(points=True)),
     "errors": Kernel("kinematics.kernel.peak_to_peak_block", of_errors),
     "slopes": Kernel("kinematics.gradients._extremes", of_slopes),
+    "one drive": Kernel("kinematics.essential.essential_extremes", one_drive_exactly),
     "walk": Kernel("simulation.walk_kernel.extended_walk", walked),
     "beat of a measured cam": Kernel("kinematics.contour_kernel.contour_extremes_block", over_the_beat("measured")),
 }
-IN_PIECES = {"slopes": (), "beat": (), "beat of a measured cam": ("beat",)}
+IN_PIECES = {"slopes": (), "one drive": (), "beat": (), "beat of a measured cam": ("beat",)}
 """Kernels of which functions stand beside the entry, all in double precision, and those that have some of the same: in
 one piece they take twice as long to compile and are no faster."""
 
