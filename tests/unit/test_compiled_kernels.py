@@ -77,10 +77,8 @@ def walked():
     """The same over all input angles, of a drive with friction."""
     from hdopt.simulation.batch import local_extremes
 
-    table = table_of("hysteresis", 0)
-    return np.concatenate(
-        [one.values(drive(), rows_of(1)[0], table) for one in local_extremes(drive(), rows_of(1)[0], table, 2)]
-    )
+    row, table = rows_of(1)[0], table_of("hysteresis", 0)
+    return np.concatenate([one.values(drive(), row, table) for one in local_extremes(drive(), row, table, 2)])
 
 
 def over_the_beat(profile):
@@ -167,8 +165,10 @@ KERNELS = {
     "beat of a measured cam": Kernel("kinematics.contour_kernel.contour_extremes_block", over_the_beat("measured")),
 }
 IN_PIECES = {"slopes": (), "one drive": (), "beat": (), "beat of a measured cam": ("beat",)}
-"""Kernels of which functions stand beside the entry, all in double precision, and those that have some of the same: in
-one piece they take twice as long to compile and are no faster."""
+"""Kernels of which functions stand beside the entry, and those that have some of the same, after which they are asked
+again. Those of slopes and of one drive contract nothing, so that every copy has the same bits; those of the beat take
+half as long again to compile in one piece, or twice, and are no faster.
+"""
 
 
 class Computed(NamedTuple):
